@@ -1,0 +1,248 @@
+"""What makes a set of numbers a possible fish.
+
+Errors, because no body could have the numbers or the equations of motion break down:
+
+* a value that is not a finite number or is outside its declared bounds; masses, inertias, areas
+  and lengths are positive, drag and lift coefficients are not negative, damping takes power out;
+* a weight block as heavy as the fish; a crank as long as its connecting rod (it could not turn);
+* a moment of inertia larger than the sum of the other two of the same part, which no distribution
+  of mass has. An identified value is exempt and only warned of: a refit absorbs water that moves
+  with the hull, and such an effective inertia need not belong to any rigid body;
+* an inertia of the whole fish, block at rest, that is not positive definite about the centre of
+  mass. The moments about O_b are positive whenever those of the parts are, but the model keeps no
+  products of inertia, so a far off-axis balance can leave the mass matrix indefinite.
+"""
+
+import difflib
+import math
+import numbers
+import warnings
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fish_env.errors import ParameterError
+from fish_env.params import trees
+from fish_env.params.fields import Leaf, leaves, tables
+from fish_env.params.provenance import STATUSES, Origin, Posterior
+
+if TYPE_CHECKING:
+    from fish_env.params.schema import FishParams
+
+
+def check_fish(fish: "FishParams") -> None:
+    """Checks a whole fish.
+
+    Raises:
+        ParameterError: Something is impossible; names file, key and remedy.
+    """
+    if not isinstance(fish.name, str) or not fish.name:
+        raise fault(fish, "name", f"is {fish.name!r}", "give the fish a name, as text")
+    for leaf in (*leaves(fish), *leaves(fish.prior, "prior")):
+        check_number(fish, leaf.path, leaf.value)
+        check_bounds(fish, leaf)
+    check_masses(fish)
+    check_triangle(fish, "inertia.rest", fish.inertia.rest)
+    check_triangle(fish, "inertia.weight_block", fish.inertia.weight_block)
+    check_central_inertia(fish)
+    check_effects(fish)
+    check_provenance(fish)
+    if fish.posterior is not None:
+        check_posterior(fish, fish.posterior)
+
+
+def fault(fish: "FishParams", key: str, problem: str, remedy: str) -> ParameterError:
+    """Words an error: file, key, what is wrong, what to do."""
+    return ParameterError(f"{fish.source_file or fish.name}: {key} {problem}; {remedy}")
+
+
+def closest(word: str, choices: Iterable[str]) -> str:
+    """Returns ", did you mean 'x'?" for the choice closest to a word, or nothing."""
+    match = difflib.get_close_matches(word, list(choices), n=1, cutoff=0.5)
+    return f", did you mean '{match[0]}'?" if match else ""
+
+
+def unknown_path(fish: "FishParams", path: str) -> str:
+    """Words the error for a path that names no number."""
+    origin = fish.source_file or fish.name
+    for key, table in tables(fish):
+        if path == key or path.startswith(f"{key}."):
+            return f"{origin}: {path} is replaced by the table {table.source}; change its rows"
+    if path in trees.prefixes(fish):
+        below = [leaf.path for leaf in leaves(fish) if leaf.path.startswith(path)]
+        return f"{origin}: {path} is a group, not a number; name one of {', '.join(below)}"
+    hint = closest(path, (leaf.path for leaf in leaves(fish)))
+    return f"{origin}: no parameter {path}{hint or '; see values() for all paths'}"
+
+
+def check_number(fish: "FishParams", key: str, value: Any) -> None:
+    """Checks that a value is one finite number; true and false are not."""
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        shown = f"{value!r} ({type(value).__name__})"
+        raise fault(fish, key, f"is {shown}, not a number", "write a plain number in SI units")
+    if not math.isfinite(value):
+        raise fault(fish, key, f"is {value}", "write a finite number")
+
+
+def check_bounds(fish: "FishParams", leaf: Leaf) -> None:
+    """Checks that a value lies within its declared bounds."""
+    spec = leaf.spec
+    if not spec.lower <= leaf.value <= spec.upper:
+        unit = "" if spec.unit == "-" else f" {spec.unit}"
+        allowed = f"{spec.lower:g} to {spec.upper:g}{unit}"
+        raise fault(
+            fish,
+            leaf.path,
+            f"({spec.description}) is {leaf.value:g}{unit}, outside {allowed}",
+            f"give a value from {allowed}",
+        )
+
+
+def check_masses(fish: "FishParams") -> None:
+    """Checks that the block is a part of the fish and the crank can turn."""
+    mass, crank = fish.mass, fish.weight_block.crank
+    if mass.weight_block >= mass.total:
+        raise fault(
+            fish,
+            "mass.weight_block",
+            f"is {mass.weight_block:g} kg, no less than mass.total, {mass.total:g} kg",
+            "the block is a part of the fish, give it a smaller mass",
+        )
+    if crank.l1 >= crank.l2:
+        raise fault(
+            fish,
+            "weight_block.crank.l1",
+            f"is {crank.l1:g} m, no shorter than weight_block.crank.l2, {crank.l2:g} m",
+            "the crank turns only with l1 < l2",
+        )
+
+
+def check_triangle(fish: "FishParams", key: str, moments: tuple[float, ...]) -> None:
+    """Checks that each principal moment is at most the sum of the other two."""
+    worst = max(range(3), key=lambda axis: moments[axis])
+    others = sum(moments) - moments[worst]
+    if moments[worst] <= others * (1 + 1e-9):
+        return
+    problem = f"is {moments[worst]:g} kg m^2, more than the other two together, {others:g} kg m^2"
+    remedy = "no rigid body has such moments, check the three"
+    error = fault(fish, f"{key}[{worst}]", problem, remedy)
+    if all(fish.provenance.of(f"{key}[{axis}]").status != "identified" for axis in range(3)):
+        raise error
+    warnings.warn(f"{error} (accepted, as it is an identified, effective inertia)", stacklevel=2)
+
+
+def check_central_inertia(fish: "FishParams") -> None:
+    """Checks that the fish's inertia about its centre of mass is positive definite.
+
+    With the block at rest, J as the model has it (diagonal, about O_b) less
+    m_total (|C_m|^2 I - C_m C_m^T) must be positive definite; that is when the 6 x 6 mass matrix
+    of the Newton-Euler equations is.
+    """
+    inertia = np.diag(inertia_about_origin(fish))
+    centre = (np.array(fish.mass.static_moment_rest) + block_moment(fish)) / fish.mass.total
+    shift = fish.mass.total * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+    smallest = float(np.linalg.eigvalsh(inertia - shift)[0])
+    if smallest <= 0:
+        raise fault(
+            fish,
+            "inertia",
+            f"is not positive definite about the centre of mass ({smallest:.3g} kg m^2)",
+            "lower mass.static_moment_rest, move the block's bracket, or raise inertia.rest",
+        )
+
+
+def block_centre(fish: "FishParams") -> NDArray[np.float64]:
+    """Returns the block's centre of mass at rest, body frame, m, shape (3,)."""
+    block = fish.weight_block
+    offset = (block.d1 - block.s_w0 + block.d3, 0.0, block.d2)
+    return np.array(block.bracket_origin) + offset
+
+
+def block_moment(fish: "FishParams") -> NDArray[np.float64]:
+    """Returns mass times centre of mass of the block at rest, kg m, shape (3,)."""
+    return fish.mass.weight_block * block_centre(fish)
+
+
+def inertia_about_origin(fish: "FishParams") -> NDArray[np.float64]:
+    """Returns the fish's moments of inertia about O_b, block at rest, kg m^2, shape (3,)."""
+    rest_mass = fish.mass.total - fish.mass.weight_block
+    rest_centre = np.array(fish.mass.static_moment_rest) / rest_mass
+    own = np.array(fish.inertia.rest) + np.array(fish.inertia.weight_block)
+    moved = rest_mass * axis_distances(rest_centre)
+    return own + moved + fish.mass.weight_block * axis_distances(block_centre(fish))
+
+
+def axis_distances(centre: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Returns the squared distance of a point from each axis, m^2, shape (3,)."""
+    squares = centre**2
+    return np.asarray(squares.sum() - squares)
+
+
+def check_effects(fish: "FishParams") -> None:
+    """Checks that effects are names with named finite numbers."""
+    for name, parameters in fish.effects.items():
+        key = f"effects.{name}"
+        if not isinstance(name, str) or not isinstance(parameters, Mapping):
+            remedy = "write each effect as a name with its parameters below"
+            raise fault(fish, key, f"is {parameters!r}", remedy)
+        for parameter, value in parameters.items():
+            check_number(fish, f"{key}.{parameter}", value)
+
+
+def check_provenance(fish: "FishParams") -> None:
+    """Checks that origins have a known status and a source, and belong to something."""
+    known = trees.prefixes(fish)
+    check_origin(fish, "default", fish.provenance.default)
+    for path, origin in fish.provenance.entries.items():
+        check_origin(fish, path, origin)
+        if path not in known:
+            remedy = f"name a parameter or a group{closest(path, known)}"
+            raise fault(fish, f"provenance.{path}", "belongs to nothing", remedy)
+
+
+def check_origin(fish: "FishParams", path: str, origin: Origin) -> None:
+    """Checks status and source of one origin."""
+    if origin.status not in STATUSES:
+        remedy = f"use one of {', '.join(STATUSES)}"
+        raise fault(fish, f"provenance.{path}.status", f"is {origin.status!r}", remedy)
+    if not isinstance(origin.source, str) or not origin.source:
+        remedy = "say in words where the value comes from"
+        raise fault(fish, f"provenance.{path}.source", f"is {origin.source!r}", remedy)
+
+
+def check_posterior(fish: "FishParams", posterior: Posterior) -> None:
+    """Checks names, sizes and definiteness of a posterior."""
+    check_names(fish, posterior.names)
+    count = len(posterior.names)
+    rows = [len(row) for row in posterior.covariance]
+    if len(posterior.mean) != count or rows != [count] * count:
+        problem = f"has {count} names, {len(posterior.mean)} means and covariance rows of {rows}"
+        raise fault(fish, "posterior", problem, "give one mean and one row and column per name")
+    for value in (*posterior.mean, *(item for row in posterior.covariance for item in row)):
+        check_number(fish, "posterior", value)
+    check_covariance(fish, np.array(posterior.covariance))
+
+
+def check_names(fish: "FishParams", names: tuple[str, ...]) -> None:
+    """Checks that a posterior's names are parameters or effect parameters of the fish, once each."""
+    known = {leaf.path for leaf in leaves(fish)}
+    known |= {f"effects.{name}.{key}" for name, values in fish.effects.items() for key in values}
+    for name in names:
+        if name not in known:
+            remedy = f"name a parameter or an effect parameter of this file{closest(name, known)}"
+            raise fault(fish, f"posterior.names: {name}", "is unknown", remedy)
+    if len(set(names)) < len(names):
+        raise fault(fish, "posterior.names", "has a name twice", "name each parameter once")
+
+
+def check_covariance(fish: "FishParams", matrix: NDArray[np.float64]) -> None:
+    """Checks that a covariance is symmetric and positive semidefinite, in units of its diagonal."""
+    scale = np.sqrt(np.clip(np.diag(matrix), 0.0, None)) if matrix.size else np.ones(0)
+    scale[scale == 0] = 1.0
+    correlation = matrix / np.outer(scale, scale)
+    symmetric = np.allclose(correlation, correlation.T, atol=1e-9)
+    if not symmetric or (matrix.size and np.linalg.eigvalsh(correlation)[0] < -1e-9):
+        problem = "is not symmetric and positive semidefinite"
+        raise fault(fish, "posterior.covariance", problem, "write the whole estimated covariance")

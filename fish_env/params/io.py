@@ -1,0 +1,172 @@
+"""Fish files: finding presets, reading, inheriting from a base, writing.
+
+A file may name a `base`, a preset or another file, and then give only what differs: sections are
+merged key by key, anything else replaces what the base says. Paths of bases and tables are relative
+to the file that names them.
+"""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from fish_env.errors import ParameterError
+from fish_env.params import trees
+from fish_env.params.building import build_fish
+from fish_env.params.checks import closest
+from fish_env.params.files import read_yaml, write_yaml
+from fish_env.params.provenance import Origin, Posterior, Provenance
+from fish_env.params.schema import FishParams
+from fish_env.params.tables import write_table
+
+SUFFIXES = (".yaml", ".yml")
+
+
+def config_root() -> Path:
+    """Returns the folder of packaged configurations, in a checkout or an installed wheel.
+
+    Raises:
+        ParameterError: There is none; the installation is incomplete.
+    """
+    package = Path(__file__).resolve().parent.parent
+    for folder in (package / "configs", package.parent / "configs"):
+        if (folder / "fish").is_dir():
+            return folder
+    raise ParameterError(f"{package}: no configs folder; reinstall the package")
+
+
+def list_fish() -> list[str]:
+    """Returns the names of the fish that come with the package, sorted."""
+    return sorted(path.stem for path in (config_root() / "fish").glob("*.yaml"))
+
+
+def load_fish(name_or_path: str | Path) -> FishParams:
+    """Reads a fish: a preset by its name, or any YAML file by its path.
+
+    Raises:
+        ParameterError: There is no such fish, or its file is not a possible one; names file, key
+            and remedy.
+    """
+    file = find_fish(name_or_path, Path())
+    return build_fish(read_merged(file, ()), file)
+
+
+def find_fish(name_or_path: str | Path, folder: Path) -> Path:
+    """Returns the file of a preset name, or of a path relative to a folder."""
+    name = str(name_or_path)
+    if name in list_fish():
+        return config_root() / "fish" / f"{name}.yaml"
+    path = (folder / Path(name).expanduser()).resolve()
+    if path.is_file():
+        return path
+    if path.suffix in SUFFIXES:
+        raise ParameterError(f"{path}: no such file; check the path")
+    presets = ", ".join(list_fish())
+    raise ParameterError(
+        f"no fish '{name}'{closest(name, list_fish())} Give the path of a YAML file, or one of: {presets}"
+    )
+
+
+def read_merged(file: Path, above: tuple[Path, ...]) -> dict[str, Any]:
+    """Reads a file merged over its bases, its table paths made absolute."""
+    if file in above:
+        chain = " -> ".join(str(path) for path in (*above, file))
+        raise ParameterError(f"{file}: base: the bases form a circle, {chain}; remove one")
+    data = read_yaml(file)
+    base = data.pop("base", None)
+    resolve_tables(data, file.parent)
+    if base is None:
+        return data
+    if not isinstance(base, str):
+        raise ParameterError(f"{file}: base is {base!r}; give the name or the path of a fish")
+    return merged(read_merged(find_base(base, file), (*above, file)), data)
+
+
+def find_base(base: str, file: Path) -> Path:
+    """Returns the file of a base, saying in any error which file asked for it."""
+    try:
+        return find_fish(base, file.parent)
+    except ParameterError as error:
+        raise ParameterError(f"{file}: base: {error}") from error
+
+
+def resolve_tables(data: Any, folder: Path) -> None:
+    """Makes the table paths in nested data absolute, in place."""
+    if not isinstance(data, dict):
+        return
+    if isinstance(data.get("table"), str):
+        data["table"] = str((folder / data["table"]).resolve())
+    for value in data.values():
+        resolve_tables(value, folder)
+
+
+def merged(base: Mapping[str, Any], change: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns a base with a change merged in, section by section.
+
+    A curve changes between analytic and table as a whole, so there the change replaces the base.
+    """
+    result = dict(base)
+    for key, value in change.items():
+        result[key] = merged_value(result.get(key), value)
+    return result
+
+
+def merged_value(old: Any, new: Any) -> Any:
+    """Returns what one key holds after a merge."""
+    if not (isinstance(old, Mapping) and isinstance(new, Mapping)):
+        return new
+    return merged(old, new) if ("table" in old) == ("table" in new) else new
+
+
+def save_fish(fish: FishParams, path: str | Path) -> None:
+    """Writes a fish to a file that loads equal to it, without reference to a base.
+
+    Coefficient tables are copied beside it, `<stem>.<curve>.csv`, so the file can be moved with them.
+
+    Raises:
+        ParameterError: The path does not end in .yaml or .yml.
+    """
+    file = Path(path)
+    if file.suffix not in SUFFIXES:
+        raise ParameterError(f"{file}: give the file the ending .yaml")
+    data: dict[str, Any] = {"name": fish.name, **trees.to_plain(fish)}
+    save_tables(fish, data, file)
+    data["prior"] = trees.to_plain(fish.prior)
+    data["provenance"] = plain_provenance(fish.provenance)
+    if fish.effects:
+        data["effects"] = {name: dict(values) for name, values in fish.effects.items()}
+    if fish.posterior is not None:
+        data["posterior"] = plain_posterior(fish.posterior)
+    write_yaml(data, file)
+
+
+def save_tables(fish: FishParams, data: dict[str, Any], file: Path) -> None:
+    """Writes the tables beside the file and puts their names into its data."""
+    for key, table in fish.tables().items():
+        copy = file.with_name(f"{file.stem}.{key}.csv")
+        write_table(table, copy)
+        *parents, last = key.split(".")
+        section = data
+        for parent in parents:
+            section = section[parent]
+        section[last] = {"table": copy.name}
+
+
+def plain_provenance(provenance: Provenance) -> dict[str, Any]:
+    """Returns origins as nested plain data."""
+    entries = {"default": provenance.default, **provenance.entries}
+    return {path: plain_origin(origin) for path, origin in entries.items()}
+
+
+def plain_origin(origin: Origin) -> dict[str, str]:
+    """Returns one origin as plain data."""
+    return {"status": origin.status, "source": origin.source}
+
+
+def plain_posterior(posterior: Posterior) -> dict[str, Any]:
+    """Returns a posterior as nested plain data."""
+    return {
+        "names": list(posterior.names),
+        "mean": list(posterior.mean),
+        "covariance": [list(row) for row in posterior.covariance],
+        "validity": dict(posterior.validity),
+    }

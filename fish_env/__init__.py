@@ -1,0 +1,1 @@
+"""Simulation, Gymnasium environment and identification of a tail-driven robotic fish."""

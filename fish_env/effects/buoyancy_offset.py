@@ -1,0 +1,27 @@
+"""Buoyancy offset: the trim is not what the scales said."""
+
+from __future__ import annotations
+
+from fish_env.model.effect import Effect, EffectParameter
+from fish_env.model.jit import kernel
+from fish_env.model.mass_properties import with_buoyancy
+
+
+@kernel
+def shift_buoyancy(centre, place, inputs, time, fish, e):
+    """m_b + mass."""
+    return with_buoyancy(centre, centre.buoyancy_mass + e.mass)
+
+
+EFFECT = Effect(
+    name="buoyancy_offset",
+    section="hydrostatics",
+    summary="The fish displaces a little more or less water than its weight.",
+    equation="m_b -> m_b + mass",
+    source="Archimedes' principle",
+    parameters=(
+        EffectParameter("mass", "kg", 0.0, -1.0, 1.0, (-0.01, 0.01), "extra displaced mass"),
+    ),
+    hooks={"barycentre": shift_buoyancy},
+    confusable_with=("hull_compression", "water_ingress", "com_offset", "depth_bias"),
+)

@@ -1,0 +1,54 @@
+"""Servo lag: the tail follows its command as a first-order system."""
+
+from __future__ import annotations
+
+from fish_env.model.effect import Effect, EffectParameter
+from fish_env.model.jit import kernel
+from fish_env.model.records import Tail
+from fish_env.model.tail import commanded_tail
+
+
+@kernel
+def lag_tail(tail, inputs, phase, time, fish, e, states):
+    """d(xi)/dt = (cmd - xi) / T, and its derivative for the tail's acceleration."""
+    (angle,) = states
+    on = e.time_constant > 0.0
+    per_second = 1.0 / (e.time_constant if on else 1.0)
+    rate = (tail.angle - angle) * per_second
+    acceleration = (tail.rate - rate) * per_second
+    seen = Tail(
+        angle if on else tail.angle,
+        rate if on else tail.rate,
+        acceleration if on else tail.acceleration,
+    )
+    return seen, (rate if on else 0.0,)
+
+
+@kernel
+def start_at_command(inputs, phase, fish, e):
+    """The run starts with the tail where it is commanded."""
+    return (commanded_tail(inputs, phase).angle,)
+
+
+def fastest(values):
+    """The lag itself; infinite when the effect is off."""
+    return values["time_constant"] or float("inf")
+
+
+EFFECT = Effect(
+    name="servo_lag",
+    section="actuation",
+    summary="The tail lags its command, so it loses amplitude and phase as the beat quickens.",
+    equation="d(xi)/dt = (cmd - xi) / time_constant",
+    source="First-order servo model, e.g. Ogata, Modern Control Engineering, section 5-2",
+    parameters=(
+        EffectParameter(
+            "time_constant", "s", 0.0, 0.0, 1.0, (0.01, 0.15), "time to 63 % of a step"
+        ),
+    ),
+    hooks={"tail": lag_tail},
+    states={"tail": ("angle",)},
+    initial_states=start_at_command,
+    time_scale=fastest,
+    confusable_with=("servo_delay", "tail_gain", "tail_flexibility", "wake_memory", "sensor_delay"),
+)

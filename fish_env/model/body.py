@@ -1,0 +1,82 @@
+"""The body: lift and drag in two planes, impact moments, rotational damping (paper III.C.2)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from fish_env.model.jit import kernel
+from fish_env.model.plate import speed_and_inverse
+from fish_env.model.records import Motion, Vector
+
+
+class PlaneFlow(NamedTuple):
+    """Flow in one body plane: speed (m/s), s = sin(alpha), cos(alpha), 1/2 rho S_i (kg/m)."""
+
+    speed: float
+    s: float
+    cosine: float
+    scale: float
+
+
+@kernel
+def plane_flow(axial, normal, area_axial, area_normal, density):
+    """S_i = e^T diag(S) e with e = V_i/|V_i|; s_i = n_i . e_i; cos(alpha) = |V_x|/|V_i|."""
+    speed, inverse = speed_and_inverse(axial, normal, 0.0)
+    along = axial * inverse
+    s = normal * inverse
+    area = area_axial * (along * along) + area_normal * (s * s)
+    return PlaneFlow(speed, s, abs(along), 0.5 * density * area)
+
+
+@kernel
+def relative_motion(time, place, velocity, omega, attitude, water):
+    """Motion against ground and water; V_rel = V_b - R^T water (m/s, body)."""
+    return Motion(
+        time,
+        place.x,
+        place.y,
+        place.z,
+        velocity.x - water.x,
+        velocity.y - water.y,
+        velocity.z - water.z,
+        omega.x,
+        omega.y,
+        omega.z,
+        velocity.x,
+        velocity.y,
+        velocity.z,
+        water.x,
+        water.y,
+        water.z,
+        attitude,
+    )
+
+
+@kernel
+def plane_xz_velocity(motion):
+    """V_1 = (V_x, 0, V_z) (m/s, body)."""
+    return Vector(motion.u, 0.0, motion.w)
+
+
+@kernel
+def plane_xy_velocity(motion):
+    """V_2 = (V_x, V_y, 0) (m/s, body)."""
+    return Vector(motion.u, motion.v, 0.0)
+
+
+@kernel
+def impact_moment(flow_xz, flow_xy, coefficient_y, coefficient_z):
+    """M_I = [0, M_y, M_z] with 1/2 rho |V_i|^2 S_i C_MI(alpha_i) (N m, body, about O_b)."""
+    return Vector(
+        0.0,
+        flow_xz.scale * (flow_xz.speed * flow_xz.speed) * coefficient_y,
+        flow_xy.scale * (flow_xy.speed * flow_xy.speed) * coefficient_z,
+    )
+
+
+@kernel
+def damping_moment(motion, fish):
+    """M_omega = diag(C_omega) omega_b (N m, body, about O_b); the coefficients are negative."""
+    return Vector(
+        fish.damping_x * motion.p, fish.damping_y * motion.q, fish.damping_z * motion.r
+    )

@@ -1,0 +1,76 @@
+"""The only place that decorates kernels, and the folder their machine code is cached in.
+
+numba's cache does not notice an edited callee in another file (numba issue 1833). Every kernel
+source therefore enters the hash that names the cache folder: an edit anywhere starts a fresh one.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Callable, Iterable
+from functools import cache
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+# IEEE semantics on purpose (no fastmath): one lane or sixteen then give the same bits.
+_COMMON = {"error_model": "numpy", "nogil": True}
+
+
+def kernel(function: F) -> F:
+    """Compile a physics function that is always inlined into the kernel calling it.
+
+    Kernels take and return floats, arrays and named tuples of floats: no random numbers, no I/O,
+    no exceptions. Effects written by users carry the same decorator.
+    """
+    return numba.njit(forceinline=True, **_COMMON)(function)
+
+
+def entry_point(function: F) -> F:
+    """Compile a function that Python calls; its machine code is kept on disk."""
+    return numba.njit(cache=True, **_COMMON)(function)
+
+
+def py_function(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The plain Python function behind a compiled one."""
+    return getattr(function, "py_func", function)
+
+
+def cache_root() -> Path:
+    """Folder for compiled kernels: ``$ROBOFISH_CACHE_DIR``, else the user's cache folder."""
+    named = os.environ.get("ROBOFISH_CACHE_DIR")
+    if named:
+        return Path(named)
+    base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
+    root = Path(base) / "robofish"
+    return root if _writable(root) else Path(tempfile.gettempdir()) / f"robofish-{os.getuid()}"
+
+
+def _writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return False
+    return os.access(folder, os.W_OK)
+
+
+def source_hash(extra_sources: Iterable[Path] = ()) -> str:
+    """Hash of every kernel source (``model/``, ``effects/``, ``envs/``) and the extra files."""
+    package = Path(__file__).resolve().parent.parent
+    folders = ("model", "effects", "envs")
+    files = [path for name in folders for path in sorted((package / name).glob("*.py"))]
+    return _hash_files((*files, *extra_sources))
+
+
+@cache
+def _hash_files(files: tuple[Path, ...]) -> str:
+    digest = hashlib.sha256(numba.__version__.encode())
+    for path in files:
+        digest.update(path.name.encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]

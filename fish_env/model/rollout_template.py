@@ -1,0 +1,224 @@
+"""Entry points of the compiled physics: RK4 rollouts, derivatives and wrenches by term.
+
+:mod:`fish_env.model.compose` completes this text with the composed ``lane_derivative`` and
+``lane_terms`` and compiles the result; it is never run as it stands. Numbers of one block of fish
+lie in one flat work array, row by row, ``width`` lanes a row: the compiler then sees that no two
+rows overlap and computes all lanes at once.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fish_env.model.jit import entry_point, kernel
+
+# --- completed by compose ---
+from fish_env.model.composed import (  # type: ignore[import-not-found]
+    N_PARAMETERS,
+    N_STATES,
+    N_TERMS,
+    lane_derivative,
+    lane_initialise,
+    lane_terms,
+)
+
+# --- end ---
+
+LANES = 16
+X0 = 0
+X = X0 + N_STATES
+DX = X + N_STATES
+SUM = DX + N_STATES
+U = SUM + N_STATES
+U_RATE = U + 5
+U_END = U_RATE + 5
+SLEW = U_END + 5
+TIME = SLEW + 5
+PAR = TIME + 1
+WORK_ROWS = PAR + N_PARAMETERS
+LARGEST = 1e4  # a state beyond this many SI units has diverged
+
+
+@kernel
+def gather(work, width, row, source, first, count):
+    """Copy rows of lanes first..first+count into the block; spare lanes repeat the last one."""
+    for i in range(source.shape[0]):
+        for k in range(width):
+            lane = first + (k if k < count else count - 1)
+            work[(row + i) * width + k] = source[i, lane]
+
+
+@kernel
+def scatter(work, width, row, target, first, count):
+    """Copy rows of the block back."""
+    for i in range(target.shape[0]):
+        for k in range(count):
+            target[i, first + k] = work[(row + i) * width + k]
+
+
+@kernel
+def plan_actuators(work, width, commands, segment, first, count, h):
+    """Where each actuator goes in this step: at once if its slew limit is infinite."""
+    shared = commands.shape[2] == 1
+    per_second = 1.0 / h
+    for j in range(5):
+        for k in range(width):
+            lane = first + (k if k < count else count - 1)
+            target = commands[segment, j, 0 if shared else lane]
+            slew = work[(SLEW + j) * width + k]
+            position = work[(U + j) * width + k]
+            ideal = slew == np.inf
+            limit = slew * h
+            gap = target - position
+            move = min(max(gap, -limit), limit)
+            end = target if abs(gap) <= limit else position + move
+            work[(U + j) * width + k] = target if ideal else position
+            work[(U_RATE + j) * width + k] = 0.0 if ideal else move * per_second
+            work[(U_END + j) * width + k] = end
+
+
+@kernel
+def rk4_step(work, width, elapsed, h, tables):
+    """One classical Runge-Kutta step of every lane: X0 -> X."""
+    for n in range(N_STATES * width):
+        work[X * width + n] = work[X0 * width + n]
+        work[SUM * width + n] = 0.0
+    for stage in range(4):
+        fraction = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
+        weight = 1.0 if (stage == 0) | (stage == 3) else 2.0
+        ahead = 0.5 * h if stage < 2 else h
+        for k in range(width):
+            lane_derivative(k, width, elapsed, fraction * h, work, tables)
+        if stage < 3:
+            for n in range(N_STATES * width):
+                slope = work[DX * width + n]
+                work[SUM * width + n] += weight * slope
+                work[X * width + n] = work[X0 * width + n] + ahead * slope
+        else:
+            for n in range(N_STATES * width):
+                total = work[SUM * width + n] + work[DX * width + n]
+                work[X * width + n] = work[X0 * width + n] + (h / 6.0) * total
+
+
+@kernel
+def accept_step(work, width, elapsed, failed_at, first, count):
+    """Normalise the quaternion; keep a lane that diverged at its last good state."""
+    for k in range(width):
+        norm = 0.0
+        for j in range(3, 7):
+            component = work[(X + j) * width + k]
+            norm += component * component
+        scale = 1.0 / np.sqrt(norm)
+        size = 0.0
+        for j in range(N_STATES):
+            value = work[(X + j) * width + k]
+            size += abs(value) if (j < 13) | (j >= 18) else 0.0 * value
+        good = size < LARGEST
+        for j in range(N_STATES):
+            value = work[(X + j) * width + k]
+            value = value * scale if (j >= 3) & (j < 7) else value
+            work[(X0 + j) * width + k] = value if good else work[(X0 + j) * width + k]
+        for j in range(5):
+            work[(U + j) * width + k] = work[(U_END + j) * width + k]
+        if (not good) & (k < count):
+            at = work[TIME * width + k] + elapsed
+            failed_at[first + k] = min(failed_at[first + k], at)
+
+
+@kernel
+def advance_block(
+    width, state, inputs, par, slew, time, commands, steps, sizes, every, trace_row, trace_at,
+    trace, failed_at, tables, first, count,
+):  # fmt: skip
+    """Advance lanes first..first+count through all segments (see :func:`advance_lanes`)."""
+    work = np.empty(WORK_ROWS * width)
+    gather(work, width, X0, state, first, count)
+    gather(work, width, U, inputs, first, count)
+    gather(work, width, SLEW, slew, first, count)
+    gather(work, width, PAR, par, first, count)
+    for k in range(width):
+        work[TIME * width + k] = time[first + (k if k < count else count - 1)]
+    done = 0
+    start = 0.0
+    for segment in range(steps.shape[0]):
+        h = sizes[segment]
+        for i in range(steps[segment]):
+            elapsed = start + i * h
+            plan_actuators(work, width, commands, segment, first, count, h)
+            rk4_step(work, width, elapsed, h, tables)
+            accept_step(work, width, elapsed + h, failed_at, first, count)
+            done += 1
+            if (trace.shape[0] > 0) & (done % every == 0):
+                slot = (trace_at + done // every - 1) % trace.shape[0]
+                for j in range(trace.shape[1]):
+                    for k in range(count):
+                        trace[slot, j, first + k] = work[(X0 + trace_row + j) * width + k]
+        start += steps[segment] * h
+    scatter(work, width, X0, state, first, count)
+    scatter(work, width, U, inputs, first, count)
+
+
+@entry_point
+def advance_lanes(
+    state, inputs, par, slew, time, commands, steps, sizes, every, trace_row, trace_at, trace,
+    failed_at, tables, first, last,
+):  # fmt: skip
+    """Advance fish first..last in place, sixteen at a time.
+
+    Args:
+        state: (states, N). Rows as :data:`fish_env.model.state.BASE_STATES`, then effect states.
+        inputs: (5, N) actuator positions, in place.
+        par: (parameters, N) records.
+        slew: (5, N) slew limits (per second); infinite = ideal actuator.
+        time: (N,) time at the start (s).
+        commands: (segments, 5, N or 1) targets.
+        steps: (segments,) physics steps in each segment.
+        sizes: (segments,) step size of each segment (s).
+        every: store into ``trace`` after every this many steps.
+        trace_row: first state row that is stored.
+        trace_at: slot of the first stored sample; slots wrap around.
+        trace: (slots, rows, N) stored samples; no slots = nothing is stored.
+        failed_at: (N,) time at which a fish diverged (s), infinite where none did.
+        tables: packed coefficient curves.
+        first: first fish.
+        last: one past the last fish.
+    """
+    for block in range(first, last, LANES):
+        advance_block(
+            LANES, state, inputs, par, slew, time, commands, steps, sizes, every, trace_row,
+            trace_at, trace, failed_at, tables, block, min(LANES, last - block),
+        )  # fmt: skip
+
+
+@entry_point
+def advance_one(
+    state, inputs, par, slew, time, commands, steps, sizes, every, trace_row, trace_at, trace,
+    failed_at, tables, first, last,
+):  # fmt: skip
+    """As :func:`advance_lanes`, one fish at a time: for a single fish."""
+    for lane in range(first, last):
+        advance_block(
+            1, state, inputs, par, slew, time, commands, steps, sizes, every, trace_row,
+            trace_at, trace, failed_at, tables, lane, 1,
+        )  # fmt: skip
+
+
+@entry_point
+def derivative_batch(work, width, tables):
+    """Fill the derivative rows of a work array of ``width`` fish, in place."""
+    for k in range(width):
+        lane_derivative(k, width, 0.0, 0.0, work, tables)
+
+
+@entry_point
+def terms_batch(work, width, terms, tables):
+    """Wrench of every term, (terms, 6, N): force (N) and moment about O_b (N m), body frame."""
+    for k in range(width):
+        lane_terms(k, width, 0.0, 0.0, work, tables, terms)
+
+
+@entry_point
+def initialise_batch(work, width):
+    """Set the effect states of the X rows to where the start of a run leaves them."""
+    for k in range(width):
+        lane_initialise(k, width, work)

@@ -1,0 +1,186 @@
+"""Runs a composed kernel: whole batches over both cores, derivatives, wrenches by term."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numba
+import numpy as np
+import numpy.typing as npt
+
+from fish_env.model import compose
+from fish_env.model.compose import Composition
+
+FloatArray = npt.NDArray[np.float64]
+NO_TRACE = np.zeros((0, 0, 0))
+
+
+@cache
+def _pool(threads: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(threads, thread_name_prefix="fish")
+
+
+def default_threads() -> int:
+    """Threads for batches: ``$ROBOFISH_THREADS``, else the cores this process may use."""
+    named = os.environ.get("ROBOFISH_THREADS")
+    return max(1, int(named)) if named else len(os.sched_getaffinity(0))
+
+
+def run_in_threads(task: Callable[[int, int], Any], count: int, lanes: int, threads: int) -> None:
+    """Call ``task(first, last)`` on slices of a batch, at least eight blocks of lanes each.
+
+    Slices end on block boundaries, so the bits do not depend on the number of threads.
+    """
+    blocks = -(-count // lanes)
+    parts = max(1, min(threads, blocks // 8))
+    if parts == 1:
+        task(0, count)
+        return
+    edges = [min(count, lanes * (blocks * i // parts)) for i in range(parts + 1)]
+    pool = _pool(threads)
+    jobs = [pool.submit(task, edges[i], edges[i + 1]) for i in range(1, parts)]
+    task(edges[0], edges[1])
+    for job in jobs:
+        job.result()
+
+
+class Kernels:
+    """Compiled entry points of one composition.
+
+    Attributes:
+        composition: which effects are in.
+        state_names: rows of state arrays.
+        parameter_names: rows of record arrays.
+    """
+
+    def __init__(self, composition: Composition) -> None:
+        self.composition = composition
+        self.module: ModuleType = compose.load(composition)
+        self.state_names = composition.state_names
+        self.parameter_names = composition.parameter_names
+        self.lanes: int = self.module.LANES
+
+    def advance(
+        self,
+        state: FloatArray,
+        inputs: FloatArray,
+        par: FloatArray,
+        slew: FloatArray,
+        time: FloatArray,
+        commands: FloatArray,
+        steps: npt.NDArray[np.int64],
+        sizes: FloatArray,
+        *,
+        tables: FloatArray,
+        failed_at: FloatArray,
+        trace: FloatArray = NO_TRACE,
+        every: int = 1,
+        trace_row: int = 0,
+        trace_at: int = 0,
+        threads: int | None = None,
+    ) -> None:
+        """Advance all fish in place; arguments as in ``rollout_template.advance_lanes``."""
+        count = state.shape[1]
+        name = "advance_one" if count == 1 else "advance_lanes"
+        function = self.entry(name)
+
+        def task(first: int, last: int) -> None:
+            function(
+                state, inputs, par, slew, time, commands, steps, sizes, every, trace_row,
+                trace_at, trace, failed_at, tables, first, last,
+            )  # fmt: skip
+
+        run_in_threads(task, count, self.lanes, threads or default_threads())
+
+    def derivative(
+        self,
+        state: FloatArray,
+        inputs: FloatArray,
+        rates: FloatArray,
+        par: FloatArray,
+        time: FloatArray,
+        tables: FloatArray,
+    ) -> FloatArray:
+        """d(state)/dt, shape (states, N), at actuator positions and rates (5, N)."""
+        work = self._work(state, inputs, rates, par, time)
+        self.entry("derivative_batch")(work, state.shape[1], tables)
+        return self._rows(work, self.module.DX, state.shape[1])
+
+    def terms(
+        self,
+        state: FloatArray,
+        inputs: FloatArray,
+        rates: FloatArray,
+        par: FloatArray,
+        time: FloatArray,
+        tables: FloatArray,
+    ) -> FloatArray:
+        """Wrench of each term, shape (terms, 6, N), in N and N m about O_b, body frame."""
+        work = self._work(state, inputs, rates, par, time)
+        result = np.zeros((self.module.N_TERMS, 6, state.shape[1]))
+        self.entry("terms_batch")(work, state.shape[1], result, tables)
+        return result
+
+    def initialise(
+        self, state: FloatArray, inputs: FloatArray, par: FloatArray, time: FloatArray
+    ) -> None:
+        """Set the effect states where the start of a run leaves them, in place."""
+        if len(self.state_names) == len(compose.BASE_STATES):
+            return
+        work = self._work(state, inputs, np.zeros_like(inputs), par, time)
+        self.entry("initialise_batch")(work, state.shape[1])
+        state[:] = self._rows(work, self.module.X, state.shape[1])
+
+    def _work(
+        self,
+        state: FloatArray,
+        inputs: FloatArray,
+        rates: FloatArray,
+        par: FloatArray,
+        time: FloatArray,
+    ) -> FloatArray:
+        module, count = self.module, state.shape[1]
+        work = np.zeros((module.WORK_ROWS, count))
+        work[module.X : module.X + module.N_STATES] = state
+        work[module.U : module.U + 5] = inputs
+        work[module.U_RATE : module.U_RATE + 5] = rates
+        work[module.TIME] = time
+        work[module.PAR :] = par
+        return work.reshape(-1)
+
+    def _rows(self, work: FloatArray, row: int, count: int) -> FloatArray:
+        return work.reshape(-1, count)[row : row + self.module.N_STATES].copy()
+
+    def entry(self, name: str) -> Callable[..., Any]:
+        """A compiled entry point; says so on stderr when it has to be compiled first."""
+        function: Callable[..., Any] = getattr(self.module, name)
+        announce_compilation(function, Path(str(self.module.__file__)), name)
+        return function
+
+
+def announce_compilation(function: Any, file: Path, name: str) -> None:
+    """Tell the user, once for a machine, that a kernel is being compiled."""
+    if getattr(function, "signatures", True) or numba.config.DISABLE_JIT:
+        return
+    marker = file.with_suffix(f".{name}.compiled")
+    if marker.exists():
+        return
+    print(
+        f"fish_env: compiling {name} for this machine (once; some seconds, kept in {file.parent})",
+        file=sys.stderr,
+        flush=True,
+    )
+    marker.touch()
+
+
+@cache
+def kernels(composition: Composition) -> Kernels:
+    """Kernels of a composition, loaded once in a process."""
+    return Kernels(composition)

@@ -1,0 +1,59 @@
+# Set-up, tests and demonstration. Needs make and Python 3.11 or newer, nothing else.
+# Another interpreter: make PYTHON=python3.12 test
+
+PYTHON ?= python3
+JOBS ?= 2
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
+
+.DEFAULT_GOAL := help
+.PHONY: help setup test lint demo bench clean
+
+help:  ## list the targets
+	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 16
+
+setup: $(VENV)/.with-dev  ## create .venv and install everything that tests and training need
+
+test: setup lint  ## check style, types and layering, then run the tests
+	$(BIN)/python -m pytest -n $(JOBS)
+
+lint: setup  ## style, types and import direction
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+demo: $(VENV)/.with-base  ## compare a measured fish with its simulation and swim the environment
+	$(BIN)/robofish demo
+
+bench: $(VENV)/.with-bench  ## measure speed beside other environments
+	$(BIN)/python scripts/bench/run.py
+
+clean:  ## remove .venv and everything that builds and tests leave behind
+	rm -rf $(VENV) build dist out .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# Each stamp is redone only when the project file or the tested versions change.
+$(VENV)/bin/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	  echo "Python 3.11 or newer is needed, '$(PYTHON)' is not it (or is missing)."; \
+	  echo "Name one that is, for example: make PYTHON=python3.12 setup"; exit 1; }
+	@echo "Creating $(VENV) with $$($(PYTHON) --version)"
+	@$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.with-base: pyproject.toml constraints.txt | $(VENV)/bin/python
+	@echo "Installing robotic-fish into $(VENV) (about a minute, only this once)"
+	@$(PIP) --editable .
+	@touch $@
+
+$(VENV)/.with-dev: pyproject.toml constraints.txt | $(VENV)/bin/python
+	@echo "Installing robotic-fish with its test and training tools into $(VENV)"
+	@echo "(a few minutes, only this once; PyTorch is the large part)"
+	@$(PIP) --editable ".[dev,train,parquet]"
+	@touch $(VENV)/.with-base $@
+
+$(VENV)/.with-bench: pyproject.toml constraints.txt | $(VENV)/bin/python
+	@echo "Installing robotic-fish and the simulators it is measured against into $(VENV)"
+	@$(PIP) --editable ".[bench]"
+	@touch $(VENV)/.with-base $@

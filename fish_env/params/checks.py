@@ -177,7 +177,8 @@ def inertia_about_origin(fish: "FishParams") -> NDArray[np.float64]:
 def axis_distances(centre: NDArray[np.float64]) -> NDArray[np.float64]:
     """Returns the squared distance of a point from each axis, m^2, shape (3,)."""
     squares = centre**2
-    return np.asarray(squares.sum() - squares)
+    distances: NDArray[np.float64] = squares.sum() - squares
+    return distances
 
 
 def check_effects(fish: "FishParams") -> None:
@@ -226,7 +227,7 @@ def check_posterior(fish: "FishParams", posterior: Posterior) -> None:
 
 
 def check_names(fish: "FishParams", names: tuple[str, ...]) -> None:
-    """Checks that a posterior's names are parameters or effect parameters of the fish, once each."""
+    """Checks that a posterior names parameters or effect parameters of the fish, once each."""
     known = {leaf.path for leaf in leaves(fish)}
     known |= {f"effects.{name}.{key}" for name, values in fish.effects.items() for key in values}
     for name in names:

@@ -60,9 +60,10 @@ def find_fish(name_or_path: str | Path, folder: Path) -> Path:
         return path
     if path.suffix in SUFFIXES:
         raise ParameterError(f"{path}: no such file; check the path")
-    presets = ", ".join(list_fish())
+    presets = list_fish()
     raise ParameterError(
-        f"no fish '{name}'{closest(name, list_fish())} Give the path of a YAML file, or one of: {presets}"
+        f"no fish '{name}'{closest(name, presets) or ';'} "
+        f"give the path of a YAML file or one of {', '.join(presets)}"
     )
 
 
@@ -120,7 +121,7 @@ def merged_value(old: Any, new: Any) -> Any:
 def save_fish(fish: FishParams, path: str | Path) -> None:
     """Writes a fish to a file that loads equal to it, without reference to a base.
 
-    Coefficient tables are copied beside it, `<stem>.<curve>.csv`, so the file can be moved with them.
+    Coefficient tables are copied beside it as `<stem>.<curve>.csv` and move along with it.
 
     Raises:
         ParameterError: The path does not end in .yaml or .yml.

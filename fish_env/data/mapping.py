@@ -1,0 +1,151 @@
+"""Access to the sections of dataset.yaml: every key is known, required or refused by name."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import yaml
+
+from fish_env.data.place import Place, closest
+from fish_env.data.table import read_text
+
+
+class TextLoader(yaml.BaseLoader):
+    """Reads every scalar as text, so that an id `007` or a number `2e-3` stays what it is."""
+
+
+def _construct_mapping(loader: TextLoader, node: yaml.MappingNode) -> dict[Any, Any]:
+    mapping: dict[Any, Any] = {}
+    for key_node, value_node in node.value:
+        key = loader.construct_object(key_node, deep=True)
+        if key in mapping:
+            line = key_node.start_mark.line + 1
+            raise yaml.YAMLError(f"line {line}: the key '{key}' is there twice")
+        value = loader.construct_object(value_node, deep=True)
+        mapping[key] = value
+    return mapping
+
+
+TextLoader.add_constructor("tag:yaml.org,2002:map", _construct_mapping)
+
+
+class Section:
+    """One mapping of dataset.yaml, its values all text, lists or sections.
+
+    Attributes:
+        place: The file, the run where it is about one, and the path of the section.
+    """
+
+    def __init__(self, content: object, place: Place) -> None:
+        if not isinstance(content, dict):
+            raise place.refuse("this must hold 'key: value' pairs", "Write it as the format shows")
+        self._content = content
+        self.place = place
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._content
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._content)
+
+    def at(self, key: str) -> Place:
+        """Returns the place of a key."""
+        above = self.place.key
+        return replace(self.place, key=f"{above}.{key}" if above else key)
+
+    def allow(self, known: Iterable[str], what: str = "key") -> None:
+        """Refuses every key but these.
+
+        Raises:
+            DatasetError: Naming the first unknown key and the one most like it.
+        """
+        names = list(known)
+        for key in self._content:
+            if key not in names:
+                raise self.at(key).refuse(f"unknown {what} '{key}'", closest(str(key), names))
+
+    def require(self, keys: Iterable[str]) -> None:
+        """Refuses the section unless it has all these keys.
+
+        Raises:
+            DatasetError: Naming the first missing key.
+        """
+        for key in keys:
+            if key not in self:
+                raise self.at(key).refuse(f"the key '{key}' is missing", "Add it")
+
+    def text(self, key: str) -> str:
+        """Returns a value that must be text.
+
+        Raises:
+            DatasetError: The key is missing, empty, or holds a list or a section.
+        """
+        self.require([key])
+        value = self._content[key]
+        if not isinstance(value, str) or not value.strip():
+            raise self.at(key).refuse("this must be a text", "Write one after the colon")
+        return value.strip()
+
+    def choice(self, key: str, choices: Iterable[str]) -> str:
+        """Returns a value that must be one of a few words.
+
+        Raises:
+            DatasetError: It is missing, or another word.
+        """
+        value = self.text(key)
+        if value not in choices:
+            known = ", ".join(choices)
+            raise self.at(key).refuse(f"'{value}' is not known here", f"Use one of: {known}")
+        return value
+
+    def number(self, key: str) -> float:
+        """Returns a value that must be a finite number.
+
+        Raises:
+            DatasetError: It is not.
+        """
+        text = self.text(key)
+        try:
+            value = float(text)
+        except ValueError:
+            value = float("nan")
+        if not abs(value) < float("inf"):
+            raise self.at(key).refuse(f"'{text}' is not a finite number", "Write a plain number")
+        return value
+
+    def section(self, key: str) -> "Section":
+        """Returns the section under a key; one that is absent is empty.
+
+        Raises:
+            DatasetError: The key holds something else.
+        """
+        return Section(self._content.get(key, {}), self.at(key))
+
+    def items(self, key: str) -> list[object]:
+        """Returns the list under a key.
+
+        Raises:
+            DatasetError: It is missing, empty, or no list.
+        """
+        self.require([key])
+        value = self._content[key]
+        if not isinstance(value, list) or not value:
+            raise self.at(key).refuse("this must be a list with entries", "Write one '- ' each")
+        return value
+
+
+def read_section(place: Place) -> Section:
+    """Reads a YAML file that holds one mapping.
+
+    Raises:
+        DatasetError: The file is missing, empty or no YAML, or a key stands in it twice.
+    """
+    text = read_text(place)
+    try:
+        content = yaml.load(text, Loader=TextLoader)
+    except (yaml.YAMLError, TypeError) as error:
+        message = " ".join(str(error).split())
+        raise place.refuse(f"this is not valid YAML ({message})", "Correct that line") from error
+    if content is None:
+        raise place.refuse("the file is empty", "Describe the dataset in it")
+    return Section(content, place)

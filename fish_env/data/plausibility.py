@@ -1,0 +1,127 @@
+"""Refusal of values that cannot be what their unit says."""
+
+import math
+
+import numpy as np
+
+from fish_env.data.place import Place
+from fish_env.data.schema import FloatArray
+from fish_env.data.units import Unit
+from fish_env.data.vocabulary import Quantity
+
+FASTEST_TURNING = 4.0 * math.pi
+"""rad/s. Two turns a second, kept up for a tenth of a run, is beyond any robotic fish."""
+
+WINDING_RATE = 2.0 * math.pi
+"""rad/s. Mean rate at which a yaw may wind on, one turn a second."""
+
+WINDING_START = 4.0 * math.pi
+"""rad. How far a yaw may already have wound when a run begins."""
+
+YAW_INTERVAL = 0.1
+"""s. Yaw is differenced over at least this time, so that noise does not look like turning."""
+
+
+def check_range(
+    values: FloatArray, quantity: Quantity, unit: Unit, rows: list[int], place: Place
+) -> None:
+    """Refuses values outside the range of their quantity.
+
+    Args:
+        values: SI, shape (n,), NaN where missing.
+        quantity: What they measure.
+        unit: The unit of the file.
+        rows: Line of the file of each value.
+        place: The file, run and column.
+
+    Raises:
+        DatasetError: At the first value outside.
+    """
+    outside = np.flatnonzero((values < quantity.lower) | (values > quantity.upper))
+    if outside.size:
+        raise refuse_value(float(values[outside[0]]), quantity, unit, place.at(rows[outside[0]]))
+
+
+def check_value(value: float, quantity: Quantity, unit: Unit, place: Place) -> None:
+    """Refuses one value, SI, outside the range of its quantity.
+
+    Raises:
+        DatasetError: It is outside.
+    """
+    if not quantity.lower <= value <= quantity.upper:
+        raise refuse_value(value, quantity, unit, place)
+
+
+def refuse_value(value: float, quantity: Quantity, unit: Unit, place: Place) -> Exception:
+    """Words the error for a value outside its quantity's range; the caller raises it."""
+    lower, upper = quantity.lower / unit.factor, quantity.upper / unit.factor
+    if quantity.lower == 0.0 and value < 0.0:
+        return place.refuse(f"{value / unit.factor:.6g} {unit.name} is negative", "Correct it")
+    reason = f"{value / unit.factor:.6g} {unit.name} is outside {lower:.4g} to {upper:.4g}"
+    if unit.name in ("rad", "rad/s"):
+        return _refuse_degrees(reason, unit, place)
+    return place.refuse(reason, f"Correct it, or the unit '{unit.name}' that is declared for it")
+
+
+def check_turning(
+    time_s: FloatArray, yaw: FloatArray, unit: Unit, rows: list[int], place: Place
+) -> None:
+    """Refuses a yaw in radians that can only be degrees, although a yaw may wind on.
+
+    Args:
+        time_s: Sample times, shape (n,), s.
+        yaw: Yaw, shape (n,), rad, wrapped or not, NaN where missing.
+        unit: The unit of the file; degrees are not questioned.
+        rows: Line of the file of each sample.
+        place: The file, run and column.
+
+    Raises:
+        DatasetError: The yaw has wound further than a fish can turn, or changes faster.
+    """
+    if unit.name != "rad":
+        return
+    measured = np.flatnonzero(np.isfinite(yaw))
+    time, angle = time_s[measured] - time_s[0], yaw[measured]
+    wound = np.flatnonzero(np.abs(angle) > WINDING_START + WINDING_RATE * time)
+    if wound.size:
+        turns = abs(angle[wound[0]]) / (2.0 * math.pi)
+        reason = f"{angle[wound[0]]:.6g} rad is {turns:.1f} turns, more than a fish makes by then"
+        raise _refuse_degrees(reason, unit, place.at(rows[measured[wound[0]]]))
+    check_rate(_turning_rate(time, angle), unit, place)
+
+
+def _turning_rate(time: FloatArray, angle: FloatArray) -> FloatArray:
+    later = np.searchsorted(time, time + YAW_INTERVAL)
+    first = np.flatnonzero(later < time.size)
+    step = np.abs(angle[later[first]] - angle[first])
+    # A wrapped angle jumps by a whole turn, which is no turning.
+    step = np.minimum(step, np.abs(step - 2.0 * math.pi))
+    return step / (time[later[first]] - time[first])
+
+
+def check_rate(rate: FloatArray, unit: Unit, place: Place) -> None:
+    """Refuses angular rates in radians that can only be degrees.
+
+    Args:
+        rate: Measured or differenced rates, shape (n,), rad/s, NaN where missing.
+        unit: The unit of the file; degrees are not questioned.
+        place: The file, run and column.
+
+    Raises:
+        DatasetError: A tenth of the run is faster than any fish turns.
+    """
+    size = np.abs(rate[np.isfinite(rate)])
+    if unit.name not in ("rad", "rad/s") or not size.size:
+        return
+    fast = float(np.quantile(size, 0.9))
+    if fast > FASTEST_TURNING:
+        reason = f"a tenth of the run turns at {fast:.3g} rad/s or faster"
+        raise _refuse_degrees(reason, unit, place)
+
+
+def _refuse_degrees(reason: str, unit: Unit, place: Place) -> Exception:
+    degrees = unit.name.replace("rad", "deg")
+    return place.refuse(
+        f"{reason}: such radians can only be degrees",
+        f"Declare the unit '{degrees}' for it in dataset.yaml, or correct the cells",
+    )

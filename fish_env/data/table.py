@@ -1,0 +1,165 @@
+"""One CSV file, read so that every wrong cell can be named by its row."""
+
+import csv
+import io
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from fish_env.data.place import Place, closest
+from fish_env.data.schema import FloatArray
+
+
+@dataclass(frozen=True)
+class Table:
+    """The cells of a CSV file.
+
+    Attributes:
+        place: The file, and the run that it holds.
+        rows: Line of the file of each row of cells.
+        cells: Text of the cells by column name.
+    """
+
+    place: Place
+    rows: list[int]
+    cells: dict[str, tuple[str, ...]]
+
+    def require(self, columns: list[str]) -> None:
+        """Refuses the table unless it has all these columns.
+
+        Raises:
+            DatasetError: Naming the first column that is missing.
+        """
+        for name in columns:
+            if name not in self.cells:
+                raise self.place.at(1, name).refuse(
+                    "the column is declared in dataset.yaml but is not in the file",
+                    f"Add it, or declare what is there ({', '.join(self.cells)})",
+                )
+
+    def numbers(self, column: str, may_miss: bool = True) -> FloatArray:
+        """Returns a column as numbers, NaN where the cell is empty or says nan.
+
+        Args:
+            column: Name of the column.
+            may_miss: Whether cells may be empty.
+
+        Raises:
+            DatasetError: At the first cell that is no number, infinite, or missing.
+        """
+        values = np.array([self._number(cell) for cell in self.cells[column]])
+        if np.isinf(values).any():
+            self._refuse_cell(column, int(np.argmax(np.isinf(values))))
+        if not may_miss and np.isnan(values).any():
+            row = self.rows[int(np.argmax(np.isnan(values)))]
+            raise self.place.at(row, column).refuse("the cell is empty", "Fill it in")
+        return values
+
+    @staticmethod
+    def _number(cell: str) -> float:
+        try:
+            return float(cell) if cell and not cell.isspace() else math.nan
+        except ValueError:
+            return math.inf
+
+    def _refuse_cell(self, column: str, index: int) -> None:
+        cell = self.cells[column][index]
+        raise self.place.at(self.rows[index], column).refuse(
+            f"'{cell}' is not a finite number",
+            "Write a plain number with a decimal point, or leave the cell empty "
+            "where a sample is missing",
+        )
+
+    def text(self, column: str) -> tuple[str, ...]:
+        """Returns a column of names.
+
+        Raises:
+            DatasetError: At the first empty cell.
+        """
+        for row, cell in zip(self.rows, self.cells[column], strict=True):
+            if not cell.strip():
+                raise self.place.at(row, column).refuse("the cell is empty", "Name the row")
+        return tuple(cell.strip() for cell in self.cells[column])
+
+
+def read_table(place: Place, fewest_rows: int) -> Table:
+    """Reads a CSV file: one header row, then rows of as many cells.
+
+    Empty lines at the end of the file are no rows.
+
+    Args:
+        place: The file, and the run that it holds.
+        fewest_rows: How many rows below the header it must have.
+
+    Raises:
+        DatasetError: The file is missing, unreadable, too short, or a row has the wrong
+            number of cells.
+    """
+    lines = _read_lines(place)
+    if not lines:
+        raise place.refuse("the file is empty", "Give a header row and the rows below it")
+    names = [name.strip() for name in lines[0][1]]
+    _check_header(place, names)
+    body = lines[1:]
+    for row, cells in body:
+        if len(cells) != len(names):
+            raise place.at(row).refuse(
+                f"{len(cells)} cells under a header of {len(names)}",
+                "Give every row one cell a column, separated by commas",
+            )
+    if len(body) < fewest_rows:
+        raise place.refuse(
+            f"{len(body)} rows below the header, where at least {fewest_rows} are needed",
+            "Give more rows, or leave the file out",
+        )
+    columns = zip(*(cells for _, cells in body), strict=True)
+    return Table(place, [row for row, _ in body], dict(zip(names, columns, strict=True)))
+
+
+def _read_lines(place: Place) -> list[tuple[int, list[str]]]:
+    reader = csv.reader(io.StringIO(read_text(place), newline=""), strict=True)
+    try:
+        lines = [(reader.line_num, cells) for cells in reader]
+    except csv.Error as error:
+        raise place.at(reader.line_num).refuse(
+            f"this is not a CSV row ({error})", "Check its quotation marks"
+        ) from error
+    while lines and _is_blank(lines[-1][1]):
+        lines.pop()
+    return lines
+
+
+def _is_blank(cells: list[str]) -> bool:
+    return not cells or (len(cells) == 1 and not cells[0].strip())
+
+
+def _check_header(place: Place, names: list[str]) -> None:
+    for name in names:
+        if names.count(name) > 1:
+            raise place.at(1, name).refuse("two columns have this name", "Rename one of them")
+
+
+def read_text(place: Place) -> str:
+    """Reads a UTF-8 file.
+
+    Raises:
+        DatasetError: It is missing, unreadable or no text.
+    """
+    try:
+        return place.file.read_text(encoding="utf-8-sig")
+    except FileNotFoundError as error:
+        beside = [path.name for path in _neighbours(place.file)]
+        raise place.refuse(
+            "there is no such file",
+            closest(place.file.name, beside) if beside else "Check the path",
+        ) from error
+    except UnicodeDecodeError as error:
+        raise place.refuse("this is not UTF-8 text", "Save it as plain UTF-8 text") from error
+    except OSError as error:
+        raise place.refuse(f"it cannot be read ({error.strerror})", "Check the path") from error
+
+
+def _neighbours(path: Path) -> list[Path]:
+    return sorted(path.parent.glob(f"*{path.suffix}"))[:20] if path.parent.is_dir() else []

@@ -93,9 +93,7 @@ def reactive_wrench(motion, tail, inputs, centre, fish, e):
 
     tip = Vector(s.root.x + length * s.aft.x, s.root.y + length * s.aft.y, s.root.z)
     tip_turning = cross(omega, tip)
-    forward = -(
-        s.aft.x * (velocity.x + tip_turning.x) + s.aft.y * (velocity.y + tip_turning.y)
-    )
+    forward = -(s.aft.x * (velocity.x + tip_turning.x) + s.aft.y * (velocity.y + tip_turning.y))
     w_tip = g0 + length * g1
     shed = -s.mass * forward * w_tip
     suction = -0.5 * s.mass * w_tip * w_tip

@@ -77,6 +77,4 @@ def impact_moment(flow_xz, flow_xy, coefficient_y, coefficient_z):
 @kernel
 def damping_moment(motion, fish):
     """M_omega = diag(C_omega) omega_b (N m, body, about O_b); the coefficients are negative."""
-    return Vector(
-        fish.damping_x * motion.p, fish.damping_y * motion.q, fish.damping_z * motion.r
-    )
+    return Vector(fish.damping_x * motion.p, fish.damping_y * motion.q, fish.damping_z * motion.r)

@@ -33,6 +33,18 @@ BASE_TERMS = (
     "tail_lift",
     "inertial",
 )
+OUTPUTS = {
+    "tail_angle": "tail.angle",
+    "tail_rate": "tail.rate",
+    "tail_power": "power",
+    "barycentre_x": "centre.x",
+    "barycentre_y": "centre.y",
+    "barycentre_z": "centre.z",
+    "surge_through_water": "motion.u",
+    "sway_through_water": "motion.v",
+    "heave_through_water": "motion.w",
+}
+"""Quantities reported beside the wrenches (rad, rad/s, W, m, m/s) and what they are called here."""
 _HEADER = '''"""Composed physics (generated; edit the sources in fish_env/model and fish_env/effects)."""
 import math
 
@@ -91,7 +103,9 @@ class Composition:
     @property
     def label(self) -> str:
         """Short name of the generated file."""
-        names = ",".join(effect.name for effect in self.effects) + ("|tables" if self.tables else "")
+        names = ",".join(effect.name for effect in self.effects) + (
+            "|tables" if self.tables else ""
+        )
         kind = "baseline" if not self.effects else f"effects{len(self.effects)}"
         return f"{kind}_{hashlib.sha256(names.encode()).hexdigest()[:8]}"
 
@@ -138,7 +152,9 @@ class _Emitter:
                     present = (component < 3) == (kind == "force")
                     value = f"{name}.{'xyz'[component % 3]}" if present else "0.0"
                 lines.append(f"terms[{row}, {component}, k] = {value}")
-        return self.function("lane_terms", "k, width, elapsed, shift, work, tables, terms", lines)
+        lines += [f"outputs[{row}, k] = {value}" for row, value in enumerate(OUTPUTS.values())]
+        arguments = "k, width, elapsed, shift, work, tables, terms, outputs"
+        return self.function("lane_terms", arguments, lines)
 
     def initialise(self) -> str:
         lines = [*self.unpack(), *self.apply("inputs", "inputs", "time, fish")]
@@ -290,7 +306,9 @@ class _Emitter:
 
     def wrench_terms(self) -> list[tuple[str, str]]:
         kinds = {"buoyancy": "force", "damping": "moment", "impact": "moment"}
-        kinds |= {f"{plane}_{force}": "force" for plane in ("xz", "xy") for force in ("drag", "lift")}
+        kinds |= {
+            f"{plane}_{force}": "force" for plane in ("xz", "xy") for force in ("drag", "lift")
+        }
         terms = [(name, kinds.get(name, "wrench")) for name in BASE_TERMS]
         return terms + [
             (f"t_{name}", "wrench") for name in self.composition.term_names[len(BASE_TERMS) :]

@@ -78,7 +78,7 @@ class EffectParameter:
     description: str = ""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Effect:
     """A physical effect that the baseline model leaves out.
 

@@ -127,8 +127,8 @@ def accept_step(work, width, elapsed, failed_at, first, count):
 
 @kernel
 def advance_block(
-    width, state, inputs, par, slew, time, commands, steps, sizes, every, trace_row, trace_at,
-    trace, failed_at, tables, first, count,
+    width, state, inputs, par, slew, time, commands, starts, steps, sizes, every, trace_row,
+    trace_at, trace, failed_at, tables, first, count,
 ):  # fmt: skip
     """Advance lanes first..first+count through all segments (see :func:`advance_lanes`)."""
     work = np.empty(WORK_ROWS * width)
@@ -138,30 +138,28 @@ def advance_block(
     gather(work, width, PAR, par, first, count)
     for k in range(width):
         work[TIME * width + k] = time[first + (k if k < count else count - 1)]
-    done = 0
-    start = 0.0
+    slot = trace_at
     for segment in range(steps.shape[0]):
         h = sizes[segment]
         for i in range(steps[segment]):
-            elapsed = start + i * h
+            elapsed = starts[segment] + i * h
             plan_actuators(work, width, commands, segment, first, count, h)
             rk4_step(work, width, elapsed, h, tables)
             accept_step(work, width, elapsed + h, failed_at, first, count)
-            done += 1
-            if (trace.shape[0] > 0) & (done % every == 0):
-                slot = (trace_at + done // every - 1) % trace.shape[0]
+            if (trace.shape[0] > 0) & ((i + 1) % every[segment] == 0):
+                at = slot % trace.shape[0]
                 for j in range(trace.shape[1]):
                     for k in range(count):
-                        trace[slot, j, first + k] = work[(X0 + trace_row + j) * width + k]
-        start += steps[segment] * h
+                        trace[at, j, first + k] = work[(X0 + trace_row + j) * width + k]
+                slot += 1
     scatter(work, width, X0, state, first, count)
     scatter(work, width, U, inputs, first, count)
 
 
 @entry_point
 def advance_lanes(
-    state, inputs, par, slew, time, commands, steps, sizes, every, trace_row, trace_at, trace,
-    failed_at, tables, first, last,
+    state, inputs, par, slew, time, commands, starts, steps, sizes, every, trace_row, trace_at,
+    trace, failed_at, tables, first, last,
 ):  # fmt: skip
     """Advance fish first..last in place, sixteen at a time.
 
@@ -172,9 +170,10 @@ def advance_lanes(
         slew: (5, N) slew limits (per second); infinite = ideal actuator.
         time: (N,) time at the start (s).
         commands: (segments, 5, N or 1) targets.
+        starts: (segments,) time since the start at which each segment begins (s).
         steps: (segments,) physics steps in each segment.
         sizes: (segments,) step size of each segment (s).
-        every: store into ``trace`` after every this many steps.
+        every: (segments,) store into ``trace`` after every this many steps of the segment.
         trace_row: first state row that is stored.
         trace_at: slot of the first stored sample; slots wrap around.
         trace: (slots, rows, N) stored samples; no slots = nothing is stored.
@@ -185,21 +184,21 @@ def advance_lanes(
     """
     for block in range(first, last, LANES):
         advance_block(
-            LANES, state, inputs, par, slew, time, commands, steps, sizes, every, trace_row,
-            trace_at, trace, failed_at, tables, block, min(LANES, last - block),
+            LANES, state, inputs, par, slew, time, commands, starts, steps, sizes, every,
+            trace_row, trace_at, trace, failed_at, tables, block, min(LANES, last - block),
         )  # fmt: skip
 
 
 @entry_point
 def advance_one(
-    state, inputs, par, slew, time, commands, steps, sizes, every, trace_row, trace_at, trace,
-    failed_at, tables, first, last,
+    state, inputs, par, slew, time, commands, starts, steps, sizes, every, trace_row, trace_at,
+    trace, failed_at, tables, first, last,
 ):  # fmt: skip
     """As :func:`advance_lanes`, one fish at a time: for a single fish."""
     for lane in range(first, last):
         advance_block(
-            1, state, inputs, par, slew, time, commands, steps, sizes, every, trace_row,
-            trace_at, trace, failed_at, tables, lane, 1,
+            1, state, inputs, par, slew, time, commands, starts, steps, sizes, every,
+            trace_row, trace_at, trace, failed_at, tables, lane, 1,
         )  # fmt: skip
 
 
@@ -211,10 +210,13 @@ def derivative_batch(work, width, tables):
 
 
 @entry_point
-def terms_batch(work, width, terms, tables):
-    """Wrench of every term, (terms, 6, N): force (N) and moment about O_b (N m), body frame."""
+def terms_batch(work, width, terms, outputs, tables):
+    """Wrench of every term, (terms, 6, N): force (N) and moment about O_b (N m), body frame.
+
+    ``outputs``, (len(OUTPUTS), N), takes the quantities that compose lists as OUTPUTS.
+    """
     for k in range(width):
-        lane_terms(k, width, 0.0, 0.0, work, tables, terms)
+        lane_terms(k, width, 0.0, 0.0, work, tables, terms, outputs)
 
 
 @entry_point

@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -51,6 +51,22 @@ def run_in_threads(task: Callable[[int, int], Any], count: int, lanes: int, thre
         job.result()
 
 
+class Grid(NamedTuple):
+    """Segments of a rollout: piecewise constant commands and step sizes.
+
+    Attributes:
+        starts: (segments,) time since the start at which each segment begins (s).
+        steps: (segments,) physics steps in each.
+        sizes: (segments,) step size (s).
+        every: (segments,) a sample is stored after every this many steps.
+    """
+
+    starts: FloatArray
+    steps: npt.NDArray[np.int64]
+    sizes: FloatArray
+    every: npt.NDArray[np.int64]
+
+
 class Kernels:
     """Compiled entry points of one composition.
 
@@ -75,13 +91,11 @@ class Kernels:
         slew: FloatArray,
         time: FloatArray,
         commands: FloatArray,
-        steps: npt.NDArray[np.int64],
-        sizes: FloatArray,
+        grid: Grid,
         *,
         tables: FloatArray,
         failed_at: FloatArray,
         trace: FloatArray = NO_TRACE,
-        every: int = 1,
         trace_row: int = 0,
         trace_at: int = 0,
         threads: int | None = None,
@@ -93,8 +107,8 @@ class Kernels:
 
         def task(first: int, last: int) -> None:
             function(
-                state, inputs, par, slew, time, commands, steps, sizes, every, trace_row,
-                trace_at, trace, failed_at, tables, first, last,
+                state, inputs, par, slew, time, commands, *grid, trace_row, trace_at, trace,
+                failed_at, tables, first, last,
             )  # fmt: skip
 
         run_in_threads(task, count, self.lanes, threads or default_threads())
@@ -121,12 +135,19 @@ class Kernels:
         par: FloatArray,
         time: FloatArray,
         tables: FloatArray,
-    ) -> FloatArray:
-        """Wrench of each term, shape (terms, 6, N), in N and N m about O_b, body frame."""
+    ) -> tuple[FloatArray, FloatArray]:
+        """Wrench of each term and the outputs beside them.
+
+        Returns:
+            Wrenches (terms, 6, N) in N and N m about O_b, body frame, in the order of the
+            composition's ``term_names``; outputs (len(OUTPUTS), N).
+        """
+        count = state.shape[1]
         work = self._work(state, inputs, rates, par, time)
-        result = np.zeros((self.module.N_TERMS, 6, state.shape[1]))
-        self.entry("terms_batch")(work, state.shape[1], result, tables)
-        return result
+        wrenches = np.zeros((self.module.N_TERMS, 6, count))
+        outputs = np.zeros((len(compose.OUTPUTS), count))
+        self.entry("terms_batch")(work, count, wrenches, outputs, tables)
+        return wrenches, outputs
 
     def initialise(
         self, state: FloatArray, inputs: FloatArray, par: FloatArray, time: FloatArray

@@ -1,0 +1,166 @@
+"""A fish with its effects: which kernel runs it, and the record that kernel reads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from fish_env.effects.registry import catalogue, get_effect, load_effect_file
+from fish_env.errors import EffectError, ParameterError
+from fish_env.model.compose import Composition
+from fish_env.model.effect import Effect
+from fish_env.model.runtime import Kernels, kernels
+from fish_env.params.packing import PATHS, pack_tables, pack_values
+from fish_env.params.schema import FishParams
+
+FloatArray = npt.NDArray[np.float64]
+EffectValues = Mapping[str, Mapping[str, float]]
+PREFIX = "effects."
+
+
+@dataclass(frozen=True, eq=False)
+class ExtendedModel:
+    """Baseline parameters plus effects, ready to run.
+
+    Attributes:
+        fish: the parameters.
+        effects: complete parameter values of the effects that are on, by name.
+        declared: the effects the kernel contains, in the order their hooks run. None for a fish
+            without effects: then the lean kernel runs it.
+        measurement: effects that act on what is recorded, not on the motion.
+    """
+
+    fish: FishParams
+    effects: EffectValues
+    declared: tuple[Effect, ...]
+    measurement: tuple[Effect, ...]
+
+    @cached_property
+    def kernels(self) -> Kernels:
+        """Compiled physics of this composition."""
+        return kernels(Composition(self.declared, bool(self.fish.tables())))
+
+    @cached_property
+    def tables(self) -> FloatArray:
+        """Packed coefficient tables of the fish."""
+        return pack_tables(self.fish)
+
+    @cached_property
+    def record(self) -> FloatArray:
+        """Parameter record, shape (parameters, 1)."""
+        return self.records({})
+
+    def records(self, changes: Mapping[str, npt.ArrayLike]) -> FloatArray:
+        """Records of fish that differ from this one, shape (parameters, N).
+
+        Args:
+            changes: path (``body.plane_xy.drag.c0`` or ``effects.current.north``) -> a number, or
+                one number per fish.
+
+        Raises:
+            ParameterError: a path that the kernel does not read.
+        """
+        known = set(PATHS.values())
+        arrays = {path: np.atleast_1d(np.asarray(v, float)) for path, v in changes.items()}
+        values: dict[str, FloatArray | float] = dict(self.fish.values())
+        values |= {path: array for path, array in arrays.items() if path in known}
+        rows = {name: np.full(1, value) for name, value in self._effect_values().items()}
+        for path, array in arrays.items():
+            name = path.removeprefix(PREFIX)
+            if path not in known and (name == path or name not in rows):
+                raise ParameterError(
+                    f"'{path}' is not a parameter of {self.fish.name} that this model computes with"
+                )
+            if path not in known:
+                rows[name] = array
+        count = max((array.size for array in arrays.values()), default=1)
+        base = pack_values(values)
+        record = np.empty((len(base) + len(rows), count))
+        record[: len(base)] = base
+        for row, value in enumerate(rows.values(), start=len(base)):
+            record[row] = value
+        return record
+
+    def _effect_values(self) -> dict[str, float]:
+        values = {}
+        for effect in self.declared:
+            complete = self.effects.get(effect.name, effect.neutral)
+            values |= {f"{effect.name}.{name}": complete[name] for name in effect.neutral}
+        return values
+
+    def longest_step(self) -> float:
+        """Longest physics step that resolves the fastest effect (s)."""
+        scales = (
+            effect.time_scale(self.effects[effect.name])
+            for effect in self.declared
+            if effect.time_scale is not None and effect.name in self.effects
+        )
+        return min(scales, default=float("inf"))
+
+    def check_step(self, dt: float) -> None:
+        """Refuse a physics step that is too long for an effect's time constant.
+
+        Raises:
+            EffectError: says the longest step.
+        """
+        longest = self.longest_step()
+        if dt > longest * (1 + 1e-9):
+            raise EffectError(
+                f"{self.fish.name}: an effect has a time constant of {longest:g} s, shorter than "
+                f"the physics step of {dt:g} s; use dt <= {longest:g}, or switch the effect off (0)"
+            )
+
+
+def build_model(
+    fish: FishParams,
+    effects: EffectValues | None = None,
+    user_effects: Iterable[Effect] = (),
+    whole_catalogue: bool = False,
+) -> ExtendedModel:
+    """Combine a fish, the effects in its file, and further ones.
+
+    Args:
+        fish: parameters; its own ``effects`` are on.
+        effects: further effects or other values, by name; they win over the file's.
+        user_effects: effects of the caller's own. An unknown name in the fish's file is looked for
+            as ``<name>.py`` beside that file.
+        whole_catalogue: use the kernel with every effect even if all are off, so that parameters
+            of any effect can be changed later without another kernel.
+
+    Raises:
+        EffectError: an unknown effect or parameter, or a value out of bounds.
+    """
+    own = {effect.name: effect for effect in user_effects}
+    wanted: dict[str, dict[str, float]] = {name: dict(v) for name, v in fish.effects.items()}
+    for name, values in (effects or {}).items():
+        wanted[name] = {**wanted.get(name, {}), **values}
+    for name in wanted:
+        if name not in own and name not in catalogue():
+            own[name] = _beside(fish, name)
+    found = {name: own.get(name) or get_effect(name) for name in wanted}
+    complete = {name: found[name].complete(values) for name, values in wanted.items()}
+    on = {name: v for name, v in complete.items() if v != found[name].neutral}
+    moving = any(found[name].hooks for name in on) or bool(own) or whole_catalogue
+    shipped = tuple(effect for effect in catalogue().values() if effect.hooks) if moving else ()
+    measured = tuple(found[name] for name in on if found[name].sample_time or found[name].measure)
+    return ExtendedModel(fish, on, (*shipped, *own.values()), measured)
+
+
+def _beside(fish: FishParams, name: str) -> Effect:
+    if fish.source_file is not None:
+        candidate = fish.source_file.with_name(f"{name}.py")
+        if candidate.is_file():
+            effect = load_effect_file(candidate)
+            if effect.name != name:
+                raise EffectError(f"{candidate} defines '{effect.name}', its file says '{name}'")
+            return effect
+    try:
+        return get_effect(name)
+    except EffectError as error:
+        raise EffectError(
+            f"{fish.name}: {error}; for an effect of your own put {name}.py beside the fish file"
+        ) from None

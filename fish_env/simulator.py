@@ -1,0 +1,300 @@
+"""The friendly way in: a schedule of commands goes in, a trajectory comes out."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from fish_env.data.schema import CommandSteps
+from fish_env.effects.extended import EffectValues, build_model
+from fish_env.errors import ScheduleError, SimulationDiverged
+from fish_env.model.compose import OUTPUTS
+from fish_env.model.crank_slider import CrankSlider
+from fish_env.model.effect import Effect
+from fish_env.model.frames import quaternion_from_euler
+from fish_env.model.runtime import Grid
+from fish_env.model.state import BASE_STATES, INPUTS
+from fish_env.params.io import load_fish
+from fish_env.params.schema import FishParams
+from fish_env.trajectory import Trajectory
+
+FloatArray = npt.NDArray[np.float64]
+REST_COMMANDS = (0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class InitialState:
+    """State at the start of a run; the default is level, at rest, at the origin.
+
+    Attributes:
+        position: (3,) m, inertial NED.
+        euler: roll, pitch, yaw (rad).
+        velocity_body: (3,) m/s.
+        angular_velocity_body: (3,) rad/s.
+        tail_phase: rad.
+    """
+
+    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    euler: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    velocity_body: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    angular_velocity_body: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    tail_phase: float = 0.0
+
+    def vector(self) -> FloatArray:
+        """The base states, shape (18,), running integrals at zero."""
+        state = np.zeros(len(BASE_STATES))
+        state[0:3] = self.position
+        state[3:7] = quaternion_from_euler(self.euler)
+        state[7:10] = self.velocity_body
+        state[10:13] = self.angular_velocity_body
+        state[13] = self.tail_phase
+        if not np.all(np.isfinite(state)):
+            raise ScheduleError(f"the initial state must be finite numbers, got {self}")
+        return state
+
+
+def schedule(rows: Iterable[Mapping[str, float]]) -> CommandSteps:
+    """Commands from rows like ``{"t": 0, "tail_amplitude": 0.35, "tail_frequency": 2}``.
+
+    Each row holds until the next; a command that a row leaves out keeps its value (first: 0).
+
+    Raises:
+        ScheduleError: no rows, an unknown command, or times that do not increase.
+    """
+    times: list[float] = []
+    values: list[list[float]] = []
+    current = dict.fromkeys(INPUTS, 0.0)
+    for row in rows:
+        unknown = set(row) - {"t", *INPUTS}
+        if unknown or "t" not in row:
+            problem = f"unknown command {sorted(unknown)}" if unknown else "a row without 't'"
+            raise ScheduleError(f"schedule: {problem}; rows have t and any of {', '.join(INPUTS)}")
+        current |= {name: float(row[name]) for name in INPUTS if name in row}
+        times.append(float(row["t"]))
+        values.append(list(current.values()))
+    if not times:
+        raise ScheduleError("the schedule is empty: give at least one row of commands")
+    if np.any(np.diff(times) <= 0) or not np.all(np.isfinite(times)):
+        raise ScheduleError(f"schedule: times must be finite and increase, got {times}")
+    if not np.all(np.isfinite(values)):
+        raise ScheduleError("schedule: every command must be a finite number")
+    return CommandSteps(np.array(times), np.array(values))
+
+
+def time_grid(sample_times: FloatArray, switches: FloatArray, dt: float) -> tuple[Grid, FloatArray]:
+    """Segments that meet every sample and every switch exactly, with steps of at most dt.
+
+    Args:
+        sample_times: (T,) increasing (s); the first is the start.
+        switches: times at which commands change (s).
+        dt: longest physics step (s).
+
+    Returns:
+        The grid, which stores one sample per sample time after the first, and the start time of
+        each segment (s).
+    """
+    inside = switches[(switches > sample_times[0]) & (switches < sample_times[-1])]
+    edges = np.union1d(sample_times, inside)
+    spans = np.diff(edges)
+    steps = np.maximum(1, np.ceil(spans / dt - 1e-9)).astype(np.int64)
+    never = np.iinfo(np.int64).max
+    every = np.where(np.isin(edges[1:], sample_times), steps, never)
+    return Grid(edges[:-1] - edges[0], steps, spans / steps, every), edges[:-1]
+
+
+class Simulator:
+    """One fish in ideal water (plus its effects), driven by ideal actuators.
+
+    Example:
+        >>> from fish_env import Simulator, schedule
+        >>> swim = schedule([{"t": 0.0, "tail_amplitude": 0.35, "tail_frequency": 2.0}])
+        >>> trajectory = Simulator("zheng-2021-a").run(swim, duration_s=10.0)
+
+    Args:
+        fish: name of a shipped fish, path of a parameter file, or parameters.
+        dt: longest physics step (s).
+        effects: effects to switch on, beside those in the fish's file: name -> parameters.
+        user_effects: effects of your own (see :func:`fish_env.effects.load_effect_file`).
+
+    Raises:
+        EffectError: an unknown effect, a bad value, or a time constant shorter than dt.
+    """
+
+    def __init__(
+        self,
+        fish: str | Path | FishParams,
+        dt: float = 0.01,
+        effects: EffectValues | None = None,
+        user_effects: Iterable[Effect] = (),
+    ) -> None:
+        if not 0 < dt <= 0.1:
+            raise ScheduleError(f"dt = {dt} s: choose a physics step between 0 and 0.1 s")
+        self.fish = fish if isinstance(fish, FishParams) else load_fish(fish)
+        self.model = build_model(self.fish, effects, user_effects)
+        self.model.check_step(dt)
+        self.dt = dt
+
+    @property
+    def crank(self) -> CrankSlider:
+        """The linkage that moves the weight block."""
+        return CrankSlider(
+            self.fish.get("weight_block.crank.l1"), self.fish.get("weight_block.crank.l2")
+        )
+
+    def run(
+        self,
+        commands: CommandSteps | Iterable[Mapping[str, float]],
+        duration_s: float | None = None,
+        initial: InitialState | None = None,
+        rate_hz: float = 10.0,
+        sample_times_s: npt.ArrayLike | None = None,
+    ) -> Trajectory:
+        """Simulate a schedule.
+
+        Args:
+            commands: steps of commands, or rows for :func:`schedule`; switches are met exactly.
+            duration_s: length (s), sampled at ``rate_hz``; or
+            sample_times_s: (T,) increasing times (s), the first being the start.
+            initial: state at the start.
+            rate_hz: samples per second.
+
+        Raises:
+            ScheduleError: neither or both of duration and sample times, or a bad schedule.
+            SimulationDiverged: the state stopped being finite; carries time and last good state.
+        """
+        steps = commands if isinstance(commands, CommandSteps) else schedule(commands)
+        self._warn_reach(steps)
+        times = _sample_times(duration_s, rate_hz, sample_times_s)
+        grid, starts = time_grid(times, steps.times_s, self.dt)
+        start = initial or InitialState()
+        kernels = self.model.kernels
+        state = np.zeros((len(kernels.state_names), 1))
+        state[: len(BASE_STATES), 0] = start.vector()
+        inputs = steps.at(times[:1]).T.copy()
+        clock = times[:1].copy()
+        kernels.initialise(state, inputs, self.model.record, clock)
+        trace = np.empty((len(times) - 1, len(state), 1))
+        first, failed_at = state.copy(), np.full(1, np.inf)
+        kernels.advance(
+            state,
+            inputs,
+            self.model.record,
+            np.full((5, 1), np.inf),
+            clock,
+            steps.at(starts)[:, :, None].copy(),
+            grid,
+            tables=self.model.tables,
+            failed_at=failed_at,
+            trace=trace,
+        )
+        if np.isfinite(failed_at[0]):
+            raise SimulationDiverged(float(failed_at[0]), state[:, 0].tolist())
+        states = np.concatenate([first.T, trace[:, :, 0]])
+        return Trajectory(
+            times, states, kernels.state_names, steps.at(times), self.fish.name, self.dt
+        )
+
+    def state_derivative(
+        self,
+        state: npt.ArrayLike,
+        inputs: npt.ArrayLike = REST_COMMANDS,
+        time_s: float = 0.0,
+        input_rates: npt.ArrayLike = REST_COMMANDS,
+    ) -> FloatArray:
+        """d(state)/dt at any state.
+
+        Args:
+            state: (states,) in the order of ``model.kernels.state_names``; base states suffice.
+            inputs: (5,) actuator positions (rad, rad, Hz, m, rad).
+            time_s: time since the run's start (s).
+            input_rates: (5,) their rates.
+
+        Returns:
+            (states,), SI: velocities inertial, accelerations in the body frame.
+        """
+        arrays = self._columns(state, inputs, input_rates, time_s)
+        return self.model.kernels.derivative(*arrays, self.model.tables)[:, 0]
+
+    def wrench_by_term(
+        self,
+        state: npt.ArrayLike,
+        inputs: npt.ArrayLike = REST_COMMANDS,
+        time_s: float = 0.0,
+        input_rates: npt.ArrayLike = REST_COMMANDS,
+    ) -> dict[str, FloatArray]:
+        """Force (N) and moment about O_b (N m), body frame, of each term of the model.
+
+        Returns:
+            Term name -> (6,). Their sum is what the mass matrix turns into accelerations;
+            ``inertial`` holds the velocity-dependent inertia terms.
+        """
+        arrays = self._columns(state, inputs, input_rates, time_s)
+        wrenches, _ = self.model.kernels.terms(*arrays, self.model.tables)
+        names = self.model.kernels.composition.term_names
+        return {name: wrenches[row, :, 0] for row, name in enumerate(names)}
+
+    def outputs(self, trajectory: Trajectory) -> dict[str, FloatArray]:
+        """Derived quantities along a trajectory of this fish, each (T,).
+
+        ``tail_angle`` (rad), ``tail_rate`` (rad/s), ``tail_power`` (W), ``barycentre_*`` (m, body)
+        and the velocity through the water (m/s, body).
+        """
+        states = np.ascontiguousarray(trajectory.states.T)
+        inputs = np.ascontiguousarray(trajectory.inputs.T)
+        record = np.repeat(self.model.record, len(trajectory), axis=1)
+        _, outputs = self.model.kernels.terms(
+            states, inputs, np.zeros_like(inputs), record, trajectory.time_s, self.model.tables
+        )
+        return dict(zip(OUTPUTS, outputs, strict=True))
+
+    def _columns(
+        self, state: npt.ArrayLike, inputs: npt.ArrayLike, rates: npt.ArrayLike, time_s: float
+    ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
+        given = np.asarray(state, float)
+        full = np.zeros((len(self.model.kernels.state_names), 1))
+        if given.ndim != 1 or not 13 <= given.size <= len(full):
+            raise ScheduleError(
+                f"state must have between 13 and {len(full)} numbers, got shape {given.shape}"
+            )
+        full[: given.size, 0] = given
+        columns = [np.array(values, float).reshape(5, 1) for values in (inputs, rates)]
+        clock = np.full(1, time_s)
+        if given.size < len(full):
+            tail_states = full.copy()
+            self.model.kernels.initialise(tail_states, columns[0], self.model.record, clock)
+            full[len(BASE_STATES) :] = tail_states[len(BASE_STATES) :]
+        return full, columns[0], columns[1], self.model.record, clock
+
+    def _warn_reach(self, steps: CommandSteps) -> None:
+        low, high = self.crank.reach
+        stroke = steps.values[:, INPUTS.index("block_displacement")]
+        beyond = stroke[(stroke < low) | (stroke > high)]
+        if beyond.size:
+            warnings.warn(
+                f"{self.fish.name}: block displacement {beyond[0]:g} m is beyond the crank's reach "
+                f"of {low:.4f} to {high:.4f} m; simulated as asked",
+                stacklevel=3,
+            )
+
+
+def _sample_times(
+    duration_s: float | None, rate_hz: float, sample_times_s: npt.ArrayLike | None
+) -> FloatArray:
+    if (duration_s is None) == (sample_times_s is None):
+        raise ScheduleError("give either duration_s (with rate_hz) or sample_times_s")
+    if sample_times_s is not None:
+        times = np.array(sample_times_s, float)
+        if times.ndim != 1 or times.size < 2 or not np.all(np.diff(times) > 0):
+            raise ScheduleError("sample_times_s must be at least two increasing times")
+        return times
+    assert duration_s is not None
+    if not (0 < duration_s < np.inf and 0 < rate_hz < np.inf):
+        raise ScheduleError(f"duration {duration_s} s and rate {rate_hz} Hz must be positive")
+    count = int(np.floor(duration_s * rate_hz + 1e-9))
+    times = np.arange(count + 1) / rate_hz
+    return times if times[-1] > duration_s - 1e-9 else np.append(times, duration_s)

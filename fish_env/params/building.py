@@ -7,7 +7,7 @@ from typing import Any
 
 from fish_env.errors import ParameterError
 from fish_env.params.checks import closest
-from fish_env.params.fields import join, parameter_fields
+from fish_env.params.fields import as_number, join, parameter_fields
 from fish_env.params.groups import Prior
 from fish_env.params.provenance import UNSTATED, Origin, Posterior, Provenance
 from fish_env.params.schema import FishParams
@@ -55,7 +55,7 @@ def check_keys(
             raise ParameterError(f"{file}: unknown key {join(path, str(key))}{hint}")
     for key in required:
         if key not in data:
-            raise ParameterError(f"{file}: missing key {join(path, key)}; add it")
+            raise ParameterError(f"{file}: missing key {join(path, key)}; add it or name a base")
 
 
 def build_group(cls: type[Any], data: Any, path: str, file: Path) -> Any:
@@ -79,11 +79,6 @@ def build_field(
     return as_number(value)
 
 
-def as_number(value: Any) -> Any:
-    """Returns an int as a float; leaves anything else for the checks to judge."""
-    return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
-
-
 def build_vector(value: Any, path: str, file: Path) -> tuple[Any, ...]:
     """Builds a vector of three numbers."""
     if not isinstance(value, list) or len(value) != AXES:
@@ -96,6 +91,8 @@ def build_table(
 ) -> CoefficientTable:
     """Reads the table that replaces a curve."""
     check_keys(value, ["table"], (), path, file)
+    if not isinstance(value["table"], str):
+        raise ParameterError(f"{file}: {path}.table is {value['table']!r}; give a CSV file's path")
     try:
         return read_table(Path(value["table"]), kind)
     except ParameterError as error:

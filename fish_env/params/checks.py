@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from fish_env.errors import ParameterError
 from fish_env.params import trees
+from fish_env.params.balance import central_inertia
 from fish_env.params.fields import Leaf, leaves, tables
 from fish_env.params.provenance import STATUSES, Origin, Posterior
 
@@ -70,7 +71,7 @@ def unknown_path(fish: "FishParams", path: str) -> str:
     for key, table in tables(fish):
         if path == key or path.startswith(f"{key}."):
             return f"{origin}: {path} is replaced by the table {table.source}; change its rows"
-    if path in trees.prefixes(fish):
+    if path in trees.known_paths(type(fish)):
         below = [leaf.path for leaf in leaves(fish) if leaf.path.startswith(path)]
         return f"{origin}: {path} is a group, not a number; name one of {', '.join(below)}"
     hint = closest(path, (leaf.path for leaf in leaves(fish)))
@@ -134,16 +135,8 @@ def check_triangle(fish: "FishParams", key: str, moments: tuple[float, ...]) -> 
 
 
 def check_central_inertia(fish: "FishParams") -> None:
-    """Checks that the fish's inertia about its centre of mass is positive definite.
-
-    With the block at rest, J as the model has it (diagonal, about O_b) less
-    m_total (|C_m|^2 I - C_m C_m^T) must be positive definite; that is when the 6 x 6 mass matrix
-    of the Newton-Euler equations is.
-    """
-    inertia = np.diag(inertia_about_origin(fish))
-    centre = (np.array(fish.mass.static_moment_rest) + block_moment(fish)) / fish.mass.total
-    shift = fish.mass.total * (centre @ centre * np.eye(3) - np.outer(centre, centre))
-    smallest = float(np.linalg.eigvalsh(inertia - shift)[0])
+    """Checks that the fish's inertia about its centre of mass is positive definite."""
+    smallest = float(np.linalg.eigvalsh(central_inertia(fish))[0])
     if smallest <= 0:
         raise fault(
             fish,
@@ -151,34 +144,6 @@ def check_central_inertia(fish: "FishParams") -> None:
             f"is not positive definite about the centre of mass ({smallest:.3g} kg m^2)",
             "lower mass.static_moment_rest, move the block's bracket, or raise inertia.rest",
         )
-
-
-def block_centre(fish: "FishParams") -> NDArray[np.float64]:
-    """Returns the block's centre of mass at rest, body frame, m, shape (3,)."""
-    block = fish.weight_block
-    offset = (block.d1 - block.s_w0 + block.d3, 0.0, block.d2)
-    return np.array(block.bracket_origin) + offset
-
-
-def block_moment(fish: "FishParams") -> NDArray[np.float64]:
-    """Returns mass times centre of mass of the block at rest, kg m, shape (3,)."""
-    return fish.mass.weight_block * block_centre(fish)
-
-
-def inertia_about_origin(fish: "FishParams") -> NDArray[np.float64]:
-    """Returns the fish's moments of inertia about O_b, block at rest, kg m^2, shape (3,)."""
-    rest_mass = fish.mass.total - fish.mass.weight_block
-    rest_centre = np.array(fish.mass.static_moment_rest) / rest_mass
-    own = np.array(fish.inertia.rest) + np.array(fish.inertia.weight_block)
-    moved = rest_mass * axis_distances(rest_centre)
-    return own + moved + fish.mass.weight_block * axis_distances(block_centre(fish))
-
-
-def axis_distances(centre: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Returns the squared distance of a point from each axis, m^2, shape (3,)."""
-    squares = centre**2
-    distances: NDArray[np.float64] = squares.sum() - squares
-    return distances
 
 
 def check_effects(fish: "FishParams") -> None:
@@ -194,7 +159,7 @@ def check_effects(fish: "FishParams") -> None:
 
 def check_provenance(fish: "FishParams") -> None:
     """Checks that origins have a known status and a source, and belong to something."""
-    known = trees.prefixes(fish)
+    known = trees.known_paths(type(fish))
     check_origin(fish, "default", fish.provenance.default)
     for path, origin in fish.provenance.entries.items():
         check_origin(fish, path, origin)
@@ -216,6 +181,9 @@ def check_origin(fish: "FishParams", path: str, origin: Origin) -> None:
 def check_posterior(fish: "FishParams", posterior: Posterior) -> None:
     """Checks names, sizes and definiteness of a posterior."""
     check_names(fish, posterior.names)
+    if not isinstance(posterior.validity, Mapping):
+        remedy = "write it as keys and values"
+        raise fault(fish, "posterior.validity", f"is {posterior.validity!r}", remedy)
     count = len(posterior.names)
     rows = [len(row) for row in posterior.covariance]
     if len(posterior.mean) != count or rows != [count] * count:
@@ -230,7 +198,7 @@ def check_names(fish: "FishParams", names: tuple[str, ...]) -> None:
     """Checks that a posterior names parameters or effect parameters of the fish, once each."""
     known = {leaf.path for leaf in leaves(fish)}
     known |= {f"effects.{name}.{key}" for name, values in fish.effects.items() for key in values}
-    for name in names:
+    for name in map(str, names):
         if name not in known:
             remedy = f"name a parameter or an effect parameter of this file{closest(name, known)}"
             raise fault(fish, f"posterior.names: {name}", "is unknown", remedy)

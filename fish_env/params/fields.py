@@ -7,6 +7,7 @@ checking, flattening and documenting all follow from one declaration.
 
 import dataclasses
 import math
+import numbers
 from collections.abc import Iterator
 from typing import Any, Literal
 
@@ -70,6 +71,12 @@ def aside(cls: type) -> Any:
 def join(path: str, name: str) -> str:
     """Appends a key to a dotted path."""
     return f"{path}.{name}" if path else name
+
+
+def as_number(value: Any) -> Any:
+    """Returns a real number as a float; leaves anything else, booleans too, to the checks."""
+    real = isinstance(value, numbers.Real) and not isinstance(value, bool)
+    return float(value) if real else value
 
 
 def parameter_fields(group: Any) -> Iterator[dataclasses.Field[Any]]:

@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 
 from fish_env.errors import ParameterError
@@ -15,15 +16,13 @@ class StrictLoader(yaml.SafeLoader):
 
 def construct_mapping(loader: StrictLoader, node: yaml.MappingNode) -> dict[Any, Any]:
     """Builds a mapping and refuses a key that stands in it twice."""
-    loader.flatten_mapping(node)
-    mapping: dict[Any, Any] = {}
-    for key_node, value_node in node.value:
-        key = loader.construct_object(key_node, deep=True)
-        if key in mapping:
-            line = key_node.start_mark.line + 1
-            raise yaml.YAMLError(f"line {line}: the key '{key}' is there twice; keep one")
-        mapping[key] = loader.construct_object(value_node, deep=True)
-    return mapping
+    seen: set[str] = set()
+    for key_node, _ in node.value:
+        if key_node.value in seen:
+            where = f"line {key_node.start_mark.line + 1}"
+            raise yaml.YAMLError(f"{where}: the key '{key_node.value}' is there twice; keep one")
+        seen.add(key_node.value)
+    return loader.construct_mapping(node, deep=True)
 
 
 StrictLoader.add_constructor("tag:yaml.org,2002:map", construct_mapping)
@@ -32,6 +31,19 @@ StrictLoader.add_implicit_resolver(
     re.compile(r"^[-+]?[0-9]+(\.[0-9]*)?[eE][-+]?[0-9]+$"),
     list("-+0123456789"),
 )
+
+
+class PlainDumper(yaml.SafeDumper):
+    """YAML's safe dumper, which also takes numpy numbers and arrays."""
+
+
+def represent_numpy(dumper: PlainDumper, value: Any) -> yaml.Node:
+    """Writes a numpy number or array as the plain number or list it holds."""
+    return dumper.represent_data(value.tolist())
+
+
+for numpy_type in (np.bool_, np.integer, np.floating, np.ndarray):
+    PlainDumper.add_multi_representer(numpy_type, represent_numpy)
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
@@ -53,5 +65,7 @@ def read_yaml(path: Path) -> dict[str, Any]:
 
 def write_yaml(data: dict[str, Any], path: Path) -> None:
     """Writes nested plain data as YAML in its own order, numbers with every digit."""
-    text = yaml.safe_dump(data, sort_keys=False, default_flow_style=None, allow_unicode=True)
+    text = yaml.dump(
+        data, Dumper=PlainDumper, sort_keys=False, default_flow_style=None, allow_unicode=True
+    )
     path.write_text(text, encoding="utf-8")

@@ -79,6 +79,8 @@ def read_merged(file: Path, above: tuple[Path, ...]) -> dict[str, Any]:
         return data
     if not isinstance(base, str):
         raise ParameterError(f"{file}: base is {base!r}; give the name or the path of a fish")
+    if "name" not in data:
+        raise ParameterError(f"{file}: missing key name; a fish that differs needs its own")
     return merged(read_merged(find_base(base, file), (*above, file)), data)
 
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from fish_env.errors import ParameterError
 from fish_env.params import checks, prior, trees
-from fish_env.params.fields import Leaf, aside, leaves, section, tables
+from fish_env.params.fields import Leaf, as_number, aside, leaves, section, tables
 from fish_env.params.groups import Body, Inertia, Mass, Prior, Tail, Water, WeightBlock
 from fish_env.params.provenance import UNSTATED, Posterior, Provenance, Status
 from fish_env.params.tables import CoefficientTable
@@ -117,7 +117,8 @@ class FishParams:
         """
         for path in values:
             self._leaf(path)
-        changes = trees.replaced_groups(self, values)
+        floats = {path: as_number(value) for path, value in values.items()}
+        changes = trees.replaced_groups(self, floats)
         provenance = self.provenance.updated(values, status, source)
         return dataclasses.replace(self, **changes, provenance=provenance)
 

@@ -60,7 +60,8 @@ class CoefficientTable:
 
         Beyond the last angle a_n, with value C_n, the curve goes on as the analytic form does:
         drag C_0 + (C_n - C_0) sin^2 a / sin^2 a_n, lift and impact moment
-        C_n sin a cos a / (sin a_n cos a_n), in knots one degree apart at most.
+        C_n sin a cos a / (sin a_n cos a_n), in knots one degree apart at most. Where the two meet
+        at a peak, the monotone cubic rounds it within the first degree.
 
         Returns:
             Knots, rad, shape (n,), the first 0 and the last pi/2; and polynomial coefficients,

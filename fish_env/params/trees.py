@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-from fish_env.params.fields import Leaf, join, leaves, parameter_fields
+from fish_env.params.fields import Leaf, join, parameter_fields
 from fish_env.params.tables import CoefficientTable
 
 AXES = "xyz"
@@ -56,17 +56,13 @@ def symbol_of(leaf: Leaf) -> str:
     return names[index] if len(names) == len(AXES) else f"{names[0]}_{AXES[index]}"
 
 
-def prefixes(group: Any) -> set[str]:
-    """Returns every path of a group that is or covers a number or a table."""
+def known_paths(cls: type[Any], path: str = "") -> set[str]:
+    """Returns every path that a group's class declares: groups, vectors and single numbers."""
     paths: set[str] = set()
-    collect_prefixes(group, "", paths)
-    return paths | {leaf.path for leaf in leaves(group)}
-
-
-def collect_prefixes(group: Any, path: str, paths: set[str]) -> None:
-    """Adds the path of every field of a group, and of those below it."""
-    for field in parameter_fields(group):
-        value, here = getattr(group, field.name), join(path, field.name)
+    for field in parameter_fields(cls):
+        here = join(path, field.name)
         paths.add(here)
-        if "section" in field.metadata and not isinstance(value, CoefficientTable):
-            collect_prefixes(value, here, paths)
+        paths.update(f"{here}[{index}]" for index in range(field.metadata.get("axes", 0)))
+        if "section" in field.metadata:
+            paths |= known_paths(field.metadata["section"], here)
+    return paths

@@ -1,0 +1,87 @@
+"""Imports go one way, and importing the package loads nothing heavy that it may not need."""
+
+import ast
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+LINTER = Path(sys.executable).with_name("lint-imports")
+OPEN_TO_AGENTS = {"errors", "params", "simulator", "envs"}
+NOT_ON_IMPORT = ("torch", "matplotlib", "pandas", "stable_baselines3", "pyarrow", "pygame")
+
+
+def run_linter(folder: Path) -> subprocess.CompletedProcess[str]:
+    command = [str(LINTER), "--no-cache"]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+
+
+def foreign_imports(source: str) -> set[str]:
+    """Modules directly below fish_env that a source imports and agents may not."""
+    imported: set[str] = set()
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            imported |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module == "fish_env":
+            imported |= {f"fish_env.{alias.name}" for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            imported.add(node.module)
+    parts = [name.split(".") for name in imported]
+    return {part[1] for part in parts if part[0] == "fish_env" and len(part) > 1} - OPEN_TO_AGENTS
+
+
+def test_the_contracts_hold():
+    result = run_linter(ROOT)
+    assert result.returncode == 0, result.stdout + result.stderr
+
+
+@pytest.mark.parametrize(
+    ("module", "line"),
+    [
+        ("fish_env/errors.py", "import fish_env.params"),
+        ("fish_env/params.py", "import fish_env.model"),
+        ("fish_env/params.py", "import agents"),
+        ("fish_env/unheard_of.py", ""),
+    ],
+)
+def test_the_contracts_notice_a_wrong_import_or_an_unplaced_module(tmp_path, module, line):
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    for file in ("agents/__init__", "fish_env/__init__", "fish_env/errors", "fish_env/params"):
+        (tmp_path / file).parent.mkdir(exist_ok=True)
+        (tmp_path / f"{file}.py").touch()
+    (tmp_path / "fish_env/model.py").touch()
+    assert run_linter(tmp_path).returncode == 0
+    (tmp_path / module).write_text(f"{line}\n")
+    assert run_linter(tmp_path).returncode == 1
+
+
+@pytest.mark.parametrize(
+    "file", sorted((ROOT / "agents").rglob("*.py")), ids=lambda file: file.name
+)
+def test_agents_use_only_what_is_open_to_them(file):
+    assert foreign_imports(file.read_text(encoding="utf-8")) == set()
+
+
+def test_the_agents_check_notices_a_kernel_import():
+    assert foreign_imports("from fish_env.model.tail import force") == {"model"}
+    assert foreign_imports("from fish_env import diagnosis, envs") == {"diagnosis"}
+    assert foreign_imports("import fish_env.effects") == {"effects"}
+
+
+def loaded_by(statement: str) -> set[str]:
+    """Heavy modules that a fresh interpreter has loaded after a statement."""
+    code = f"{statement}; import sys; print(*[m for m in {NOT_ON_IMPORT!r} if m in sys.modules])"
+    command = [sys.executable, "-c", code]
+    result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    return set(result.stdout.split())
+
+
+def test_importing_the_package_loads_no_heavy_module():
+    assert loaded_by("import fish_env") == set()
+
+
+def test_the_heavy_module_check_notices_one():
+    assert loaded_by("import fish_env, pandas") == {"pandas"}

@@ -10,7 +10,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 LINTER = Path(sys.executable).with_name("lint-imports")
-OPEN_TO_AGENTS = {"errors", "params", "simulator", "envs"}
+OPEN_TO_AGENTS = {"errors", "params", "trajectory", "simulator", "envs"}
 NOT_ON_IMPORT = ("torch", "matplotlib", "pandas", "stable_baselines3", "pyarrow", "pygame")
 
 
@@ -58,9 +58,7 @@ def test_the_contracts_notice_a_wrong_import_or_an_unplaced_module(tmp_path, mod
     assert run_linter(tmp_path).returncode == 1
 
 
-@pytest.mark.parametrize(
-    "file", sorted((ROOT / "agents").rglob("*.py")), ids=lambda file: file.name
-)
+@pytest.mark.parametrize("file", sorted((ROOT / "agents").rglob("*.py")), ids=str)
 def test_agents_use_only_what_is_open_to_them(file):
     assert foreign_imports(file.read_text(encoding="utf-8")) == set()
 
@@ -84,4 +82,4 @@ def test_importing_the_package_loads_no_heavy_module():
 
 
 def test_the_heavy_module_check_notices_one():
-    assert loaded_by("import fish_env, pandas") == {"pandas"}
+    assert loaded_by("import fish_env, pandas") >= {"pandas"}

@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fish_env.data.place import Place
 from fish_env.data.schema import FloatArray
@@ -87,24 +88,26 @@ def check_turning(
         turns = abs(angle[wound[0]]) / (2.0 * math.pi)
         reason = f"{angle[wound[0]]:.6g} rad is {turns:.1f} turns, more than a fish makes by then"
         raise _refuse_degrees(reason, unit, place.at(rows[measured[wound[0]]]))
-    check_rate(_turning_rate(time, angle), unit, place)
+    rate, first = _turning_rate(time, angle)
+    check_rate(rate, unit, [rows[index] for index in measured[first]], place)
 
 
-def _turning_rate(time: FloatArray, angle: FloatArray) -> FloatArray:
+def _turning_rate(time: FloatArray, angle: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
     later = np.searchsorted(time, time + YAW_INTERVAL)
     first = np.flatnonzero(later < time.size)
     step = np.abs(angle[later[first]] - angle[first])
     # A wrapped angle jumps by a whole turn, which is no turning.
     step = np.minimum(step, np.abs(step - 2.0 * math.pi))
-    return step / (time[later[first]] - time[first])
+    return step / (time[later[first]] - time[first]), first
 
 
-def check_rate(rate: FloatArray, unit: Unit, place: Place) -> None:
+def check_rate(rate: FloatArray, unit: Unit, rows: list[int], place: Place) -> None:
     """Refuses angular rates in radians that can only be degrees.
 
     Args:
         rate: Measured or differenced rates, shape (n,), rad/s, NaN where missing.
         unit: The unit of the file; degrees are not questioned.
+        rows: Line of the file of each rate.
         place: The file, run and column.
 
     Raises:
@@ -116,7 +119,8 @@ def check_rate(rate: FloatArray, unit: Unit, place: Place) -> None:
     fast = float(np.quantile(size, 0.9))
     if fast > FASTEST_TURNING:
         reason = f"a tenth of the run turns at {fast:.3g} rad/s or faster"
-        raise _refuse_degrees(reason, unit, place)
+        first = int(np.argmax(np.abs(rate) > FASTEST_TURNING))
+        raise _refuse_degrees(reason, unit, place.at(rows[first]))
 
 
 def _refuse_degrees(reason: str, unit: Unit, place: Place) -> Exception:

@@ -73,7 +73,7 @@ def check_turning_channels(
         if name == "yaw":
             check_turning(time, values, units[name], table.rows, place)
         elif FILE_CHANNELS[name].dimension == "rate":
-            check_rate(values, units[name], place)
+            check_rate(values, units[name], table.rows, place)
 
 
 def quaternion_to_angles(channels: dict[str, FloatArray], table: Table) -> dict[str, FloatArray]:
@@ -110,10 +110,12 @@ def depth_to_z(
     if "z" not in channels:
         return others | {"z": depth}, ()
     z = channels["z"]
-    difference = np.abs(z - depth)[np.isfinite(z - depth)]
-    if difference.size and np.median(difference) > DEPTH_TOLERANCE:
-        raise table.place.at(column="depth").refuse(
-            f"depth and z differ by {np.median(difference):.3g} m (median)",
+    difference = np.abs(z - depth)
+    both = np.isfinite(difference)
+    if both.any() and np.median(difference[both]) > DEPTH_TOLERANCE:
+        first = int(np.argmax(difference > DEPTH_TOLERANCE))
+        raise table.place.at(table.rows[first], "depth").refuse(
+            f"depth and z differ by {np.median(difference[both]):.3g} m (median)",
             "z points down in frame ned and up in frame enu, depth always down; "
             "correct one of the two or leave it out",
         )

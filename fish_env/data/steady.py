@@ -33,7 +33,7 @@ def read_steady(description: Description, file: Path) -> SteadyDataset:
     observations = read_quantities(table, description.channels, OBSERVATIONS)
     if "yaw_rate" in observations:
         place, unit = table.place.at(column="yaw_rate"), description.channels["yaw_rate"]
-        check_rate(observations["yaw_rate"], unit, place)
+        check_rate(observations["yaw_rate"], unit, table.rows, place)
     commands = read_commands(table, description)
     if description.frame == "enu":
         observations, commands = switch_frame(observations), switch_command_frame(commands)

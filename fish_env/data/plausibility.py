@@ -87,7 +87,8 @@ def check_turning(
     if wound.size:
         turns = abs(angle[wound[0]]) / (2.0 * math.pi)
         reason = f"{angle[wound[0]]:.6g} rad is {turns:.1f} turns, more than a fish makes by then"
-        raise _refuse_degrees(reason, unit, place.at(rows[measured[wound[0]]]))
+        remedy = ", or take off the whole turns it had made before the run"
+        raise _refuse_degrees(reason, unit, place.at(rows[measured[wound[0]]]), remedy)
     rate, first = _turning_rate(time, angle)
     check_rate(rate, unit, [rows[index] for index in measured[first]], place)
 
@@ -123,9 +124,9 @@ def check_rate(rate: FloatArray, unit: Unit, rows: list[int], place: Place) -> N
         raise _refuse_degrees(reason, unit, place.at(rows[first]))
 
 
-def _refuse_degrees(reason: str, unit: Unit, place: Place) -> Exception:
+def _refuse_degrees(reason: str, unit: Unit, place: Place, remedy: str = "") -> Exception:
     degrees = unit.name.replace("rad", "deg")
     return place.refuse(
         f"{reason}: such radians can only be degrees",
-        f"Declare the unit '{degrees}' for it in dataset.yaml, or correct the cells",
+        f"Declare the unit '{degrees}' for it in dataset.yaml, or correct the cells{remedy}",
     )

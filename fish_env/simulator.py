@@ -13,9 +13,9 @@ import numpy.typing as npt
 from fish_env.data.schema import CommandSteps
 from fish_env.effects.extended import EffectValues, build_model
 from fish_env.errors import ScheduleError, SimulationDiverged
-from fish_env.model.compose import OUTPUTS
 from fish_env.model.crank_slider import CrankSlider
 from fish_env.model.effect import Effect
+from fish_env.model.emit import OUTPUTS
 from fish_env.model.frames import quaternion_from_euler
 from fish_env.model.runtime import Grid
 from fish_env.model.state import BASE_STATES, INPUTS
@@ -104,7 +104,8 @@ def time_grid(sample_times: FloatArray, switches: FloatArray, dt: float) -> tupl
     steps = np.maximum(1, np.ceil(spans / dt - 1e-9)).astype(np.int64)
     never = np.iinfo(np.int64).max
     every = np.where(np.isin(edges[1:], sample_times), steps, never)
-    return Grid(edges[:-1] - edges[0], steps, spans / steps, every), edges[:-1]
+    slots = np.arange(len(steps))
+    return Grid(slots, edges[:-1] - edges[0], steps, spans / steps, every), edges[:-1]
 
 
 class Simulator:

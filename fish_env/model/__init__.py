@@ -1,1 +1,1 @@
-"""Compiled physics: one force, one function; composed into kernels by :mod:`fish_env.model.compose`."""
+"""Compiled physics: one force, one function; :mod:`fish_env.model.compose` joins them."""

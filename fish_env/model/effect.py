@@ -135,7 +135,7 @@ class Effect:
     @cached_property
     def record_type(self) -> type:
         """Named tuple that hooks receive as ``e``."""
-        return namedtuple(f"{self.name}_parameters", [p.name for p in self.parameters])  # noqa: PYI024
+        return namedtuple(f"{self.name}_parameters", [p.name for p in self.parameters])
 
     @property
     def neutral(self) -> dict[str, float]:

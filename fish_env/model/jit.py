@@ -60,9 +60,9 @@ def _writable(folder: Path) -> bool:
 
 
 def source_hash(extra_sources: Iterable[Path] = ()) -> str:
-    """Hash of every kernel source (``model/``, ``effects/``, ``envs/``) and the extra files."""
+    """Hash of every kernel source of the physics (``model/``, ``effects/``) and the extra files."""
     package = Path(__file__).resolve().parent.parent
-    folders = ("model", "effects", "envs")
+    folders = ("model", "effects")
     files = [path for name in folders for path in sorted((package / name).glob("*.py"))]
     return _hash_files((*files, *extra_sources))
 

@@ -10,17 +10,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from fish_env.model.jit import entry_point, kernel
-
 # --- completed by compose ---
 from fish_env.model.composed import (  # type: ignore[import-not-found]
     N_PARAMETERS,
     N_STATES,
-    N_TERMS,
     lane_derivative,
     lane_initialise,
     lane_terms,
 )
+from fish_env.model.jit import entry_point, kernel
 
 # --- end ---
 
@@ -57,14 +55,14 @@ def scatter(work, width, row, target, first, count):
 
 
 @kernel
-def plan_actuators(work, width, commands, segment, first, count, h):
+def plan_actuators(work, width, commands, slot, first, count, h):
     """Where each actuator goes in this step: at once if its slew limit is infinite."""
     shared = commands.shape[2] == 1
     per_second = 1.0 / h
     for j in range(5):
         for k in range(width):
             lane = first + (k if k < count else count - 1)
-            target = commands[segment, j, 0 if shared else lane]
+            target = commands[slot, j, 0 if shared else lane]
             slew = work[(SLEW + j) * width + k]
             position = work[(U + j) * width + k]
             ideal = slew == np.inf
@@ -127,7 +125,7 @@ def accept_step(work, width, elapsed, failed_at, first, count):
 
 @kernel
 def advance_block(
-    width, state, inputs, par, slew, time, commands, starts, steps, sizes, every, trace_row,
+    width, state, inputs, par, slew, time, commands, slots, starts, steps, sizes, every, trace_row,
     trace_at, trace, failed_at, tables, first, count,
 ):  # fmt: skip
     """Advance lanes first..first+count through all segments (see :func:`advance_lanes`)."""
@@ -138,28 +136,28 @@ def advance_block(
     gather(work, width, PAR, par, first, count)
     for k in range(width):
         work[TIME * width + k] = time[first + (k if k < count else count - 1)]
-    slot = trace_at
+    stored = trace_at
     for segment in range(steps.shape[0]):
         h = sizes[segment]
         for i in range(steps[segment]):
             elapsed = starts[segment] + i * h
-            plan_actuators(work, width, commands, segment, first, count, h)
+            plan_actuators(work, width, commands, slots[segment], first, count, h)
             rk4_step(work, width, elapsed, h, tables)
             accept_step(work, width, elapsed + h, failed_at, first, count)
             if (trace.shape[0] > 0) & ((i + 1) % every[segment] == 0):
-                at = slot % trace.shape[0]
+                sample = stored % trace.shape[0]
                 for j in range(trace.shape[1]):
                     for k in range(count):
-                        trace[at, j, first + k] = work[(X0 + trace_row + j) * width + k]
-                slot += 1
+                        trace[sample, j, first + k] = work[(X0 + trace_row + j) * width + k]
+                stored += 1
     scatter(work, width, X0, state, first, count)
     scatter(work, width, U, inputs, first, count)
 
 
 @entry_point
 def advance_lanes(
-    state, inputs, par, slew, time, commands, starts, steps, sizes, every, trace_row, trace_at,
-    trace, failed_at, tables, first, last,
+    state, inputs, par, slew, time, commands, slots, starts, steps, sizes, every, trace_row,
+    trace_at, trace, failed_at, tables, first, last,
 ):  # fmt: skip
     """Advance fish first..last in place, sixteen at a time.
 
@@ -169,7 +167,8 @@ def advance_lanes(
         par: (parameters, N) records.
         slew: (5, N) slew limits (per second); infinite = ideal actuator.
         time: (N,) time at the start (s).
-        commands: (segments, 5, N or 1) targets.
+        commands: (slots, 5, N or 1) targets.
+        slots: (segments,) which targets hold in each segment.
         starts: (segments,) time since the start at which each segment begins (s).
         steps: (segments,) physics steps in each segment.
         sizes: (segments,) step size of each segment (s).
@@ -184,20 +183,20 @@ def advance_lanes(
     """
     for block in range(first, last, LANES):
         advance_block(
-            LANES, state, inputs, par, slew, time, commands, starts, steps, sizes, every,
+            LANES, state, inputs, par, slew, time, commands, slots, starts, steps, sizes, every,
             trace_row, trace_at, trace, failed_at, tables, block, min(LANES, last - block),
         )  # fmt: skip
 
 
 @entry_point
 def advance_one(
-    state, inputs, par, slew, time, commands, starts, steps, sizes, every, trace_row, trace_at,
-    trace, failed_at, tables, first, last,
+    state, inputs, par, slew, time, commands, slots, starts, steps, sizes, every, trace_row,
+    trace_at, trace, failed_at, tables, first, last,
 ):  # fmt: skip
     """As :func:`advance_lanes`, one fish at a time: for a single fish."""
     for lane in range(first, last):
         advance_block(
-            1, state, inputs, par, slew, time, commands, starts, steps, sizes, every,
+            1, state, inputs, par, slew, time, commands, slots, starts, steps, sizes, every,
             trace_row, trace_at, trace, failed_at, tables, lane, 1,
         )  # fmt: skip
 

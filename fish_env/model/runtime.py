@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from fish_env.model import compose
 from fish_env.model.compose import Composition
+from fish_env.model.emit import OUTPUTS
 
 FloatArray = npt.NDArray[np.float64]
 NO_TRACE = np.zeros((0, 0, 0))
@@ -55,12 +56,14 @@ class Grid(NamedTuple):
     """Segments of a rollout: piecewise constant commands and step sizes.
 
     Attributes:
+        slots: (segments,) which row of the commands holds.
         starts: (segments,) time since the start at which each segment begins (s).
         steps: (segments,) physics steps in each.
         sizes: (segments,) step size (s).
         every: (segments,) a sample is stored after every this many steps.
     """
 
+    slots: npt.NDArray[np.int64]
     starts: FloatArray
     steps: npt.NDArray[np.int64]
     sizes: FloatArray
@@ -145,7 +148,7 @@ class Kernels:
         count = state.shape[1]
         work = self._work(state, inputs, rates, par, time)
         wrenches = np.zeros((self.module.N_TERMS, 6, count))
-        outputs = np.zeros((len(compose.OUTPUTS), count))
+        outputs = np.zeros((len(OUTPUTS), count))
         self.entry("terms_batch")(work, count, wrenches, outputs, tables)
         return wrenches, outputs
 

@@ -23,7 +23,7 @@ BASE_STATES = (
     "tail_energy",
 )
 """Pose and velocities (m, m/s, rad/s; see the model page), tail phase (rad), then four running
-integrals: of the horizontal unit vector of the heading (s), of the surge speed through the water
+integrals: of the horizontal unit vector of the heading (s), of the surge speed over ground
 (m), and of the tail servo's mechanical power (J). Means over a tail beat are their differences."""
 
 DYNAMIC_ROWS = 14

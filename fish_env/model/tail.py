@@ -1,4 +1,4 @@
-"""The tail: commanded motion, and lift and drag at its centre of pressure (paper section III.C.1)."""
+"""The tail: commanded motion, lift and drag at its centre of pressure (paper III.C.1)."""
 
 from __future__ import annotations
 

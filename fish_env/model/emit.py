@@ -1,0 +1,321 @@
+"""Writes the source of one lane's evaluation: baseline terms with the hooks of the effects between.
+
+This is the table of contents of the physics: each line it writes calls one function that holds one
+idea, in the order in which the model is computed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from fish_env.params.packing import CURVES, RECORD_FIELDS
+
+if TYPE_CHECKING:
+    from fish_env.model.compose import Composition
+
+BASE_TERMS = (
+    "gravity",
+    "buoyancy",
+    "damping",
+    "impact",
+    "xz_drag",
+    "xz_lift",
+    "xy_drag",
+    "xy_lift",
+    "tail_drag",
+    "tail_lift",
+    "inertial",
+)
+OUTPUTS = {
+    "tail_angle": "tail.angle",
+    "tail_rate": "tail.rate",
+    "tail_power": "power",
+    "barycentre_x": "centre.x",
+    "barycentre_y": "centre.y",
+    "barycentre_z": "centre.z",
+    "surge_through_water": "motion.u",
+    "sway_through_water": "motion.v",
+    "heave_through_water": "motion.w",
+}
+"""Quantities reported beside the wrenches (rad, rad/s, W, m, m/s) and what they are called here."""
+HEADER = '''"""Composed physics (generated; edit the sources in fish_env/model and fish_env/effects)."""
+import math
+
+import numpy as np
+
+from fish_env.model.body import (
+    damping_moment, impact_moment, plane_flow, plane_xy_velocity, plane_xz_velocity,
+    relative_motion,
+)
+from fish_env.model.coefficients import (
+    analytic_drag, analytic_lift, analytic_moment, table_drag, table_lift, table_moment,
+)
+from fish_env.model.frames import quaternion_rate, rotation, to_body, to_inertial
+from fish_env.model.hydrostatics import buoyancy_force, gravity_wrench
+from fish_env.model.jit import entry_point, kernel
+from fish_env.model.mass_properties import barycentre, rigid_inertia
+from fish_env.model.newton_euler import inertial_wrench, solve_full, solve_rigid
+from fish_env.model.plate import drag_force, lift_force, speed_and_inverse
+from fish_env.model.records import Fish, Inputs, Vector, Wrench
+from fish_env.model.tail import (
+    TWO_PI, commanded_tail, hinge_power, tail_arm, tail_velocity, tail_wrench, wrench_at,
+)
+'''
+
+
+class Emitter:
+    """Writes the functions that evaluate one lane."""
+
+    def __init__(self, composition: Composition) -> None:
+        self.composition = composition
+        self.effects = [effect for effect in composition.effects if effect.hooks]
+        self.states = composition.state_names
+        self.parameters = composition.parameter_names
+        self.coefficients = "table" if composition.tables else "analytic"
+
+    def text(self) -> str:
+        """All functions of one composition."""
+        sizes = (
+            f"N_STATES = {len(self.states)}\nN_PARAMETERS = {len(self.parameters)}\n"
+            f"N_TERMS = {len(self.composition.term_names)}\n"
+        )
+        return "\n".join([sizes, self.derivative(), self.terms(), self.initialise()])
+
+    def function(self, name: str, arguments: str, lines: Sequence[str]) -> str:
+        """One kernel from its lines."""
+        body = "\n".join(f"    {line}" for line in lines)
+        return f"\n@kernel\ndef {name}({arguments}):\n{body}\n"
+
+    def derivative(self) -> str:
+        """d(state)/dt of one lane."""
+        lines = [*self.evaluation(), *self.total(), *self.accelerations(), *self.rates()]
+        return self.function("lane_derivative", "k, width, elapsed, shift, work, tables", lines)
+
+    def terms(self) -> str:
+        """Wrench of every term, and the outputs beside them."""
+        lines = [*self.evaluation()]
+        for row, (name, kind) in enumerate(self.wrench_terms()):
+            for component in range(6):
+                attribute = ("fx", "fy", "fz", "mx", "my", "mz")[component]
+                value = f"{name}.{attribute}"
+                if kind != "wrench":
+                    present = (component < 3) == (kind == "force")
+                    value = f"{name}.{'xyz'[component % 3]}" if present else "0.0"
+                lines.append(f"terms[{row}, {component}, k] = {value}")
+        lines += [f"outputs[{row}, k] = {value}" for row, value in enumerate(OUTPUTS.values())]
+        arguments = "k, width, elapsed, shift, work, tables, terms, outputs"
+        return self.function("lane_terms", arguments, lines)
+
+    def initialise(self) -> str:
+        """States of effects at the start of a run."""
+        lines = [*self.unpack(), *self.apply("inputs", "inputs", "time, fish")]
+        lines.append("inputs_at_start = inputs")
+        for effect in self.effects:
+            if not effect.state_names:
+                continue
+            names = ", ".join(f"s_{effect.name}_{i}" for i in range(len(effect.state_names)))
+            call = f"{effect.name}_initial(inputs_at_start, phase, fish, e_{effect.name})"
+            lines.append(f"{names}, = {call}")
+            for i, state in enumerate(effect.state_names):
+                row = self.states.index(f"{effect.name}.{state}")
+                lines.append(f"work[(X + {row}) * width + k] = s_{effect.name}_{i}")
+        return self.function(
+            "lane_initialise", "k, width, work", ["elapsed = 0.0", "shift = 0.0", *lines]
+        )
+
+    def unpack(self) -> list[str]:
+        """Read parameters, state and inputs of a lane."""
+        count = len(RECORD_FIELDS)
+        fields = ", ".join(f"work[(PAR + {i}) * width + k]" for i in range(count))
+        lines = [f"fish = Fish({fields})"]
+        row = count
+        for effect in self.effects:
+            rows = range(row, row + len(effect.parameters))
+            values = ", ".join(f"work[(PAR + {i}) * width + k]" for i in rows)
+            lines.append(f"e_{effect.name} = {effect.name}_record({values})")
+            row += len(effect.parameters)
+        state = [f"work[(X + {i}) * width + k]" for i in range(14)]
+        order = (0, 1, 2, 3, 4, 5, 6)
+        lines += [
+            "time = work[TIME * width + k] + elapsed + shift",
+            f"place = Vector({', '.join(state[:3])})",
+            f"attitude = rotation({', '.join(state[i] for i in order[3:7])})",
+            f"velocity = Vector({', '.join(state[7:10])})",
+            f"omega = Vector({', '.join(state[10:13])})",
+            f"phase = {state[13]}",
+        ]
+        for i in range(5):
+            lines.append(f"u{i}_rate = work[(U_RATE + {i}) * width + k]")
+            lines.append(f"u{i} = work[(U + {i}) * width + k] + shift * u{i}_rate")
+        lines.append("inputs = Inputs(u0, u1, u2, u3, u4, u0_rate, u1_rate, u3_rate, u4_rate)")
+        return lines
+
+    def apply(self, stage: str, value: str, arguments: str) -> list[str]:
+        """Calls of all hooks of a stage, each replacing ``value``."""
+        lines = []
+        for effect in self.effects:
+            if stage not in effect.hooks:
+                continue
+            call = f"{effect.name}_{stage}({value}, {arguments}, e_{effect.name}"
+            names = effect.states.get(stage, ())
+            if not names:
+                lines.append(f"{value} = {call})")
+                continue
+            rows = [self.states.index(f"{effect.name}.{name}") for name in names]
+            states = "".join(f"work[(X + {row}) * width + k], " for row in rows)
+            slopes = ", ".join(f"d_{effect.name}_{i}" for i in range(len(rows)))
+            lines.append(f"{value}, ({slopes},) = {call}, ({states}))")
+        return lines
+
+    def has(self, stage: str) -> bool:
+        """Whether any effect has a hook for this stage."""
+        return any(stage in effect.hooks for effect in self.effects)
+
+    def coefficient(self, kind: str, s: str, curve: str, *numbers: str) -> str:
+        """Call of a coefficient, analytic or from a table."""
+        values = ", ".join(f"fish.{number}" for number in numbers)
+        return f"{self.coefficients}_{kind}({s}, {values}, tables, {CURVES.index(curve)})"
+
+    def evaluation(self) -> list[str]:
+        """Everything up to the wrench terms."""
+        lines = [
+            *self.unpack(),
+            *self.apply("inputs", "inputs", "time, fish"),
+            "tail = commanded_tail(inputs, phase)",
+            *self.apply("tail", "tail", "inputs, phase, time, fish"),
+            "centre = barycentre(inputs, fish)",
+            *self.apply("barycentre", "centre", "place, inputs, time, fish"),
+            "water = Vector(0.0, 0.0, 0.0)",
+            *self.apply("water", "water", "place, time"),
+            "flow = to_body(attitude, water)" if self.has("water") else "flow = water",
+            "motion = relative_motion(time, place, velocity, omega, attitude, flow)",
+            *self.tail_lines(),
+            *self.body_lines(),
+            "gravity = gravity_wrench(attitude, centre, fish)",
+            "buoyancy = buoyancy_force(attitude, centre, fish)",
+            "damping = damping_moment(motion, fish)",
+            "inertial = inertial_wrench(motion, centre)",
+        ]
+        for effect in self.effects:
+            if "wrench" in effect.hooks:
+                lines.append(
+                    f"t_{effect.name} = {effect.name}_wrench(motion, tail, inputs, centre, fish, "
+                    f"e_{effect.name})"
+                )
+        return lines
+
+    def tail_lines(self) -> list[str]:
+        """Tail: kinematics, forces, servo power."""
+        drag = self.coefficient("drag", "s_tail", "tail.drag", "tail_c0", "tail_c2")
+        lift = self.coefficient("lift", "s_tail", "tail.lift", "tail_c1")
+        lines = [
+            "inflow = motion",
+            *self.apply("tail_inflow", "inflow", "fish"),
+            "arm, normal = tail_arm(tail, fish)",
+            "v_tail = tail_velocity(inflow, tail, arm, fish)",
+            "speed_tail, inverse_tail = speed_and_inverse(v_tail.x, v_tail.y, v_tail.z)",
+            "s_tail = (normal.x * v_tail.x + normal.y * v_tail.y) * inverse_tail",
+            "scale_tail = 0.5 * fish.density * fish.tail_area",
+            f"f_drag = drag_force(v_tail, speed_tail, scale_tail, {drag})",
+            f"f_lift = lift_force(v_tail, normal, speed_tail, s_tail, scale_tail, {lift})",
+            "force = Vector(f_drag.x + f_lift.x, f_drag.y + f_lift.y, f_drag.z + f_lift.z)",
+            "tail_drag = tail_wrench(arm, f_drag, fish)",
+            "tail_lift = tail_wrench(arm, f_lift, fish)",
+        ]
+        for effect in self.effects:
+            if "tail_force" in effect.hooks:
+                lines.append("before = force")
+                one = Emitter(self.composition)
+                one.effects = [effect]
+                lines += one.apply("tail_force", "force", "motion, tail, fish")
+                change = ", ".join(f"force.{axis} - before.{axis}" for axis in "xyz")
+                lines.append(f"t_{effect.name} = tail_wrench(arm, Vector({change}), fish)")
+        return [*lines, "power = hinge_power(tail, arm, force)"]
+
+    def body_lines(self) -> list[str]:
+        """Body planes and impact moments."""
+        lines = ["factor = 1.0", *self.apply("body_drag", "factor", "motion, fish")]
+        scale = "factor * " if self.has("body_drag") else ""
+        for plane, normal, area in (("xz", "w", "z"), ("xy", "v", "y")):
+            curve = f"body.plane_{plane}"
+            drag = self.coefficient(
+                "drag", f"flow_{plane}.s", f"{curve}.drag", f"{plane}_c0", f"{plane}_c2"
+            )
+            lift = self.coefficient("lift", f"flow_{plane}.s", f"{curve}.lift", f"{plane}_c1")
+            moment = self.coefficient(
+                "moment",
+                f"flow_{plane}.s, flow_{plane}.cosine",
+                f"{curve}.impact_moment",
+                f"{plane}_k",
+            )
+            unit = "Vector(0.0, 0.0, 1.0)" if normal == "w" else "Vector(0.0, 1.0, 0.0)"
+            lines += [
+                f"v_{plane} = plane_{plane}_velocity(motion)",
+                f"flow_{plane} = plane_flow(motion.u, motion.{normal}, fish.area_x, "
+                f"fish.area_{area}, fish.density)",
+                f"{plane}_drag = drag_force(v_{plane}, flow_{plane}.speed, flow_{plane}.scale, "
+                f"{scale}{drag})",
+                f"{plane}_lift = lift_force(v_{plane}, {unit}, flow_{plane}.speed, "
+                f"flow_{plane}.s, flow_{plane}.scale, {lift})",
+                f"c_{plane} = {moment}",
+            ]
+        return [*lines, "impact = impact_moment(flow_xz, flow_xy, c_xz, c_xy)"]
+
+    def wrench_terms(self) -> list[tuple[str, str]]:
+        """Variables that hold the terms, with their kind: force, moment or both."""
+        kinds = {"buoyancy": "force", "damping": "moment", "impact": "moment"}
+        kinds |= {
+            f"{plane}_{force}": "force" for plane in ("xz", "xy") for force in ("drag", "lift")
+        }
+        terms = [(name, kinds.get(name, "wrench")) for name in BASE_TERMS]
+        return terms + [
+            (f"t_{name}", "wrench") for name in self.composition.term_names[len(BASE_TERMS) :]
+        ]
+
+    def total(self) -> list[str]:
+        """Sum of all terms, leaving out components that are zero by construction."""
+        sums = []
+        for component, attribute in enumerate(("fx", "fy", "fz", "mx", "my", "mz")):
+            is_force = component < 3
+            parts = []
+            for name, kind in self.wrench_terms():
+                if kind == "wrench":
+                    parts.append(f"{name}.{attribute}")
+                elif (kind == "force") == is_force:
+                    parts.append(f"{name}.{'xyz'[component % 3]}")
+            sums.append(" + ".join(parts))
+        return [f"total = Wrench({', '.join(sums)})"]
+
+    def accelerations(self) -> list[str]:
+        """Newton-Euler: the mass matrix solved for the total wrench."""
+        solver = "solve_full" if self.has("inertia") else "solve_rigid"
+        return [
+            "inertia = rigid_inertia(centre)",
+            *self.apply("inertia", "inertia", "tail, fish"),
+            f"acceleration = {solver}(inertia, total)",
+        ]
+
+    def rates(self) -> list[str]:
+        """Store the derivative of every state."""
+        quaternion = ", ".join(f"work[(X + {i}) * width + k]" for i in range(3, 7))
+        values = [
+            "drift.x",
+            "drift.y",
+            "drift.z",
+            *(f"spin[{i}]" for i in range(4)),
+            *(f"acceleration.{a}" for a in ("fx", "fy", "fz", "mx", "my", "mz")),
+            "TWO_PI * inputs.tail_frequency",
+            "attitude.xx * level",
+            "attitude.yx * level",
+            "velocity.x",
+            "power",
+        ]
+        for effect in self.effects:
+            values += [f"d_{effect.name}_{i}" for i in range(len(effect.state_names))]
+        return [
+            "drift = to_inertial(attitude, velocity)",
+            f"spin = quaternion_rate({quaternion}, omega.x, omega.y, omega.z)",
+            "_, level = speed_and_inverse(attitude.xx, attitude.yx, 0.0)",
+            *(f"work[(DX + {i}) * width + k] = {value}" for i, value in enumerate(values)),
+        ]

@@ -34,22 +34,22 @@ def default_threads() -> int:
     return max(1, int(named)) if named else len(os.sched_getaffinity(0))
 
 
-def run_in_threads(task: Callable[[int, int], Any], count: int, lanes: int, threads: int) -> None:
+def run_in_threads(task: Callable[[int, int], int], count: int, lanes: int, threads: int) -> int:
     """Call ``task(first, last)`` on slices of a batch, at least eight blocks of lanes each.
 
     Slices end on block boundaries, so the bits do not depend on the number of threads.
+
+    Returns:
+        Sum of what the calls return.
     """
     blocks = -(-count // lanes)
     parts = max(1, min(threads, blocks // 8))
     if parts == 1:
-        task(0, count)
-        return
+        return task(0, count)
     edges = [min(count, lanes * (blocks * i // parts)) for i in range(parts + 1)]
     pool = _pool(threads)
     jobs = [pool.submit(task, edges[i], edges[i + 1]) for i in range(1, parts)]
-    task(edges[0], edges[1])
-    for job in jobs:
-        job.result()
+    return task(edges[0], edges[1]) + sum(job.result() for job in jobs)
 
 
 class Grid(NamedTuple):
@@ -108,11 +108,12 @@ class Kernels:
         name = "advance_one" if count == 1 else "advance_lanes"
         function = self.entry(name)
 
-        def task(first: int, last: int) -> None:
+        def task(first: int, last: int) -> int:
             function(
                 state, inputs, par, slew, time, commands, *grid, trace_row, trace_at, trace,
                 failed_at, tables, first, last,
             )  # fmt: skip
+            return 0
 
         run_in_threads(task, count, self.lanes, threads or default_threads())
 

@@ -1,0 +1,199 @@
+"""A batch of fish in their episodes: the one engine behind the single and the vector environment."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fish_env.envs import start
+from fish_env.envs.layout import GOAL, MAX_BEAT_S, OBSERVATION, OUTPUTS, SENSORS
+from fish_env.envs.options import EnvOptions
+from fish_env.errors import ConfigError
+from fish_env.model.runtime import default_threads, kernels, run_in_threads
+from fish_env.model.state import BASE_STATES, INTEGRAL_ROW
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+STEP_TEMPLATE = Path(__file__).with_name("step_template.py")
+NOISE_BLOCK = 64
+"""Noise is drawn for this many steps at a time."""
+
+
+class FishBatch:
+    """N fish, each in an episode of its own, advanced together.
+
+    Attributes:
+        options: what the environment is.
+        obs: (N, observations) float32, of the last step or reset.
+        reward: (N,) reward of the last step (a view).
+        outputs: (len(OUTPUTS), N) what ``info`` reports (a view).
+    """
+
+    def __init__(self, options: EnvOptions, count: int, threads: int | None = None) -> None:
+        self.options = options
+        self.count = count
+        self.threads = threads or default_threads()
+        base = options.model.kernels
+        composition = base.composition
+        self._base = base
+        self._kernels = kernels(
+            replace(composition, templates=(*composition.templates, STEP_TEMPLATE))
+        )
+        module = self._kernels.module
+        config = options.config
+        self._data = np.zeros((module.DATA_ROWS, count))
+        self._rows = module
+        self._actions = np.zeros((count, 5), np.float32)
+        self._substeps = config.substeps
+        self._queue = np.zeros((options.action_lag // config.substeps + 2, 5, count))
+        self._queue_at = 0
+        self._trace_row = 0 if options.observation_lag else INTEGRAL_ROW
+        beat = int(np.ceil(MAX_BEAT_S / config.dt)) + 2
+        slots = max(beat + options.observation_lag, config.substeps) + 1
+        rows = len(base.state_names) if options.observation_lag else 3
+        self._ring = np.zeros((slots, rows, count))
+        self._ring_at = 0
+        self._setup = config.setup()
+        self._slew = config.slew
+        self._noise = np.zeros((0 if options.noise_sd is None else len(SENSORS), count))
+        self._noise_blocks = np.zeros((count, NOISE_BLOCK, len(self._noise)))
+        self._noise_used = np.zeros(count, np.int64)
+        self._noise_rngs: list[np.random.Generator | None] = [None] * count
+        self.obs = np.zeros((count, len(OBSERVATION)), np.float32)
+        self.reward = self._data[module.ROW_REWARD]
+        self.outputs = self._data[module.ROW_OUTPUT : module.ROW_OUTPUT + len(OUTPUTS)]
+        self._step = self._kernels.entry("step_one" if count == 1 else "step_lanes")
+
+    @property
+    def state(self) -> FloatArray:
+        """(states, N) states of all fish (a view), rows as ``model.kernels.state_names``."""
+        return self._data[: self._rows.N_STATES]
+
+    @property
+    def inputs(self) -> FloatArray:
+        """(5, N) actuator positions (a view)."""
+        return self._data[self._rows.ROW_INPUTS : self._rows.ROW_SLEW]
+
+    @property
+    def records(self) -> FloatArray:
+        """(parameters, N) parameter records (a view)."""
+        return self._data[self._rows.ROW_PAR : self._rows.ROW_TIME]
+
+    @property
+    def time(self) -> FloatArray:
+        """(N,) time since the start of each episode (s, a view)."""
+        return self._data[self._rows.ROW_TIME]
+
+    def reset(
+        self,
+        lanes: IntArray,
+        rngs: list[np.random.Generator],
+        given: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Start new episodes for some fish.
+
+        Args:
+            lanes: (k,) which fish.
+            rngs: their generators; each fish draws from its own alone.
+            given: reset options that hold for all of them.
+        """
+        given = start.check_reset_options(given)
+        options, rows, data = self.options, self._rows, self._data
+        draws = np.stack([rng.random(start.draw_count(options)) for rng in rngs], axis=1)
+        goal = start.goals(options, draws, given)
+        state = np.zeros((len(self._base.state_names), len(lanes)))
+        state[: len(BASE_STATES)] = start.poses(options, draws, goal, given)
+        record = start.records(options, draws, given)
+        inputs = np.repeat(
+            np.clip(0.0, options.config.low, options.config.high)[:, None], len(lanes), 1
+        )
+        self._base.initialise(state, inputs, np.ascontiguousarray(record), np.zeros(len(lanes)))
+        centre = (options.config.high + options.config.low) / 2
+        half = (options.config.high - options.config.low) / 2
+        data[: rows.N_STATES, lanes] = state
+        data[rows.ROW_INPUTS : rows.ROW_SLEW, lanes] = inputs
+        data[rows.ROW_SLEW : rows.ROW_PAR, lanes] = self._slew[:, None]
+        data[rows.ROW_PAR : rows.ROW_TIME, lanes] = record
+        data[rows.ROW_TIME, lanes] = 0.0
+        data[rows.ROW_GOAL : rows.ROW_GOAL + len(GOAL), lanes] = goal
+        data[rows.ROW_FAILED, lanes] = np.inf
+        data[rows.ROW_ACTION : rows.ROW_WITHIN, lanes] = (inputs - centre[:, None]) / half[:, None]
+        data[rows.ROW_WITHIN, lanes] = 0.0
+        data[rows.ROW_REWARD, lanes] = 0.0
+        self._queue[:, :, lanes] = inputs
+        self._fill_ring(lanes, state)
+        self._start_noise(lanes, rngs)
+        self._kernels.entry("observe_batch")(
+            data, lanes, self._ring, self._ring_at - 1 + len(self._ring),
+            options.observation_lag, self._trace_row, self._noise, self.obs, self._setup,
+        )  # fmt: skip
+
+    def step(self, actions: npt.ArrayLike) -> None:
+        """One control step of all fish; results are in ``obs``, ``reward``, ``outputs``.
+
+        Args:
+            actions: (N, 5) in [-1, 1]; values beyond are clipped.
+
+        Raises:
+            ConfigError: an action is not a number.
+        """
+        self._actions[:] = actions
+        if len(self._noise):
+            self._draw_noise()
+        if self.count == 1:
+            bad = self._advance(0, 1)
+        else:
+            bad = run_in_threads(self._advance, self.count, self._kernels.lanes, self.threads)
+        self._ring_at = (self._ring_at + self._substeps) % len(self._ring)
+        self._queue_at = (self._queue_at + 1) % len(self._queue)
+        if bad:
+            raise ConfigError(f"{bad} action values are NaN; the policy has diverged")
+
+    def _advance(self, first: int, last: int) -> int:
+        return int(
+            self._step(
+                self._data, self._actions, self._queue, self._queue_at, self._ring, self._ring_at,
+                self._noise, self.obs, self._setup, self._substeps, self.options.action_lag,
+                self.options.observation_lag, self._trace_row, self.options.model.tables, first,
+                last,
+            )
+        )  # fmt: skip
+
+    def _fill_ring(self, lanes: IntArray, state: FloatArray) -> None:
+        """As if the fish had kept its first heading and speed since long before the start."""
+        slots = len(self._ring)
+        age = (self._ring_at - 1 - np.arange(slots)) % slots * self.options.config.dt
+        qw, qx, qy, qz = state[3:7]
+        across = np.stack([1 - 2 * (qy * qy + qz * qz), 2 * (qx * qy + qw * qz)])
+        rates = np.concatenate([across / np.hypot(*across), state[7:8]])
+        past = -age[:, None, None] * rates
+        if self._trace_row == 0:
+            self._ring[:, :, lanes] = state
+            integrals = slice(INTEGRAL_ROW, INTEGRAL_ROW + 3)
+            self._ring[:, integrals, lanes] = past
+        else:
+            self._ring[:, :, lanes] = past
+
+    def _start_noise(self, lanes: IntArray, rngs: list[np.random.Generator]) -> None:
+        if self.options.noise_sd is None:
+            return
+        for lane, rng in zip(lanes, rngs, strict=True):
+            self._noise_rngs[lane] = np.random.Generator(np.random.PCG64(rng.integers(2**63)))
+            self._noise_used[lane] = NOISE_BLOCK
+        self._draw_noise(lanes)
+
+    def _draw_noise(self, lanes: IntArray | None = None) -> None:
+        chosen = np.arange(self.count) if lanes is None else lanes
+        for lane in chosen[self._noise_used[chosen] >= NOISE_BLOCK]:
+            rng = self._noise_rngs[lane]
+            assert rng is not None
+            normals = rng.standard_normal(self._noise_blocks.shape[1:])
+            self._noise_blocks[lane] = normals * self.options.noise_sd
+            self._noise_used[lane] = 0
+        self._noise[:, chosen] = self._noise_blocks[chosen, self._noise_used[chosen]].T
+        self._noise_used[chosen] += 1

@@ -1,0 +1,160 @@
+"""What a user asks of the environment beyond its settings: fish, water, sensors, delays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fish_env.effects.extended import PREFIX, EffectValues, ExtendedModel, build_model
+from fish_env.envs.config import EnvConfig, load_env_config
+from fish_env.envs.layout import SENSORS
+from fish_env.envs.randomization import Randomization, randomization
+from fish_env.envs.tasks import TASKS
+from fish_env.errors import ConfigError
+from fish_env.model.crank_slider import CrankSlider
+from fish_env.model.state import INPUTS
+from fish_env.params.io import load_fish
+from fish_env.params.schema import FishParams
+
+FloatArray = npt.NDArray[np.float64]
+NOISE_GROUPS = {
+    "depth": ("depth",),
+    "depth_rate": ("depth_rate",),
+    "attitude": ("roll", "pitch"),
+    "heading": ("heading",),
+    "velocity": ("u", "v", "w"),
+    "rates": ("p", "q", "r"),
+}
+"""Keys of ``observation_noise`` and the sensors they set; sensors may also be named one by one."""
+
+
+@dataclass(frozen=True, eq=False)
+class EnvOptions:
+    """Everything that defines an environment, checked and ready.
+
+    Attributes:
+        config: settings.
+        model: fish and effects.
+        task: task name.
+        goals: settings and draws -> goals.
+        random: parameters drawn anew in each episode, or None.
+        noise_sd: (sensors,) standard deviations, or None.
+        action_lag: action delay in physics steps.
+        observation_lag: observation delay in physics steps.
+    """
+
+    config: EnvConfig
+    model: ExtendedModel
+    task: str
+    goals: Callable[[EnvConfig, FloatArray], dict[str, FloatArray]]
+    random: Randomization | None
+    noise_sd: FloatArray | None
+    action_lag: int
+    observation_lag: int
+
+
+def env_options(
+    task: str = "hold",
+    fish: str | Path | FishParams = "zheng-2021-a",
+    *,
+    config: str | Path | Mapping[str, Any] | None = None,
+    control_hz: float | None = None,
+    physics_hz: float | None = None,
+    cruise_speed: float | tuple[float, float] | None = None,
+    effects: EffectValues | None = None,
+    current: tuple[float, float, float] | None = None,
+    wave: Mapping[str, float] | None = None,
+    observation_noise: Mapping[str, float] | None = None,
+    observation_delay_s: float = 0.0,
+    action_delay_s: float = 0.0,
+    randomization_spec: str | Mapping[str, Any] | None = None,
+) -> EnvOptions:
+    """Check and combine what the constructor of the environment takes (see its docstring).
+
+    Raises:
+        ConfigError: an unknown task or option, or values out of range.
+        EffectError: an unknown effect, or one too fast for the physics step.
+    """
+    if task not in TASKS:
+        raise ConfigError(f"unknown task '{task}': choose one of {', '.join(TASKS)}")
+    settings = load_env_config(config, control_hz, physics_hz)
+    if cruise_speed is not None:
+        speeds = np.atleast_1d(np.asarray(cruise_speed, float))
+        if speeds.size > 2 or np.any(~(speeds >= 0)) or speeds[0] > speeds[-1]:
+            raise ConfigError(f"cruise_speed {cruise_speed!r}: a speed >= 0 or a range [low, high]")
+        settings.tree["goal"]["cruise_speed"] = [float(speeds[0]), float(speeds[-1])]
+    loaded = fish if isinstance(fish, FishParams) else load_fish(fish)
+    spec = randomization_spec
+    named = spec if isinstance(spec, Mapping) else {}
+    whole = any(path.startswith(PREFIX) for path in named)
+    model = build_model(loaded, _water(effects, current, wave), whole_catalogue=whole)
+    model.check_step(settings.dt)
+    _check_reach(settings, loaded)
+    return EnvOptions(
+        settings,
+        model,
+        task,
+        TASKS[task],
+        randomization(spec, loaded, model),
+        _noise(observation_noise),
+        _lag("action_delay_s", action_delay_s, settings.dt),
+        _lag("observation_delay_s", observation_delay_s, settings.dt),
+    )
+
+
+def _water(
+    effects: EffectValues | None,
+    current: tuple[float, float, float] | None,
+    wave: Mapping[str, float] | None,
+) -> dict[str, Mapping[str, float]]:
+    combined: dict[str, Mapping[str, float]] = dict(effects or {})
+    if current is not None:
+        if len(current) != 3:
+            raise ConfigError(f"current {current!r}: three speeds (north, east, down) in m/s")
+        combined["current"] = dict(zip(("north", "east", "down"), map(float, current), strict=True))
+    if wave is not None:
+        combined["wave"] = dict(wave)
+    return combined
+
+
+def _check_reach(settings: EnvConfig, fish: FishParams) -> None:
+    crank = CrankSlider(fish.get("weight_block.crank.l1"), fish.get("weight_block.crank.l2"))
+    low, high = crank.reach
+    row = INPUTS.index("block_displacement")
+    if settings.low[row] < low - 1e-9 or settings.high[row] > high + 1e-9:
+        raise ConfigError(
+            f"actuators.block_displacement {settings.low[row]:g} to {settings.high[row]:g} m is "
+            f"beyond the crank's reach of {fish.name}: stay within {low:.4f} to {high:.4f} m"
+        )
+
+
+def _noise(spec: Mapping[str, float] | None) -> FloatArray | None:
+    if not spec:
+        return None
+    sd = dict.fromkeys(SENSORS, 0.0)
+    for name, value in spec.items():
+        sensors = NOISE_GROUPS.get(name) or ((name,) if name in sd else ())
+        if not sensors or not (0 <= float(value) < np.inf):
+            raise ConfigError(
+                f"observation_noise '{name}': {value!r}; give a standard deviation >= 0 (SI) for "
+                f"any of {', '.join([*NOISE_GROUPS, *SENSORS])}"
+            )
+        sd |= dict.fromkeys(sensors, float(value))
+    return np.array(list(sd.values()))
+
+
+def _lag(name: str, delay_s: float, dt: float) -> int:
+    if not 0 <= delay_s <= 2.0:
+        raise ConfigError(f"{name} = {delay_s} s: choose a delay between 0 and 2 s")
+    steps = round(delay_s / dt)
+    if abs(steps * dt - delay_s) > 1e-9:
+        raise ConfigError(
+            f"{name} = {delay_s} s is not a whole number of physics steps of {dt:g} s; "
+            f"use {steps * dt:g} s or another physics rate"
+        )
+    return steps

@@ -1,0 +1,214 @@
+"""The Gymnasium environment ``RoboticFish3D-v0``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, ClassVar
+
+import gymnasium as gym
+import numpy as np
+import numpy.typing as npt
+from gymnasium.spaces import Box
+
+from fish_env.effects.extended import EffectValues
+from fish_env.envs.batch import FishBatch
+from fish_env.envs.layout import OBSERVATION, OBSERVATION_LIMIT, OUTPUTS
+from fish_env.envs.options import env_options
+from fish_env.params.schema import FishParams
+
+FAILURE = OUTPUTS.index("failure")
+ONE = np.zeros(1, np.int64)
+
+
+def action_space() -> Box:
+    """Five actuators, -1 to 1."""
+    return Box(-1.0, 1.0, (5,), np.float32)
+
+
+def observation_space() -> Box:
+    """Observations, clipped to a finite range."""
+    return Box(-OBSERVATION_LIMIT, OBSERVATION_LIMIT, (len(OBSERVATION),), np.float32)
+
+
+class RoboticFish3DEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
+    """A 29 cm robotic fish that holds or tracks depth and heading while it cruises.
+
+    One servo swings a rigid tail; inside, a weight block slides fore and aft and swings sideways.
+    Inertial frame: x north, y east, z down (depth). Body frame: x forward, y starboard, z down.
+    Actions come at 10 Hz, the physics runs at 100 Hz (RK4); both can be set.
+
+    ## Action space
+
+    ``Box(-1, 1, (5,), float32)``, mapped linearly to physical ranges; values beyond are clipped.
+    Actuators move towards their targets at limited rates (configs/env/robotic-fish-3d.yaml).
+
+    | index | actuator | -1 | +1 | slew limit |
+    | --- | --- | --- | --- | --- |
+    | 0 | tail offset (positive turns to port, yaw rate negative) | -0.6 rad | 0.6 rad | 2 rad/s |
+    | 1 | tail amplitude | 0 | 0.6 rad | 1.5 rad/s |
+    | 2 | tail frequency | 0 | 3 Hz | 4 Hz/s |
+    | 3 | block displacement (positive aft: nose up, climbs) | -12 mm | 12 mm | 20 mm/s |
+    | 4 | block angle (positive: rolls to starboard) | -0.7 rad | 0.7 rad | 2 rad/s |
+
+    ## Observation space
+
+    ``Box(-10, 10, (33,), float32)``; each number is divided by the scale given here.
+
+    | index | observation | scale |
+    | --- | --- | --- |
+    | 0 | depth error (goal - depth) | 0.3 m |
+    | 1 | rate of depth | 0.1 m/s |
+    | 2 | rate of the goal depth | 0.1 m/s |
+    | 3 | depth, -1 at the top and 1 at the bottom of the tank | half of the tank |
+    | 4 | sine of the heading error over the last beat | 1 |
+    | 5 | cosine of the heading error over the last beat | 1 |
+    | 6 | sine of the instantaneous heading error | 1 |
+    | 7 | cosine of the instantaneous heading error | 1 |
+    | 8 | rate of the goal heading | 0.5 rad/s |
+    | 9 | speed error (goal - surge speed over the last beat) | 0.1 m/s |
+    | 10 | goal speed | 0.1 m/s |
+    | 11-12 | sine and cosine of roll | 1 |
+    | 13-14 | sine and cosine of pitch | 1 |
+    | 15-17 | surge, sway, heave speed over ground, body frame | 0.2 m/s |
+    | 18-20 | roll, pitch, yaw rate | 1 rad/s |
+    | 21-22 | sine and cosine of the tail phase | 1 |
+    | 23-27 | actuator positions in the order of the action | action range |
+    | 28-32 | last action | 1 |
+
+    Errors are goal minus measured. The tail swings the heading by some degrees in every stroke, so
+    the heading error that counts is that of the mean heading vector over the last tail beat (at
+    most 1.5 s); the instantaneous one stands beside it.
+
+    ## Reward
+
+    With tolerance(e, m) = 1 / (1 + (e/m)^2): ``0.4 tolerance(depth error, 0.10 m)
+    + 0.4 tolerance(heading error, 0.20 rad) + 0.2 tolerance(speed error, 0.04 m/s)
+    - 0.05 P/(P + 0.5 W) - 0.05 mean((change of action)^2)/4``; P is the mean mechanical power of
+    the tail servo over the step. At most 1 a step; each term is in ``info``.
+
+    ## Start
+
+    Depth within 0.2 m and heading within 90 degrees of the goal, up to 0.1 m/s, a little tilted,
+    at a random tail phase, at (0, 0); actuators at zero.
+
+    ## End
+
+    Terminated when the fish leaves the tank (surface, bottom, walls if set), tumbles by more than
+    80 degrees, or the simulation diverges; ``info["failure"]`` says which
+    (:class:`fish_env.envs.layout.Failure`). Truncated only by the time limit (400 steps).
+
+    ## Info
+
+    ``reward_*`` and ``cost_*`` terms; ``depth_error`` (m), ``heading_error`` (rad, over the last
+    beat), ``heading_error_instant`` (rad), ``speed_error`` (m/s), ``depth, north, east`` (m),
+    ``heading`` (rad, over the last beat), ``speed`` (m/s), ``goal_depth``, ``goal_heading``,
+    ``goal_speed``, ``power`` (W), ``within_tolerance_s``: for how long depth, heading and speed
+    have been within 5 cm, 5 degrees and 20 %, ``is_success``: 1 once that is 10 s, ``failure``,
+    ``time_s``.
+
+    ## Reset options
+
+    ``reset(options={"state": {...}, "goal": {...}, "parameters": {...}})``: state by ``position``
+    (m), ``euler`` (roll, pitch, yaw, rad), ``velocity_body`` (m/s), ``angular_velocity_body``
+    (rad/s), ``tail_phase`` (rad); goal by ``depth`` (m), ``heading`` (rad), ``cruise_speed`` (m/s)
+    or any field of :data:`fish_env.envs.layout.GOAL`; parameters by path, as in the fish's file.
+
+    ## Versions
+
+    * v0: first version.
+
+    Args:
+        task: ``"hold"`` (constant references) or ``"track"`` (steps, ramps, sines).
+        fish: name of a shipped fish, path of a parameter file (extended models included), or
+            parameters.
+        render_mode: None; there is no rendering yet.
+        config: YAML file or mapping that changes configs/env/robotic-fish-3d.yaml.
+        control_hz: actions a second.
+        physics_hz: physics steps a second, a whole multiple of ``control_hz``.
+        cruise_speed: goal speed (m/s) or range; default 0.10, 0 is allowed.
+        effects: effects to switch on: name -> parameters (fish_env.effects).
+        current: steady flow towards (north, east, down) (m/s).
+        wave: parameters of the wave effect: ``amplitude`` (m/s), ``frequency`` (Hz), ...
+        observation_noise: standard deviations (SI) for ``depth``, ``depth_rate``, ``attitude``,
+            ``heading``, ``velocity``, ``rates``, or single sensors.
+        observation_delay_s: age of what the sensors show (s); commands are known at once.
+        action_delay_s: time until an action reaches the actuators (s).
+        randomization: parameters drawn in each episode: ``"prior"``, ``"posterior"``, or
+            path -> ``{"relative": sd}``, ``{"sd": sd}`` or ``[low, high]``.
+
+    Raises:
+        ConfigError, ParameterError, EffectError: saying what to change.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": [], "render_fps": 10}  # type: ignore[misc]
+
+    def __init__(
+        self,
+        task: str = "hold",
+        fish: str | Path | FishParams = "zheng-2021-a",
+        render_mode: str | None = None,
+        *,
+        config: str | Path | Mapping[str, Any] | None = None,
+        control_hz: float | None = None,
+        physics_hz: float | None = None,
+        cruise_speed: float | tuple[float, float] | None = None,
+        effects: EffectValues | None = None,
+        current: tuple[float, float, float] | None = None,
+        wave: Mapping[str, float] | None = None,
+        observation_noise: Mapping[str, float] | None = None,
+        observation_delay_s: float = 0.0,
+        action_delay_s: float = 0.0,
+        randomization: str | Mapping[str, Any] | None = None,
+    ) -> None:
+        self.render_mode = render_mode
+        self.options = env_options(
+            task,
+            fish,
+            config=config,
+            control_hz=control_hz,
+            physics_hz=physics_hz,
+            cruise_speed=cruise_speed,
+            effects=effects,
+            current=current,
+            wave=wave,
+            observation_noise=observation_noise,
+            observation_delay_s=observation_delay_s,
+            action_delay_s=action_delay_s,
+            randomization_spec=randomization,
+        )
+        self.metadata = {**self.metadata, "render_fps": 1.0 / self.options.config.control_period}
+        self.action_space = action_space()
+        self.observation_space = observation_space()
+        self._batch = FishBatch(self.options, 1)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
+        """Start an episode; see the class for ``options``."""
+        super().reset(seed=seed)
+        self._batch.reset(ONE, [self.np_random], options)
+        return self._batch.obs[0].copy(), self._info()
+
+    def step(
+        self, action: npt.NDArray[np.float32]
+    ) -> tuple[npt.NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+        """One control step."""
+        batch = self._batch
+        batch.step(action)
+        info = self._info()
+        return batch.obs[0].copy(), float(batch.reward[0]), info["failure"] > 0, False, info
+
+    @property
+    def state(self) -> dict[str, float]:
+        """The true state by name (see :data:`fish_env.model.state.BASE_STATES`)."""
+        names = self.options.model.kernels.state_names
+        return dict(zip(names, self._batch.state[:, 0].tolist(), strict=True))
+
+    @property
+    def actuators(self) -> npt.NDArray[np.float64]:
+        """(5,) actuator positions (rad, rad, Hz, m, rad)."""
+        return self._batch.inputs[:, 0].copy()
+
+    def _info(self) -> dict[str, Any]:
+        return dict(zip(OUTPUTS, self._batch.outputs[:, 0].tolist(), strict=True))

@@ -1,0 +1,387 @@
+"""The compiled environment step, for one fish or a batch: actions in, observations out.
+
+Completed and compiled by :mod:`fish_env.model.compose` behind the rollout template, whose
+``advance_block`` it calls. All numbers of a fish that last through an episode lie in one column
+of ``data``; the rows follow :data:`fish_env.envs.layout`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+import math
+
+from fish_env.envs.layout import GOAL, MAX_BEAT_S, OBSERVATION_LIMIT, OUTPUTS, Setup
+from fish_env.envs.rewards import saturating, tolerance
+from fish_env.model.state import INTEGRAL_ROW
+from fish_env.model.trigonometry import sincos
+
+# --- completed by compose ---
+from fish_env.model.composed import (  # type: ignore[import-not-found]
+    LANES,
+    N_PARAMETERS,
+    N_STATES,
+    advance_block,
+    entry_point,
+    kernel,
+)
+
+# --- end ---
+
+ROW_INPUTS = N_STATES
+ROW_SLEW = ROW_INPUTS + 5
+ROW_PAR = ROW_SLEW + 5
+ROW_TIME = ROW_PAR + N_PARAMETERS
+ROW_GOAL = ROW_TIME + 1
+ROW_FAILED = ROW_GOAL + len(GOAL)
+ROW_ACTION = ROW_FAILED + 1
+ROW_WITHIN = ROW_ACTION + 5
+ROW_REWARD = ROW_WITHIN + 1
+ROW_OUTPUT = ROW_REWARD + 1
+DATA_ROWS = ROW_OUTPUT + len(OUTPUTS)
+SPEED_INDEX = ROW_GOAL + len(GOAL) - 1
+
+DT = int(Setup.DT)
+CENTRE = int(Setup.CENTRE)
+HALF_RANGE = int(Setup.HALF_RANGE)
+TOP = int(Setup.TOP)
+BOTTOM = int(Setup.BOTTOM)
+WALLS = int(Setup.NORTH_MIN)
+TUMBLE = int(Setup.TUMBLE_COSINE)
+WEIGHTS = int(Setup.WEIGHT_DEPTH)
+MARGINS = int(Setup.MARGIN_DEPTH)
+POWER_SCALE = int(Setup.POWER_SCALE)
+TOLERANCES = int(Setup.TOLERANCE_DEPTH)
+SUCCESS_TIME = int(Setup.SUCCESS_TIME)
+
+
+@kernel
+def reference(data, row, lane, time):
+    """Value and rate of a reference signal at a time (see layout.REFERENCE)."""
+    base = data[row, lane]
+    step = data[row + 1, lane] if time >= data[row + 2, lane] else 0.0
+    rate = data[row + 3, lane]
+    start = data[row + 4, lane]
+    end = data[row + 5, lane]
+    ramped = min(max(time - start, 0.0), max(end - start, 0.0))
+    omega = 6.283185307179586 * data[row + 7, lane]
+    sine, cosine = sincos(omega * time + data[row + 8, lane])
+    amplitude = data[row + 6, lane]
+    ramping = (time >= start) & (time < end)
+    value = base + step + rate * ramped + amplitude * sine
+    return value, (rate if ramping else 0.0) + amplitude * omega * cosine
+
+
+@kernel
+def beat_means(data, lane, ring, newest, back, offset, dt):
+    """Mean heading vector and surge speed over the tail beat that ends ``back`` steps ago."""
+    slots = ring.shape[0]
+    frequency = data[ROW_INPUTS + 2, lane]
+    window = MAX_BEAT_S if frequency * MAX_BEAT_S < 1.0 else 1.0 / frequency
+    steps = window / dt
+    whole = int(steps)
+    fraction = steps - whole
+    now = (newest - back) % slots
+    late = (newest - back - whole) % slots
+    early = (newest - back - whole - 1) % slots
+    per_second = 1.0 / window
+    cosine = ring[now, offset, lane] - (
+        ring[late, offset, lane] * (1.0 - fraction) + ring[early, offset, lane] * fraction
+    )
+    sine = ring[now, offset + 1, lane] - (
+        ring[late, offset + 1, lane] * (1.0 - fraction) + ring[early, offset + 1, lane] * fraction
+    )
+    surge = ring[now, offset + 2, lane] - (
+        ring[late, offset + 2, lane] * (1.0 - fraction) + ring[early, offset + 2, lane] * fraction
+    )
+    norm = math.sqrt(cosine * cosine + sine * sine)
+    scale = 1.0 / norm if norm > 0.0 else 0.0
+    return cosine * scale, sine * scale, surge * per_second
+
+
+@kernel
+def turn(cosine, sine, by_cosine, by_sine):
+    """Cosine and sine of the sum of two angles."""
+    return cosine * by_cosine - sine * by_sine, sine * by_cosine + cosine * by_sine
+
+
+@kernel
+def clipped(value):
+    """An observation within its finite space."""
+    return np.float32(min(max(value, -OBSERVATION_LIMIT), OBSERVATION_LIMIT))
+
+
+@kernel
+def failure_of(data, lane, z_cosine, setup):
+    """Failure code of the present state (layout.Failure)."""
+    code = 0.0
+    if z_cosine < setup[TUMBLE]:
+        code = 4.0
+    x, y, z = data[0, lane], data[1, lane], data[2, lane]
+    outside = (x < setup[WALLS]) | (x > setup[WALLS + 1]) | (y < setup[WALLS + 2])
+    if outside | (y > setup[WALLS + 3]):
+        code = 3.0
+    if z > setup[BOTTOM]:
+        code = 2.0
+    if z < setup[TOP]:
+        code = 1.0
+    if data[ROW_FAILED, lane] < np.inf:
+        code = 5.0
+    return code
+
+
+@kernel
+def judge(data, lane, ring, newest, offset, energy_before, change, period, setup):
+    """Errors, reward terms, tolerance clock and failure of the true state after a step."""
+    time = data[ROW_TIME, lane]
+    goal_depth, _ = reference(data, ROW_GOAL, lane, time)
+    goal_heading, _ = reference(data, ROW_GOAL + 9, lane, time)
+    goal_speed = data[SPEED_INDEX, lane]
+    qw, qx, qy, qz = data[3, lane], data[4, lane], data[5, lane], data[6, lane]
+    heading = math.atan2(2.0 * (qx * qy + qw * qz), 1.0 - 2.0 * (qy * qy + qz * qz))
+    cosine, sine, surge = beat_means(data, lane, ring, newest, 0, offset, setup[DT])
+    goal_sine, goal_cosine = sincos(goal_heading)
+    error_cosine, error_sine = turn(goal_cosine, goal_sine, cosine, -sine)
+    now_sine, now_cosine = sincos(heading)
+    instant_cosine, instant_sine = turn(goal_cosine, goal_sine, now_cosine, -now_sine)
+    depth_error = goal_depth - data[2, lane]
+    heading_error = math.atan2(error_sine, error_cosine)
+    speed_error = goal_speed - surge
+    power = (data[17, lane] - energy_before) / period
+    z_cosine = 1.0 - 2.0 * (qx * qx + qy * qy)
+    failure = failure_of(data, lane, z_cosine, setup)
+
+    allowed = max(setup[TOLERANCES + 2] * goal_speed, setup[TOLERANCES + 3])
+    inside = (
+        (abs(depth_error) <= setup[TOLERANCES])
+        & (abs(heading_error) <= setup[TOLERANCES + 1])
+        & (abs(speed_error) <= allowed)
+        & (failure == 0.0)
+    )
+    data[ROW_WITHIN, lane] = data[ROW_WITHIN, lane] + period if inside else 0.0
+    out = ROW_OUTPUT
+    data[out, lane] = setup[WEIGHTS] * tolerance(depth_error, setup[MARGINS])
+    data[out + 1, lane] = setup[WEIGHTS + 1] * tolerance(heading_error, setup[MARGINS + 1])
+    data[out + 2, lane] = setup[WEIGHTS + 2] * tolerance(speed_error, setup[MARGINS + 2])
+    data[out + 3, lane] = setup[WEIGHTS + 3] * saturating(power, setup[POWER_SCALE])
+    data[out + 4, lane] = setup[WEIGHTS + 4] * change
+    data[out + 5, lane] = depth_error
+    data[out + 6, lane] = heading_error
+    data[out + 7, lane] = math.atan2(instant_sine, instant_cosine)
+    data[out + 8, lane] = speed_error
+    data[out + 9, lane] = data[2, lane]
+    data[out + 10, lane] = math.atan2(sine, cosine)
+    data[out + 11, lane] = surge
+    data[out + 12, lane] = goal_depth
+    data[out + 13, lane] = goal_heading
+    data[out + 14, lane] = goal_speed
+    data[out + 15, lane] = data[0, lane]
+    data[out + 16, lane] = data[1, lane]
+    data[out + 17, lane] = power
+    data[out + 18, lane] = data[ROW_WITHIN, lane]
+    held = data[ROW_WITHIN, lane] >= setup[SUCCESS_TIME] - 1e-9
+    data[out + 19, lane] = 1.0 if held else 0.0
+    data[out + 20, lane] = failure
+    data[out + 21, lane] = time
+    terms = data[out, lane] + data[out + 1, lane] + data[out + 2, lane]
+    data[ROW_REWARD, lane] = terms - data[out + 3, lane] - data[out + 4, lane]
+
+
+@kernel
+def observe(data, lane, ring, newest, back, trace_row, noise, obs, setup):
+    """Write the observation of one fish: what its sensors saw ``back`` physics steps ago."""
+    offset = INTEGRAL_ROW - trace_row
+    slot = (newest - back) % ring.shape[0]
+    pose = ring[slot] if back > 0 else data
+    time = data[ROW_TIME, lane]
+    goal_depth, goal_depth_rate = reference(data, ROW_GOAL, lane, time)
+    goal_heading, goal_heading_rate = reference(data, ROW_GOAL + 9, lane, time)
+    goal_speed = data[SPEED_INDEX, lane]
+    noisy = noise.shape[0] > 0
+
+    qw, qx, qy, qz = pose[3, lane], pose[4, lane], pose[5, lane], pose[6, lane]
+    xx = 1.0 - 2.0 * (qy * qy + qz * qz)
+    yx = 2.0 * (qx * qy + qw * qz)
+    zx = 2.0 * (qx * qz - qw * qy)
+    zy = 2.0 * (qy * qz + qw * qx)
+    zz = 1.0 - 2.0 * (qx * qx + qy * qy)
+    u, v, w = pose[7, lane], pose[8, lane], pose[9, lane]
+    depth = pose[2, lane]
+    depth_rate = zx * u + zy * v + zz * w
+    level = math.sqrt(xx * xx + yx * yx)
+    per_level = 1.0 / level if level > 0.0 else 0.0
+    pitch_sine, pitch_cosine = -zx, level
+    roll_sine, roll_cosine = zy * per_level, zz * per_level
+    now_cosine, now_sine = xx * per_level, yx * per_level
+    cosine, sine, surge = beat_means(data, lane, ring, newest, back, offset, setup[DT])
+    p, q, r = pose[10, lane], pose[11, lane], pose[12, lane]
+    if noisy:
+        depth += noise[0, lane]
+        depth_rate += noise[1, lane]
+        s, c = sincos(noise[2, lane])
+        roll_cosine, roll_sine = turn(roll_cosine, roll_sine, c, s)
+        s, c = sincos(noise[3, lane])
+        pitch_cosine, pitch_sine = turn(pitch_cosine, pitch_sine, c, s)
+        s, c = sincos(noise[4, lane])
+        now_cosine, now_sine = turn(now_cosine, now_sine, c, s)
+        cosine, sine = turn(cosine, sine, c, s)
+        u += noise[5, lane]
+        surge += noise[5, lane]
+        v += noise[6, lane]
+        w += noise[7, lane]
+        p += noise[8, lane]
+        q += noise[9, lane]
+        r += noise[10, lane]
+    goal_sine, goal_cosine = sincos(goal_heading)
+    error_cosine, error_sine = turn(goal_cosine, goal_sine, cosine, -sine)
+    instant_cosine, instant_sine = turn(goal_cosine, goal_sine, now_cosine, -now_sine)
+    phase_sine, phase_cosine = sincos(data[13, lane])
+    half = 0.5 * (setup[BOTTOM] - setup[TOP])
+    middle = 0.5 * (setup[BOTTOM] + setup[TOP])
+    obs[lane, 0] = clipped((goal_depth - depth) / 0.3)
+    obs[lane, 1] = clipped(depth_rate / 0.1)
+    obs[lane, 2] = clipped(goal_depth_rate / 0.1)
+    obs[lane, 3] = clipped((depth - middle) / half)
+    obs[lane, 4] = clipped(error_sine)
+    obs[lane, 5] = clipped(error_cosine)
+    obs[lane, 6] = clipped(instant_sine)
+    obs[lane, 7] = clipped(instant_cosine)
+    obs[lane, 8] = clipped(goal_heading_rate / 0.5)
+    obs[lane, 9] = clipped((goal_speed - surge) / 0.1)
+    obs[lane, 10] = clipped(goal_speed / 0.1)
+    obs[lane, 11] = clipped(roll_sine)
+    obs[lane, 12] = clipped(roll_cosine)
+    obs[lane, 13] = clipped(pitch_sine)
+    obs[lane, 14] = clipped(pitch_cosine)
+    obs[lane, 15] = clipped(u / 0.2)
+    obs[lane, 16] = clipped(v / 0.2)
+    obs[lane, 17] = clipped(w / 0.2)
+    obs[lane, 18] = clipped(p)
+    obs[lane, 19] = clipped(q)
+    obs[lane, 20] = clipped(r)
+    obs[lane, 21] = clipped(phase_sine)
+    obs[lane, 22] = clipped(phase_cosine)
+    for j in range(5):
+        centred = data[ROW_INPUTS + j, lane] - setup[CENTRE + j]
+        obs[lane, 23 + j] = clipped(centred / setup[HALF_RANGE + j])
+        obs[lane, 28 + j] = clipped(data[ROW_ACTION + j, lane])
+
+
+@kernel
+def step_block(
+    width, data, actions, queue, queue_at, ring, ring_at, noise, obs, setup, n_sub, lag, back,
+    trace_row, tables, first, count,
+):  # fmt: skip
+    """Step lanes first..first+count (see :func:`step_lanes`)."""
+    dt = setup[DT]
+    period = n_sub * dt
+    depth_of_queue = queue.shape[0]
+    change = np.empty(width)
+    energy = np.empty(width)
+    bad = 0
+    for k in range(count):
+        lane = first + k
+        total = 0.0
+        for j in range(5):
+            asked = np.float64(actions[lane, j])
+            action = min(max(asked, -1.0), 1.0)
+            if asked != asked:
+                action = 0.0
+                bad += 1
+            step = action - data[ROW_ACTION + j, lane]
+            total += step * step
+            data[ROW_ACTION + j, lane] = action
+            queue[queue_at, j, lane] = setup[CENTRE + j] + setup[HALF_RANGE + j] * action
+        change[k] = total / 20.0
+        energy[k] = data[17, lane]
+    whole = lag // n_sub
+    part = lag % n_sub
+    segments = 1 if part == 0 else 2
+    slots = np.empty(segments, np.int64)
+    starts = np.zeros(segments)
+    steps = np.empty(segments, np.int64)
+    slots[0] = (queue_at - whole - (0 if part == 0 else 1)) % depth_of_queue
+    steps[0] = n_sub if part == 0 else part
+    if segments == 2:
+        slots[1] = (queue_at - whole) % depth_of_queue
+        steps[1] = n_sub - part
+        starts[1] = part * dt
+    sizes = np.full(segments, dt)
+    every = np.ones(segments, np.int64)
+    advance_block(
+        width, data[:ROW_INPUTS], data[ROW_INPUTS:ROW_SLEW], data[ROW_PAR:ROW_TIME],
+        data[ROW_SLEW:ROW_PAR], data[ROW_TIME], queue, slots, starts, steps, sizes, every,
+        trace_row, ring_at, ring, data[ROW_FAILED], tables, first, count,
+    )  # fmt: skip
+    newest = ring_at + n_sub - 1
+    for k in range(count):
+        lane = first + k
+        data[ROW_TIME, lane] += period
+        offset = INTEGRAL_ROW - trace_row
+        judge(data, lane, ring, newest, offset, energy[k], change[k], period, setup)
+        observe(data, lane, ring, newest, back, trace_row, noise, obs, setup)
+    return bad
+
+
+@entry_point
+def step_lanes(
+    data, actions, queue, queue_at, ring, ring_at, noise, obs, setup, n_sub, lag, back, trace_row,
+    tables, first, last,
+):  # fmt: skip
+    """One control step of fish first..last, in place.
+
+    Args:
+        data: (DATA_ROWS, N), everything about each fish.
+        actions: (N, 5) float32 in [-1, 1]; clipped, NaN counts as 0 and is reported.
+        queue: (Q, 5, N) past targets of the actuators; slot ``queue_at`` is written now.
+        queue_at: slot of this step's targets.
+        ring: (L, rows, N) samples after every physics step, the last L of them.
+        ring_at: slot of this step's first sample (not wrapped).
+        noise: (sensors, N) added to what sensors see, or no rows.
+        obs: (N, observations) float32, written.
+        setup: shared numbers, see layout.Setup.
+        n_sub: physics steps in a control step.
+        lag: action delay in physics steps.
+        back: observation delay in physics steps.
+        trace_row: first state row that the ring holds.
+        tables: packed coefficient curves.
+        first: first fish.
+        last: one past the last.
+
+    Returns:
+        How many action values were NaN.
+    """
+    bad = 0
+    for block in range(first, last, LANES):
+        bad += step_block(
+            LANES, data, actions, queue, queue_at, ring, ring_at, noise, obs, setup, n_sub, lag,
+            back, trace_row, tables, block, min(LANES, last - block),
+        )  # fmt: skip
+    return bad
+
+
+@entry_point
+def step_one(
+    data, actions, queue, queue_at, ring, ring_at, noise, obs, setup, n_sub, lag, back, trace_row,
+    tables, first, last,
+):  # fmt: skip
+    """As :func:`step_lanes`, one fish at a time: for a single fish."""
+    bad = 0
+    for lane in range(first, last):
+        bad += step_block(
+            1, data, actions, queue, queue_at, ring, ring_at, noise, obs, setup, n_sub, lag, back,
+            trace_row, tables, lane, 1,
+        )  # fmt: skip
+    return bad
+
+
+@entry_point
+def observe_batch(data, lanes, ring, newest, back, trace_row, noise, obs, setup):
+    """Judge and observe some fish without moving them: what a reset returns."""
+    for i in range(lanes.shape[0]):
+        lane = lanes[i]
+        judge(data, lane, ring, newest, INTEGRAL_ROW - trace_row, data[17, lane], 0.0, 1.0, setup)
+        data[ROW_WITHIN, lane] = 0.0
+        data[ROW_OUTPUT + 18, lane] = 0.0
+        data[ROW_OUTPUT + 19, lane] = 0.0
+        observe(data, lane, ring, newest, back, trace_row, noise, obs, setup)

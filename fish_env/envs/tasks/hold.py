@@ -1,0 +1,36 @@
+"""Hold: constant depth, heading and cruise speed."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from fish_env.envs.config import EnvConfig
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def between(bounds: list[float], draw: FloatArray) -> FloatArray:
+    """Uniform draw in [0, 1) mapped to a range [low, high]."""
+    low, high = bounds
+    return np.asarray(low + (high - low) * draw)
+
+
+def hold_goal(config: EnvConfig, draws: FloatArray) -> dict[str, FloatArray]:
+    """Constant references.
+
+    Args:
+        config: settings; ``goal.depth`` and ``goal.cruise_speed`` are used.
+        draws: (GOAL_DRAWS, N) uniform in [0, 1).
+
+    Returns:
+        Goal field -> (N,); fields that are absent are zero (see layout.GOAL).
+    """
+    goal = config.tree["goal"]
+    cruise = goal["cruise_speed"]
+    cruise = cruise if isinstance(cruise, list) else [cruise, cruise]
+    return {
+        "depth_base": between(goal["depth"], draws[0]),
+        "heading_base": np.pi * (2.0 * draws[1] - 1.0),
+        "cruise_speed": between(cruise, draws[2]),
+    }

@@ -1,0 +1,172 @@
+"""Many fish at once: the native ``VectorEnv`` on the same compiled step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+import numpy.typing as npt
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+
+from fish_env.envs.batch import FishBatch
+from fish_env.envs.layout import OUTPUTS
+from fish_env.envs.options import env_options
+from fish_env.envs.robotic_fish_3d import FAILURE, action_space, observation_space
+from fish_env.errors import ConfigError
+
+BoolArray = npt.NDArray[np.bool_]
+Float32Array = npt.NDArray[np.float32]
+
+
+class RoboticFish3DVectorEnv(VectorEnv[Float32Array, Float32Array, npt.NDArray[np.float64]]):
+    """N independent :class:`RoboticFish3DEnv`, advanced together on all cores.
+
+    Fish i behaves to the last bit like a single environment that was reset with seed + i, whatever
+    the number of threads. Made by ``gymnasium.make_vec("RoboticFish3D-v0", num_envs=N)``.
+
+    Args:
+        num_envs: number of fish.
+        max_episode_steps: control steps until truncation.
+        autoreset_mode: NEXT_STEP (default): the step after an end returns the reset observation
+            and zero reward; SAME_STEP: the step that ends an episode returns the first
+            observation of the next, with the last one in ``info["final_obs"]`` and its info in
+            ``info["final_info"]``; DISABLED: the caller resets with
+            ``options={"reset_mask": mask}``.
+        threads: threads for a step; default: all cores of this process.
+        render_mode: None.
+        **kwargs: as for :class:`RoboticFish3DEnv`.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
+        "render_modes": [],
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        max_episode_steps: int = 400,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        threads: int | None = None,
+        render_mode: str | None = None,
+        **kwargs: Any,
+    ) -> None:
+        if num_envs < 1 or max_episode_steps < 1:
+            raise ConfigError("num_envs and max_episode_steps must be at least 1")
+        self.num_envs = num_envs
+        self.max_episode_steps = max_episode_steps
+        self.autoreset_mode = AutoresetMode(autoreset_mode)
+        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
+        self.render_mode = render_mode
+        kwargs["randomization_spec"] = kwargs.pop("randomization", None)
+        self.options = env_options(**kwargs)
+        self.single_action_space = action_space()
+        self.single_observation_space = observation_space()
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.batch = FishBatch(self.options, num_envs, threads)
+        self._rngs: list[np.random.Generator] = []
+        self._steps = np.zeros(num_envs, np.int64)
+        self._ended = np.zeros(num_envs, bool)
+        self._all = np.arange(num_envs)
+
+    def reset(
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[Float32Array, dict[str, Any]]:
+        """Start episodes for all fish, or for those in ``options["reset_mask"]``.
+
+        Args:
+            seed: fish i is seeded with seed + i, or with the i-th of a sequence.
+            options: as for the single environment, for all fish alike, and ``reset_mask``:
+                (num_envs,) bool.
+        """
+        given = dict(options or {})
+        mask = given.pop("reset_mask", None)
+        lanes = self._all if mask is None else self._masked(mask)
+        self._seed(seed, lanes)
+        self._restart(lanes, given)
+        return self.batch.obs.copy(), self._infos(np.isin(self._all, lanes))
+
+    def step(
+        self, actions: npt.ArrayLike
+    ) -> tuple[Float32Array, npt.NDArray[np.float64], BoolArray, BoolArray, dict[str, Any]]:
+        """One control step of every fish."""
+        batch = self.batch
+        if not self._rngs:
+            raise ConfigError("call reset() before step()")
+        batch.step(actions)
+        self._steps += 1
+        reward = batch.reward.copy()
+        terminated = batch.outputs[FAILURE] > 0
+        truncated = (self._steps >= self.max_episode_steps) & ~terminated
+        if self.autoreset_mode is AutoresetMode.NEXT_STEP and self._ended.any():
+            fresh = np.flatnonzero(self._ended)
+            self._restart(fresh, {})
+            reward[fresh] = 0.0
+            terminated[fresh] = truncated[fresh] = False
+        self._ended = terminated | truncated
+        infos: dict[str, Any] = {}
+        if self.autoreset_mode is AutoresetMode.SAME_STEP and self._ended.any():
+            infos = self._finish()
+        infos = {**self._infos(np.ones(self.num_envs, bool)), **infos}
+        return batch.obs.copy(), reward, terminated, truncated, infos
+
+    def _finish(self) -> dict[str, Any]:
+        """Keep the last observation and info of ended episodes, then start new ones."""
+        mask = self._ended.copy()
+        final_obs = np.full(self.num_envs, None, dtype=object)
+        for lane in np.flatnonzero(mask):
+            final_obs[lane] = self.batch.obs[lane].copy()
+        final_info = self._infos(mask)
+        self._restart(np.flatnonzero(mask), {})
+        return {
+            "final_obs": final_obs,
+            "_final_obs": mask,
+            "final_info": final_info,
+            "_final_info": mask.copy(),
+        }
+
+    def _restart(self, lanes: npt.NDArray[np.int64], given: dict[str, Any]) -> None:
+        self.batch.reset(lanes, [self._rngs[lane] for lane in lanes], given)
+        self._steps[lanes] = 0
+        self._ended[lanes] = False
+
+    def _seed(self, seed: int | Sequence[int | None] | None, lanes: npt.NDArray[np.int64]) -> None:
+        if not self._rngs:
+            first = seed if isinstance(seed, int) else None
+            self._np_random, self._np_random_seed = seeding.np_random(first)
+            self._rngs = [seeding.np_random(None)[0] for _ in self._all]
+        if seed is None:
+            return
+        if isinstance(seed, int):
+            self._np_random, self._np_random_seed = seeding.np_random(seed)
+            seed = [seed + i for i in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise ConfigError(f"give one seed or {self.num_envs} of them, not {len(seed)}")
+        for lane in lanes:
+            if seed[lane] is not None:
+                self._rngs[lane] = seeding.np_random(seed[lane])[0]
+
+    def _masked(self, mask: Any) -> npt.NDArray[np.int64]:
+        chosen = np.asarray(mask)
+        if chosen.dtype != bool or chosen.shape != (self.num_envs,) or not chosen.any():
+            raise ConfigError(
+                f"reset_mask must be a boolean array of shape ({self.num_envs},), not all False"
+            )
+        if not self._rngs and not chosen.all():
+            raise ConfigError("the first reset must be of all fish")
+        return np.flatnonzero(chosen)
+
+    def _infos(self, mask: BoolArray) -> dict[str, Any]:
+        infos: dict[str, Any] = {}
+        values = np.where(mask, self.batch.outputs, 0.0)
+        for name, row in zip(OUTPUTS, values, strict=True):
+            infos[name] = row
+            infos[f"_{name}"] = mask
+        return infos

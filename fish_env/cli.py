@@ -1,0 +1,84 @@
+"""`robofish`, the command line. Thin: every command lives in :mod:`fish_env.commands`.
+
+Only typer and rich are imported here; what a command needs is imported when it runs.
+"""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from fish_env.errors import RoboticFishError
+
+app = typer.Typer(
+    name="robofish",
+    help="Simulate, compare and study a tail-driven robotic fish.",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
+)
+
+
+@app.command()
+def simulate(
+    case: Annotated[Path, typer.Argument(help="The case, a JSON file.", metavar="CASE.json")],
+    dt: Annotated[float, typer.Option(help="Longest physics step, s.")] = 0.001,
+    rate: Annotated[float, typer.Option(help="Samples per second.")] = 10.0,
+    out: Annotated[
+        Path | None, typer.Option(help="A .csv or .parquet file; without it, CSV is printed.")
+    ] = None,
+) -> None:
+    """Simulate one case and write pose and velocities over time.
+
+    A case names the fish, the duration, the schedule of commands and, if wanted, the initial
+    state and effects.
+
+    [bold]Example[/bold]: robofish simulate case.json --rate 50 --out swim.csv
+    """
+    from fish_env.commands.simulate import simulate_case
+
+    simulate_case(case, dt, rate, out)
+
+
+@app.command()
+def effects() -> None:
+    """List the effects that can be added to the model, with their parameters.
+
+    [bold]Example[/bold]: robofish effects
+    """
+    from fish_env.commands.effects import print_effects
+
+    print_effects(Console())
+
+
+def main() -> None:
+    """Runs `robofish`. An error that we raise on purpose is one red line, exit status 2."""
+    with warnings.catch_warnings():
+        warnings.showwarning = lambda message, *_: _complain("yellow", f"robofish: {message}")
+        _run()
+
+
+def _run() -> None:
+    try:
+        app()
+    except RoboticFishError as error:
+        _complain("red", f"robofish: {error}")
+        raise SystemExit(2) from None
+    except OSError as error:
+        _complain("red", f"robofish: {error.filename or ''}: {error.strerror or error}")
+        raise SystemExit(2) from None
+
+
+def _complain(colour: str, text: str) -> None:
+    line = " ".join(text.split())
+    Console(stderr=True, soft_wrap=True).print(f"[{colour}]{escape(line)}[/{colour}]")
+
+
+if __name__ == "__main__":
+    main()

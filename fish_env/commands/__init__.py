@@ -1,0 +1,1 @@
+"""What the commands of `robofish` do, one module each; :mod:`fish_env.cli` only parses words."""

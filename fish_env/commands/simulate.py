@@ -1,0 +1,76 @@
+"""`robofish simulate`: one case in, one table out."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+import numpy.typing as npt
+
+from fish_env.commands.case import read_case
+from fish_env.errors import ScheduleError, missing_extra
+from fish_env.simulator import Simulator
+from fish_env.trajectory import POSE_COLUMNS, Trajectory
+
+FloatArray = npt.NDArray[np.float64]
+COLUMNS = ("t", *POSE_COLUMNS)
+SUFFIXES = (".csv", ".parquet")
+
+
+def simulate_case(case_file: Path, dt: float, rate_hz: float, out: Path | None) -> None:
+    """Simulates a case and writes its motion, to standard output if no file is named.
+
+    Args:
+        case_file: The case, see :mod:`fish_env.commands.case`.
+        dt: Longest physics step, s.
+        rate_hz: Samples per second.
+        out: `.csv` or `.parquet` file.
+
+    Raises:
+        ScheduleError: The case or the output's ending is not as it should be.
+    """
+    if out is not None and out.suffix not in SUFFIXES:
+        raise ScheduleError(f"{out}: give the output the ending .csv or .parquet")
+    case = read_case(case_file)
+    simulator = Simulator(case.fish, dt, case.effects)
+    trajectory = simulator.run(case.commands, case.duration_s, case.initial, rate_hz)
+    write_table(pose_table(trajectory), out)
+
+
+def pose_table(trajectory: Trajectory) -> FloatArray:
+    """Time, pose and velocities, shape (T, 14), columns as `COLUMNS`.
+
+    q and -q are one attitude; the one with qw >= 0 is given.
+    """
+    table = np.column_stack([trajectory[name] for name in COLUMNS])
+    quaternion = slice(COLUMNS.index("qw"), COLUMNS.index("qz") + 1)
+    table[table[:, quaternion.start] < 0.0, quaternion] *= -1.0
+    return table + 0.0  # turns -0 into 0
+
+
+def write_table(table: FloatArray, out: Path | None) -> None:
+    """Writes a table with all digits, as its file's ending says, or as CSV to standard output."""
+    if out is None:
+        _write_csv(table, sys.stdout)
+    elif out.suffix == ".parquet":
+        _write_parquet(table, out)
+    else:
+        with out.open("w", encoding="utf-8") as file:
+            _write_csv(table, file)
+
+
+def _write_csv(table: FloatArray, file: TextIO) -> None:
+    header = ",".join(COLUMNS)
+    np.savetxt(file, table, fmt="%.17g", delimiter=",", header=header, comments="")
+
+
+def _write_parquet(table: FloatArray, out: Path) -> None:
+    try:
+        import pyarrow  # noqa: F401
+    except ImportError:
+        raise missing_extra("Writing Parquet", "pyarrow", "parquet") from None
+    import pandas as pd
+
+    pd.DataFrame(table, columns=list(COLUMNS)).to_parquet(out, index=False)

@@ -100,7 +100,7 @@ def rk4_step(work, width, elapsed, h, tables):
 
 @kernel
 def accept_step(work, width, elapsed, failed_at, first, count):
-    """Normalise the quaternion; keep a lane that diverged at its last good state."""
+    """Normalise the quaternion; a lane that diverged stays at its last good state for good."""
     for k in range(width):
         norm = 0.0
         for j in range(3, 7):
@@ -111,7 +111,8 @@ def accept_step(work, width, elapsed, failed_at, first, count):
         for j in range(N_STATES):
             value = work[(X + j) * width + k]
             size += abs(value) if (j < 13) | (j >= 18) else 0.0 * value
-        good = size < LARGEST
+        lane = first + (k if k < count else count - 1)
+        good = (size < LARGEST) & (failed_at[lane] == np.inf)
         for j in range(N_STATES):
             value = work[(X + j) * width + k]
             value = value * scale if (j >= 3) & (j < 7) else value

@@ -39,11 +39,12 @@ def plain_module(composition: Composition, replacements: Replacements) -> types.
     """The composed module with texts replaced, as plain Python.
 
     Raises:
-        AssertionError: a text to replace is not there, so nothing would be broken.
+        LookupError: a text to replace is not there, so nothing would be broken.
     """
     text = composition.source()
     for old, new in {**replacements, JIT_IMPORT: NO_JIT}.items():
-        assert old in text, f"the composed model no longer contains {old!r}"
+        if old not in text:
+            raise LookupError(f"the composed model no longer contains {old!r}")
         text = text.replace(old, new)
     module = types.ModuleType("broken_model")
     module.__file__ = __file__

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from fish_env.simulator import Simulator
+from fish_env.simulator import InitialState, Simulator
 from tests.physics import checkers
-from tests.physics.cases import ALL_EFFECTS, WATER_EFFECTS, swimmer
+from tests.physics.cases import ALL_EFFECTS, SWIM, TUMBLE, WATER_EFFECTS, swimmer
 
 NO_CURRENT_ACROSS = {**ALL_EFFECTS, "current": {"down": 0.05}}
 
@@ -32,8 +32,6 @@ def test_a_trimmed_fish_at_rest_stays_at_rest():
 def test_a_fish_at_rest_drifts_with_the_current():
     """Rest in the moving frame: the velocity over ground stays that of the water."""
     current = {"north": 0.2, "east": -0.1, "down": 0.05}
-    from fish_env.simulator import InitialState
-
     start = InitialState(velocity_body=tuple(current.values()))
     run = Simulator(swimmer(), 0.01, {"current": current}).run(
         [{"t": 0.0}], duration_s=5.0, initial=start
@@ -44,8 +42,6 @@ def test_a_fish_at_rest_drifts_with_the_current():
 
 def test_yaw_does_not_matter():
     """Water and gravity have no compass: a turned start gives the turned path."""
-    from tests.physics.cases import SWIM, TUMBLE, InitialState
-
     turned = InitialState(
         (0.0, 0.0, 1.0),
         (TUMBLE.euler[0], TUMBLE.euler[1], TUMBLE.euler[2] + np.pi / 2),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copyreg
 import difflib
 import hashlib
 import importlib
@@ -73,3 +74,15 @@ def load_effect_file(path: str | Path) -> Effect:
     if effect.name in catalogue():
         raise EffectError(f"{file}: the name '{effect.name}' is taken by a shipped effect")
     return replace(effect, file=file)
+
+
+def _restore(name: str, file: Path | None) -> Effect:
+    return get_effect(name) if file is None else load_effect_file(file)
+
+
+def _reduce(effect: Effect) -> tuple[object, tuple[str, Path | None]]:
+    return _restore, (effect.name, effect.file)
+
+
+# Compiled hooks cannot be pickled, so an effect travels by name, or by its file.
+copyreg.pickle(Effect, _reduce)

@@ -1,4 +1,4 @@
-"""A batch of fish in their episodes: the one engine behind the single and the vector environment."""
+"""A batch of fish in their episodes: the engine behind single and vector environment."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fish_env.envs import start
 from fish_env.envs.layout import GOAL, MAX_BEAT_S, OBSERVATION, OUTPUTS, SENSORS
 from fish_env.envs.options import EnvOptions
 from fish_env.errors import ConfigError
-from fish_env.model.runtime import default_threads, kernels, run_in_threads
+from fish_env.model.runtime import Kernels, default_threads, kernels, run_in_threads
 from fish_env.model.state import BASE_STATES, INTEGRAL_ROW
 
 FloatArray = npt.NDArray[np.float64]
@@ -22,6 +22,12 @@ IntArray = npt.NDArray[np.int64]
 STEP_TEMPLATE = Path(__file__).with_name("step_template.py")
 NOISE_BLOCK = 64
 """Noise is drawn for this many steps at a time."""
+
+
+def _step_kernels(options: EnvOptions) -> Kernels:
+    """The physics of these options with the environment step behind it."""
+    composition = options.model.kernels.composition
+    return kernels(replace(composition, templates=(*composition.templates, STEP_TEMPLATE)))
 
 
 class FishBatch:
@@ -38,16 +44,9 @@ class FishBatch:
         self.options = options
         self.count = count
         self.threads = threads or default_threads()
-        base = options.model.kernels
-        composition = base.composition
-        self._base = base
-        self._kernels = kernels(
-            replace(composition, templates=(*composition.templates, STEP_TEMPLATE))
-        )
-        module = self._kernels.module
         config = options.config
-        self._data = np.zeros((module.DATA_ROWS, count))
-        self._rows = module
+        rows = _step_kernels(options).module.DATA_ROWS
+        self._data = np.zeros((rows, count))
         self._actions = np.zeros((count, 5), np.float32)
         self._substeps = config.substeps
         self._queue = np.zeros((options.action_lag // config.substeps + 2, 5, count))
@@ -55,8 +54,8 @@ class FishBatch:
         self._trace_row = 0 if options.observation_lag else INTEGRAL_ROW
         beat = int(np.ceil(MAX_BEAT_S / config.dt)) + 2
         slots = max(beat + options.observation_lag, config.substeps) + 1
-        rows = len(base.state_names) if options.observation_lag else 3
-        self._ring = np.zeros((slots, rows, count))
+        traced = len(options.model.kernels.state_names) if options.observation_lag else 3
+        self._ring = np.zeros((slots, traced, count))
         self._ring_at = 0
         self._setup = config.setup()
         self._slew = config.slew
@@ -65,9 +64,31 @@ class FishBatch:
         self._noise_used = np.zeros(count, np.int64)
         self._noise_rngs: list[np.random.Generator | None] = [None] * count
         self.obs = np.zeros((count, len(OBSERVATION)), np.float32)
-        self.reward = self._data[module.ROW_REWARD]
-        self.outputs = self._data[module.ROW_OUTPUT : module.ROW_OUTPUT + len(OUTPUTS)]
-        self._step = self._kernels.entry("step_one" if count == 1 else "step_lanes")
+        self._bind()
+
+    def _bind(self) -> None:
+        """Compiled code and views of the data, which are not part of a pickle."""
+        self._base = self.options.model.kernels
+        self._kernels = _step_kernels(self.options)
+        self._rows = rows = self._kernels.module
+        self.reward = self._data[rows.ROW_REWARD]
+        self.outputs = self._data[rows.ROW_OUTPUT : rows.ROW_OUTPUT + len(OUTPUTS)]
+        self._step = self._kernels.entry("step_one" if self.count == 1 else "step_lanes")
+
+    def __getstate__(self) -> dict[str, Any]:
+        bound = ("_base", "_kernels", "_rows", "reward", "outputs", "_step")
+        return {name: value for name, value in vars(self).items() if name not in bound}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._bind()
+
+    @property
+    def results(self) -> list[float]:
+        """Reward of fish 0, then its outputs: what a single environment reads after a step."""
+        last = self._rows.ROW_OUTPUT + len(OUTPUTS)
+        numbers: list[float] = self._data[self._rows.ROW_REWARD : last, 0].tolist()
+        return numbers
 
     @property
     def state(self) -> FloatArray:
@@ -109,12 +130,10 @@ class FishBatch:
         state = np.zeros((len(self._base.state_names), len(lanes)))
         state[: len(BASE_STATES)] = start.poses(options, draws, goal, given)
         record = start.records(options, draws, given)
-        inputs = np.repeat(
-            np.clip(0.0, options.config.low, options.config.high)[:, None], len(lanes), 1
-        )
-        self._base.initialise(state, inputs, np.ascontiguousarray(record), np.zeros(len(lanes)))
-        centre = (options.config.high + options.config.low) / 2
-        half = (options.config.high - options.config.low) / 2
+        low, high = options.config.low, options.config.high
+        inputs = np.repeat(np.clip(0.0, low, high)[:, None], len(lanes), axis=1)
+        self._base.initialise(state, inputs, record, np.zeros(len(lanes)))
+        action = (inputs - (high + low)[:, None] / 2) / ((high - low)[:, None] / 2)
         data[: rows.N_STATES, lanes] = state
         data[rows.ROW_INPUTS : rows.ROW_SLEW, lanes] = inputs
         data[rows.ROW_SLEW : rows.ROW_PAR, lanes] = self._slew[:, None]
@@ -122,7 +141,7 @@ class FishBatch:
         data[rows.ROW_TIME, lanes] = 0.0
         data[rows.ROW_GOAL : rows.ROW_GOAL + len(GOAL), lanes] = goal
         data[rows.ROW_FAILED, lanes] = np.inf
-        data[rows.ROW_ACTION : rows.ROW_WITHIN, lanes] = (inputs - centre[:, None]) / half[:, None]
+        data[rows.ROW_ACTION : rows.ROW_WITHIN, lanes] = action
         data[rows.ROW_WITHIN, lanes] = 0.0
         data[rows.ROW_REWARD, lanes] = 0.0
         self._queue[:, :, lanes] = inputs

@@ -188,7 +188,8 @@ class RoboticFish3DEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]
         """Start an episode; see the class for ``options``."""
         super().reset(seed=seed)
         self._batch.reset(ONE, [self.np_random], options)
-        return self._batch.obs[0].copy(), self._info()
+        _, *outputs = self._batch.results
+        return self._batch.obs[0].copy(), dict(zip(OUTPUTS, outputs, strict=True))
 
     def step(
         self, action: npt.NDArray[np.float32]
@@ -196,8 +197,9 @@ class RoboticFish3DEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]
         """One control step."""
         batch = self._batch
         batch.step(action)
-        info = self._info()
-        return batch.obs[0].copy(), float(batch.reward[0]), info["failure"] > 0, False, info
+        reward, *outputs = batch.results
+        info = dict(zip(OUTPUTS, outputs, strict=True))
+        return batch.obs[0].copy(), reward, info["failure"] > 0, False, info
 
     @property
     def state(self) -> dict[str, float]:
@@ -209,6 +211,3 @@ class RoboticFish3DEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]
     def actuators(self) -> npt.NDArray[np.float64]:
         """(5,) actuator positions (rad, rad, Hz, m, rad)."""
         return self._batch.inputs[:, 0].copy()
-
-    def _info(self) -> dict[str, Any]:
-        return dict(zip(OUTPUTS, self._batch.outputs[:, 0].tolist(), strict=True))

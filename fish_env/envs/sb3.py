@@ -18,7 +18,7 @@ except ImportError as error:
 
 
 class FishVecEnv(VecEnv):
-    """``FishVecEnv(num_envs=64, task="hold", ...)``; wrap it in SB3's ``VecMonitor`` for statistics.
+    """``FishVecEnv(num_envs=64, task="hold")``; wrap it in SB3's ``VecMonitor`` for statistics.
 
     Args:
         num_envs: number of fish.

@@ -86,6 +86,10 @@ class Kernels:
         self.parameter_names = composition.parameter_names
         self.lanes: int = self.module.LANES
 
+    def __reduce__(self) -> tuple[Callable[[Composition], Kernels], tuple[Composition]]:
+        """Machine code is not pickled; the composition finds it again."""
+        return kernels, (self.composition,)
+
     def advance(
         self,
         state: FloatArray,

@@ -1,4 +1,4 @@
-"""Tasks: what the goal of an episode is. ``hold`` keeps constant references, ``track`` moves them."""
+"""Tasks: what the goal of an episode is. ``hold`` keeps references constant, ``track`` moves them."""
 
 from collections.abc import Callable
 

@@ -84,7 +84,7 @@ class RoboticFish3DEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]
 
     With tolerance(e, m) = 1 / (1 + (e/m)^2): ``0.4 tolerance(depth error, 0.10 m)
     + 0.4 tolerance(heading error, 0.20 rad) + 0.2 tolerance(speed error, 0.04 m/s)
-    - 0.05 P/(P + 0.5 W) - 0.05 mean((change of action)^2)/4``; P is the mean mechanical power of
+    - 0.05 P/(P + 0.1 W) - 0.05 mean((change of action)^2)/4``; P is the mean mechanical power of
     the tail servo over the step. At most 1 a step; each term is in ``info``.
 
     ## Start

@@ -20,7 +20,7 @@ app = typer.Typer(
     help="Simulate, compare and study a tail-driven robotic fish.",
     no_args_is_help=True,
     add_completion=False,
-    rich_markup_mode="rich",
+    rich_markup_mode="markdown",
     pretty_exceptions_enable=False,
 )
 
@@ -39,7 +39,7 @@ def simulate(
     A case names the fish, the duration, the schedule of commands and, if wanted, the initial
     state and effects.
 
-    [bold]Example[/bold]: robofish simulate case.json --rate 50 --out swim.csv
+    **Example:** `robofish simulate case.json --rate 50 --out swim.csv`
     """
     from fish_env.commands.simulate import simulate_case
 
@@ -47,10 +47,35 @@ def simulate(
 
 
 @app.command()
+def compare(
+    dataset: Annotated[
+        str, typer.Argument(help="A folder with dataset.yaml, or a shipped dataset's name.")
+    ],
+    fish: Annotated[
+        str | None, typer.Option(help="Another fish than the dataset names: preset or file.")
+    ] = None,
+    json: Annotated[Path | None, typer.Option(help="File for all numbers.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for pictures.")] = None,
+    dt: Annotated[float, typer.Option(help="Longest physics step, s.")] = 0.01,
+    runs: Annotated[bool, typer.Option("--runs", help="Print every run.")] = False,
+) -> None:
+    """Compare measured motion with its simulation: how wrong it is, and where.
+
+    Runs over time are simulated from their measured start. Where the file does not know the
+    tail's phase, the best of sixteen over the first beat is taken.
+
+    **Example:** `robofish compare msu-steady --out pictures --json errors.json`
+    """
+    from fish_env.commands.compare import compare_dataset
+
+    compare_dataset(Console(), dataset, fish, json, out, dt, runs)
+
+
+@app.command()
 def effects() -> None:
     """List the effects that can be added to the model, with their parameters.
 
-    [bold]Example[/bold]: robofish effects
+    **Example:** `robofish effects`
     """
     from fish_env.commands.effects import print_effects
 

@@ -1,0 +1,198 @@
+"""`robofish compare`: simulated against measured."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from rich import box
+from rich.console import Console
+from rich.padding import Padding
+from rich.progress import Progress
+from rich.table import Table
+
+from fish_env.comparison import RunComparison, RunsComparison, SteadyComparison
+from fish_env.comparison.runs import compare_runs
+from fish_env.comparison.tables import compare_steady
+from fish_env.comparison.words import in_words, shown_unit
+from fish_env.data import Dataset, SteadyDataset, load_dataset
+from fish_env.params import FishParams, load_fish
+
+Comparison = RunsComparison | SteadyComparison
+Groups = Mapping[str, tuple[RunComparison, ...]]
+
+
+def compare_dataset(
+    console: Console,
+    dataset: str,
+    fish: str | None,
+    json_file: Path | None,
+    out: Path | None,
+    dt: float,
+    every_run: bool,
+) -> Comparison:
+    """Compares a dataset with its simulation and writes what was asked for.
+
+    Args:
+        console: Where the tables go.
+        dataset: Folder, or name of a shipped dataset.
+        fish: Another fish than the dataset names: preset or file.
+        json_file: File for all numbers.
+        out: Folder for pictures.
+        dt: Longest physics step, s.
+        every_run: Print each run, not only conditions.
+
+    Raises:
+        RoboticFishError: The data or the fish cannot be used.
+    """
+    measured = load_dataset(dataset)
+    comparison = _compare(console, measured, load_fish(fish or measured.fish), dt)
+    print_comparison(console, comparison, every_run)
+    if json_file is not None:
+        json_file.parent.mkdir(parents=True, exist_ok=True)
+        json_file.write_text(json.dumps(comparison.as_dict(), indent=1, allow_nan=False) + "\n")
+        console.print(f"numbers: {json_file}", soft_wrap=True)
+    if out is not None:
+        draw(console, comparison, out)
+    return comparison
+
+
+def _compare(
+    console: Console, measured: Dataset | SteadyDataset, fish: FishParams, dt: float
+) -> Comparison:
+    if isinstance(measured, SteadyDataset):
+        with console.status("simulating until steady"):
+            return compare_steady(measured, fish, dt)
+    with Progress(console=console, transient=True) as progress:
+        task = progress.add_task("simulating runs", total=len(measured.runs))
+        return compare_runs(measured, fish, dt, lambda _: progress.advance(task))
+
+
+def draw(console: Console, comparison: Comparison, folder: Path) -> None:
+    """Draws the pictures of a comparison and names them."""
+    from fish_env.plotting.comparison import draw_runs, draw_steady
+
+    with console.status("drawing"):
+        if isinstance(comparison, SteadyComparison):
+            written = draw_steady(comparison, folder)
+        else:
+            written = draw_runs(comparison, folder)
+    shown = [str(path) for path in written if not path.name.startswith("run_")]
+    single = len(written) - len(shown)
+    console.print("pictures:", ", ".join(shown), soft_wrap=True)
+    if single:
+        console.print(f"and one of each run: {folder}/run_*.png ({single})", soft_wrap=True)
+
+
+def print_comparison(console: Console, comparison: Comparison, every_run: bool = False) -> None:
+    """Prints tables, findings in words, and the notes of the dataset."""
+    effects = ", ".join(comparison.effects) or "none"
+    console.print(
+        f"[bold]{comparison.dataset}[/bold] against fish [bold]{comparison.fish}[/bold] "
+        f"(effects: {effects}); errors are simulated minus measured",
+        highlight=False,
+        soft_wrap=True,
+    )
+    if isinstance(comparison, SteadyComparison):
+        _print_steady(console, comparison)
+    else:
+        _print_runs(console, comparison, every_run)
+    for sentence in in_words(comparison):
+        console.print(f"• {sentence}", highlight=False)
+    for note in comparison.notes:
+        console.print(f"note: {note}", style="dim", highlight=False)
+
+
+def _table(title: str, *columns: str) -> Table:
+    table = Table(
+        title=title,
+        title_justify="left",
+        box=box.SIMPLE_HEAD,
+        pad_edge=False,
+        collapse_padding=True,
+    )
+    for i, column in enumerate(columns):
+        table.add_column(column, justify="left" if i == 0 else "right", no_wrap=True)
+    return table
+
+
+def _shown(value: float) -> str:
+    return f"{value:.2f}" if abs(value) >= 1.0 else f"{value:.4f}"
+
+
+def _print_steady(console: Console, comparison: SteadyComparison) -> None:
+    columns = ("observation", "unit", "R²", "MAE", "bias", "gain", "% error", "repeat sd")
+    table, left_out = _table("Steady motion", *columns), list[str]()
+    for o in comparison.observations.values():
+        unit, factor = shown_unit(o.name)
+        table.add_row(
+            o.name,
+            unit,
+            f"{o.r_squared:.3f}",
+            _shown(factor * o.mae),
+            _shown(factor * o.bias),
+            f"{o.gain:.3f}",
+            f"{o.percent_error:.1f}",
+            _shown(factor * o.repeat_sd),
+        )
+        left_out += [
+            f"{o.name}: {len(o.measured) - o.rows} rows not compared, {o.rows - o.percent_rows} "
+            "near zero not in its percentage"
+        ]
+    console.print(table)
+    console.print(Padding("\n".join(left_out), (0, 0, 1, 0)), style="dim", highlight=False)
+    if comparison.unsteady:
+        console.print(f"not steady after the longest wait: {', '.join(comparison.unsteady)}")
+    console.print(_worst_table(comparison))
+
+
+def _worst_table(comparison: SteadyComparison) -> Table:
+    table = _table(
+        "Most wrong", "condition", "observation", "unit", "measured", "simulated", "error"
+    )
+    for name in comparison.observations:
+        unit, factor = shown_unit(name)
+        for condition, error, measured, simulated in comparison.worst(name):
+            numbers = (factor * value for value in (measured, simulated, error))
+            table.add_row(condition, name, unit, *map(_shown, numbers))
+        table.add_section()
+    return table
+
+
+def _print_runs(console: Console, comparison: RunsComparison, every_run: bool) -> None:
+    groups = comparison.by_condition()
+    console.print(_error_table("By condition (means over runs)", "condition", groups))
+    if every_run:
+        runs = {run.id: (run,) for run in comparison.runs}
+        console.print(_error_table("By run", "run", runs))
+    else:
+        console.print("every run: --runs, or --json for all numbers", style="dim")
+    starts = dict.fromkeys(run.start_from for run in comparison.runs)
+    console.print(f"simulations start from: {'; or '.join(starts)}", highlight=False)
+
+
+def _error_table(title: str, first: str, groups: Groups) -> Table:
+    columns = (first, "runs", "channel", "unit", "RMSE", "MAE", "bias", "fit %", "path max")
+    table = _table(title, *columns)
+    for name, runs in groups.items():
+        for row, channel in enumerate(runs[0].errors):
+            path = [float(np.nanmax(run.path_error_m)) for run in runs if run.path_error_m.size]
+            heading = (name, str(len(runs))) if row == 0 else ("", "")
+            farthest = f"{max(path):.3f}" if path and row == 0 else ""
+            table.add_row(*heading, *_errors(channel, runs), farthest)
+        table.add_section()
+    return table
+
+
+def _errors(channel: str, runs: tuple[RunComparison, ...]) -> list[str]:
+    unit, factor = shown_unit(channel)
+    errors = [run.errors[channel] for run in runs]
+    rmse, mae, bias = (
+        factor * float(np.mean([getattr(error, measure) for error in errors]))
+        for measure in ("rmse", "mae", "bias")
+    )
+    fits = [error.fit_percent for error in errors if np.isfinite(error.fit_percent)]
+    fit = f"{np.mean(fits):.0f}" if fits else "-"
+    return [channel, unit, *map(_shown, (rmse, mae, bias)), fit]

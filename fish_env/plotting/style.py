@@ -1,0 +1,83 @@
+"""The one style of all pictures, and how they are written.
+
+Figures are drawn off screen. The palette is Okabe and Ito's, which stays apart for every kind of
+colour vision; maps use cividis or viridis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+BLUE, VERMILION, GREEN = "#0072B2", "#D55E00", "#009E73"
+ORANGE, SKY, PURPLE, BLACK = "#E69F00", "#56B4E9", "#CC79A7", "#222222"
+PALETTE = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, BLACK)
+MEASURED, SIMULATED = BLACK, VERMILION
+COLOUR_MAP = "viridis"
+FORMATS = ("png", "pdf")
+
+_STYLE: dict[Any, Any] = {
+    "font.size": 9.0,
+    "axes.titlesize": 9.5,
+    "axes.labelsize": 9.0,
+    "legend.fontsize": 8.0,
+    "legend.frameon": False,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.color": "#dddddd",
+    "grid.linewidth": 0.6,
+    "axes.axisbelow": True,
+    "lines.linewidth": 1.3,
+    "savefig.dpi": 150,
+    "pdf.fonttype": 42,
+}
+
+
+@contextmanager
+def drawing(width: float = 7.2, height: float = 4.0) -> Iterator[Figure]:
+    """A figure in the project's style, for use with `with`.
+
+    Args:
+        width: Inches.
+        height: Inches.
+    """
+    import matplotlib
+    from cycler import cycler
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    with matplotlib.rc_context({**_STYLE, "axes.prop_cycle": cycler(color=PALETTE)}):
+        figure = Figure(figsize=(width, height), layout="constrained")
+        FigureCanvasAgg(figure)
+        yield figure
+
+
+def colours(count: int) -> list[Any]:
+    """As many colours that can be told apart: the palette, or steps of the colour map."""
+    if count <= len(PALETTE):
+        return list(PALETTE[:count])
+    from matplotlib import colormaps
+
+    return [colormaps[COLOUR_MAP](i / (count - 1)) for i in range(count)]
+
+
+def save(figure: Figure, folder: Path, name: str, formats: tuple[str, ...] = FORMATS) -> Path:
+    """Writes a figure as `<folder>/<name>.<format>` for each format; returns the first path."""
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = [folder / f"{name}.{ending}" for ending in formats]
+    for path in paths:
+        figure.savefig(path)
+    return paths[0]
+
+
+def panel_letters(axes: list[Axes]) -> None:
+    """Letters (a), (b), ... before the titles of panels."""
+    for letter, ax in zip("abcdefghij", axes, strict=False):
+        ax.set_title(f"({letter}) {ax.get_title(loc='left')}", loc="left")

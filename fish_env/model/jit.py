@@ -10,7 +10,6 @@ import hashlib
 import os
 import tempfile
 from collections.abc import Callable, Iterable
-from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -67,7 +66,6 @@ def source_hash(extra_sources: Iterable[Path] = ()) -> str:
     return _hash_files((*files, *extra_sources))
 
 
-@cache
 def _hash_files(files: tuple[Path, ...]) -> str:
     digest = hashlib.sha256(numba.__version__.encode())
     for path in files:

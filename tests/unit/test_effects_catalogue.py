@@ -1,0 +1,139 @@
+"""The catalogue as a whole: neutral changes nothing, bad values are refused, all is declared."""
+
+import numpy as np
+import pytest
+
+from fish_env.effects import catalogue, get_effect
+from fish_env.effects.extended import ExtendedModel, build_model
+from fish_env.errors import EffectError, ParameterError
+from fish_env.model.compose import Composition
+from fish_env.model.effect import SECTIONS
+from fish_env.simulator import Simulator
+from tests.broken import PlainKernels
+from tests.physics.cases import ALL_EFFECTS, SWIM, TUMBLE, random_inputs, random_states, swimmer
+
+MOVING = {name: effect for name, effect in catalogue().items() if effect.hooks}
+
+
+def on(name):
+    """Values that switch an effect of the catalogue on."""
+    effect = get_effect(name)
+    plausible = {p.name: p.plausible[0] + 0.6 * np.ptp(p.plausible) for p in effect.parameters}
+    return effect.complete(ALL_EFFECTS.get(name, plausible))
+
+
+def whole(effects=None):
+    """A simulator whose kernel holds every effect of the catalogue."""
+    simulator = Simulator(swimmer())
+    simulator.model = build_model(swimmer(), effects, whole_catalogue=True)
+    return simulator
+
+
+def test_all_neutral_equals_the_baseline_on_states():
+    """Bit for bit, in states all over and with slewing actuators."""
+    rng = np.random.default_rng(0)
+    baseline, extended = Simulator(swimmer()), whole()
+    for state, inputs in zip(random_states(rng, 200), random_inputs(rng, 200), strict=True):
+        rates = rng.normal(size=5)
+        one = baseline.state_derivative(state, inputs, 3.0, rates)
+        two = extended.state_derivative(state, inputs, 3.0, rates)
+        assert one.tobytes() == two[: len(one)].tobytes()
+
+
+def test_all_neutral_equals_the_baseline_along_a_run():
+    """Bit for bit, from rest and from a tumble."""
+    for start in (None, TUMBLE):
+        commands = [*SWIM, {"t": 1.0, "tail_offset": -0.3}]
+        one = Simulator(swimmer()).run(commands, duration_s=3.0, initial=start).states
+        two = whole().run(commands, duration_s=3.0, initial=start).states
+        assert one.tobytes() == np.ascontiguousarray(two[:, : one.shape[1]]).tobytes()
+
+
+@pytest.mark.parametrize("name", MOVING)
+def test_neutral_effects_change_nothing_while_another_is_on(name):
+    """The kernel with one effect alone against that with all, the others neutral."""
+    ends = []
+    for declared in ((MOVING[name],), tuple(MOVING.values())):
+        simulator = Simulator(swimmer())
+        simulator.model = ExtendedModel(swimmer(), {name: on(name)}, declared, ())
+        vars(simulator.model)["kernels"] = PlainKernels(Composition(declared), {})
+        run = simulator.run(SWIM, duration_s=0.1, initial=TUMBLE)
+        ends.append(run.states[:, :18])
+    np.testing.assert_array_equal(ends[0], ends[1])
+
+
+@pytest.mark.parametrize("name", MOVING)
+def test_an_effect_that_is_on_changes_the_motion(name):
+    """Otherwise the tests above would say nothing."""
+    baseline = Simulator(swimmer()).run(SWIM, duration_s=0.5, initial=TUMBLE)
+    changed = Simulator(swimmer(), effects={name: on(name)}).run(
+        SWIM, duration_s=0.5, initial=TUMBLE
+    )
+    assert not np.array_equal(baseline.states[:, :14], changed.states[:, :14])
+
+
+@pytest.mark.parametrize("name", MOVING)
+def test_a_plausible_effect_leaves_a_finite_motion(name):
+    """No NaN at either end of the plausible range."""
+    for end in (0, 1):
+        values = {p.name: p.plausible[end] for p in get_effect(name).parameters}
+        run = Simulator(swimmer(), effects={name: values}).run(SWIM, duration_s=2.0)
+        assert np.all(np.isfinite(run.states))
+
+
+@pytest.mark.parametrize("effect", catalogue().values(), ids=catalogue())
+def test_an_effect_declares_what_reports_need(effect):
+    """Section, equation, source, units; plausible within bounds; confusions are real names or not
+    shipped yet, and never itself."""
+    assert effect.section in SECTIONS
+    assert effect.summary
+    assert effect.equation
+    assert effect.source
+    assert effect.name not in effect.confusable_with
+    assert effect.hooks or effect.sample_time or effect.measure
+    for parameter in effect.parameters:
+        assert parameter.unit
+        assert parameter.description
+        low, high = parameter.plausible
+        assert parameter.lower <= low < high <= parameter.upper
+        assert parameter.lower <= parameter.neutral <= parameter.upper
+
+
+@pytest.mark.parametrize(
+    ("effects", "problem"),
+    [
+        ({"servo_lagg": {}}, "did you mean 'servo_lag'"),
+        ({"current": {"nort": 0.1}}, "no parameter 'nort'"),
+        ({"current": {"north": float("nan")}}, "not finite"),
+        ({"current": {"north": float("inf")}}, "not finite"),
+        ({"servo_lag": {"time_constant": -0.1}}, "between 0.0 and 1.0"),
+        ({"added_mass": {"surge": -1.0}}, "added_mass.surge"),
+    ],
+)
+def test_a_wrong_effect_is_refused(effects, problem):
+    with pytest.raises(EffectError, match=problem):
+        Simulator(swimmer(), effects=effects)
+
+
+def test_records_vary_parameters_and_effects_per_fish():
+    """A path of the fish and one of an effect, one number for each fish."""
+    model = build_model(swimmer(), {"current": {"north": 0.1}})
+    record = model.records({"tail.area": [0.01, 0.012], "effects.current.north": [0.2, 0.3]})
+    names = model.kernels.parameter_names
+    assert record[names.index("tail_area")].tolist() == [0.01, 0.012]
+    assert record[names.index("current.north")].tolist() == [0.2, 0.3]
+    with pytest.raises(ParameterError, match="not a parameter"):
+        model.records({"effects.current.nort": 0.1})
+    with pytest.raises(ParameterError, match="not a parameter"):
+        model.records({"tail.aera": 0.1})
+
+
+def test_the_order_of_effects_does_not_depend_on_how_they_are_given():
+    """Hooks run in the catalogue's order, so a file and a call give the same bits."""
+    one = dict(list(ALL_EFFECTS.items()))
+    two = dict(reversed(list(ALL_EFFECTS.items())))
+    runs = [
+        Simulator(swimmer(), effects=effects).run(SWIM, duration_s=0.5, initial=TUMBLE)
+        for effects in (one, two)
+    ]
+    assert runs[0].states.tobytes() == runs[1].states.tobytes()

@@ -290,8 +290,9 @@ def _sample_times(
         raise ScheduleError("give either duration_s (with rate_hz) or sample_times_s")
     if sample_times_s is not None:
         times = np.array(sample_times_s, float)
-        if times.ndim != 1 or times.size < 2 or not np.all(np.diff(times) > 0):
-            raise ScheduleError("sample_times_s must be at least two increasing times")
+        increasing = times.ndim == 1 and times.size > 1 and np.all(np.diff(times) > 0)
+        if not increasing or not np.all(np.isfinite(times)):
+            raise ScheduleError("sample_times_s must be at least two finite, increasing times")
         return times
     assert duration_s is not None
     if not (0 < duration_s < np.inf and 0 < rate_hz < np.inf):

@@ -41,7 +41,7 @@ def steady_motion(
     tolerance: float = 1e-4,
     longest_s: float = 240.0,
 ) -> dict[str, FloatArray]:
-    """Steady motion under n sets of held commands, all simulated at once.
+    """Steady motion under n sets of held commands, those of one tail frequency at once.
 
     Each fish starts level and at rest and swims until its means over the last `beats` tail beats
     differ from those some seconds before by less than `tolerance` (see `change` below).
@@ -52,7 +52,7 @@ def steady_motion(
         fish: Parameters, or a model with effects.
         commands: (n, 5), SI, in the order of :data:`fish_env.model.state.INPUTS`.
         records: (parameters, n) records where the fish differ (see `ExtendedModel.records`).
-        dt: Physics step, s.
+        dt: Longest physics step, s; the step used divides the tail beat.
         beats: Tail beats to average over.
         tolerance: Largest change that counts as steady.
         longest_s: Time at which to stop waiting, s.
@@ -84,12 +84,29 @@ def steady_motion(
     model.check_step(dt)
     asked = _checked(commands)
     record = np.repeat(model.record, len(asked), axis=1) if records is None else records
-    parts = []
-    for first in range(0, len(asked), LANES_AT_ONCE):
-        lanes = slice(first, first + LANES_AT_ONCE)
-        group = _Group(model, asked[lanes], np.ascontiguousarray(record[:, lanes]), dt, beats)
-        parts.append(group.settle(tolerance, longest_s))
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    result: dict[str, FloatArray] = {}
+    for lanes in _lanes_by_frequency(asked[:, _FREQUENCY]):
+        lane_record = np.ascontiguousarray(record[:, lanes])
+        group = _Group(model, asked[lanes], lane_record, _step(asked[lanes[0]], dt), beats)
+        for name, values in group.settle(tolerance, longest_s).items():
+            result.setdefault(name, np.empty(len(asked)))[lanes] = values
+    return result
+
+
+def _lanes_by_frequency(frequency: FloatArray) -> list[npt.NDArray[np.intp]]:
+    """Fish that beat together: their beat is then a whole number of steps, and means are exact."""
+    groups = [np.flatnonzero(frequency == value) for value in np.unique(frequency)]
+    return [
+        group[first : first + LANES_AT_ONCE]
+        for group in groups
+        for first in range(0, len(group), LANES_AT_ONCE)
+    ]
+
+
+def _step(command: FloatArray, dt: float) -> float:
+    """Longest step that divides the tail beat, s."""
+    frequency = float(command[_FREQUENCY])
+    return 1.0 / (frequency * np.ceil(1.0 / (frequency * dt))) if frequency > 0.0 else dt
 
 
 def _checked(commands: npt.ArrayLike) -> FloatArray:
@@ -112,7 +129,7 @@ class _Group:
         frequency = commands[:, _FREQUENCY]
         self.window_s = beats / np.where(frequency > 0.0, frequency, 1.0 / BEAT_WITHOUT_TAIL_S)
         # A fifth longer than asked, because effects may slow the tail.
-        self.steps = int(np.ceil(max(1.2 * self.window_s.max(), SHORTEST_CHUNK_S) / dt))
+        self.steps = int(np.ceil(max(1.2 * self.window_s.max(), SHORTEST_CHUNK_S) / dt)) + 2
         self.clock_s = 0.0
         count = len(commands)
         self.failed_at = np.full(count, np.inf)
@@ -164,11 +181,14 @@ class _Group:
 def _window_starts(
     time_s: FloatArray, phase: FloatArray, beats: int, without_tail_s: FloatArray
 ) -> FloatArray:
-    """When the last whole beats began, shape (n,); fewer than asked if the tail is slower."""
-    turns = np.minimum(beats, np.floor((phase[-1] - phase[0]) / (2 * np.pi) + 1e-9))
-    starts = phase[-1] - 2 * np.pi * turns
+    """When the last whole beats began, shape (n,); fewer than asked if the tail is slower.
+
+    They end one sample before the last, so that all derivatives in them are central.
+    """
+    turns = np.minimum(beats, np.floor((phase[-2] - phase[1]) / (2 * np.pi) + 1e-9))
+    starts = phase[-2] - 2 * np.pi * turns
     found = [np.interp(starts[i], phase[:, i], time_s) for i in range(phase.shape[1])]
-    return np.where(turns > 0, found, time_s[-1] - without_tail_s)
+    return np.where(turns > 0, found, time_s[-2] - without_tail_s)
 
 
 def _stamps(model: ExtendedModel, true_s: FloatArray) -> FloatArray:
@@ -214,6 +234,7 @@ class _Window:
         """Trapezoidal weights of each sample in a mean over the window, (samples, n)."""
         spans = np.diff(self.time_s)[:, None]
         inside = np.clip((self.time_s[1:, None] - self.first_s) / spans, 0.0, 1.0)
+        inside[-1] = 0.0
         weights = np.zeros((len(self.time_s), len(self.first_s)))
         weights[:-1] += spans * inside**2 / 2
         weights[1:] += spans * (inside - inside**2 / 2)
@@ -223,20 +244,19 @@ class _Window:
         return np.asarray(np.sum(self.weights * values, axis=0))
 
     def rate(self, values: FloatArray) -> FloatArray:
-        return np.asarray(np.gradient(values, self.time_s, axis=0, edge_order=2))
+        return np.asarray(np.gradient(values, self.time_s, axis=0))
 
     def half_range(self, values: FloatArray) -> FloatArray:
-        outside = self.time_s[:, None] < self.first_s
+        outside = self.weights == 0.0
         highest = np.where(outside, -np.inf, values).max(axis=0)
         return np.asarray((highest - np.where(outside, np.inf, values).min(axis=0)) / 2)
 
     def extreme(self, values: FloatArray) -> FloatArray:
-        outside = self.time_s[:, None] < self.first_s
-        return np.asarray(np.where(outside, 0.0, np.abs(values)).max(axis=0))
+        return np.asarray(np.where(self.weights == 0.0, 0.0, np.abs(values)).max(axis=0))
 
     def path(self, horizontal: FloatArray, yaw_rate: FloatArray) -> FloatArray:
         """Speed along the evenly winding path."""
-        turned = np.exp(-1j * yaw_rate * (self.time_s - self.time_s[-1])[:, None])
+        turned = np.exp(-1j * yaw_rate * self.time_s[:, None])
         return np.asarray(np.abs(np.sum(self.weights * horizontal * turned, axis=0)))
 
     def body_velocity(self, rates: dict[str, FloatArray]) -> FloatArray:

@@ -144,10 +144,11 @@ def build_model(
     found = {name: own.get(name) or get_effect(name) for name in wanted}
     complete = {name: found[name].complete(values) for name, values in wanted.items()}
     on = {name: v for name, v in complete.items() if v != found[name].neutral}
-    moving = any(found[name].hooks for name in on) or bool(own) or whole_catalogue
+    compiled = tuple(effect for effect in own.values() if effect.hooks)
+    moving = any(found[name].hooks for name in on) or bool(compiled) or whole_catalogue
     shipped = tuple(effect for effect in catalogue().values() if effect.hooks) if moving else ()
     measured = tuple(found[name] for name in on if found[name].sample_time or found[name].measure)
-    return ExtendedModel(fish, on, (*shipped, *own.values()), measured)
+    return ExtendedModel(fish, on, (*shipped, *compiled), measured)
 
 
 def _beside(fish: FishParams, name: str) -> Effect:

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 from fish_env.effects import load_effect_file
+from fish_env.effects.extended import build_model
 from fish_env.errors import EffectError
+from fish_env.model.effect import Effect, EffectParameter
 from fish_env.params.io import load_fish
+from fish_env.sensing import true_times
 from fish_env.simulator import InitialState, Simulator
 from tests.physics.cases import dry, swimmer
 
@@ -137,3 +140,22 @@ def test_a_changed_effect_file_is_compiled_again(effect_file):
         simulator = Simulator(swimmer(), 0.01, effects, [load_effect_file(effect_file)])
         ends.append(simulator.wrench_by_term(AHEAD.vector())["surge_drag"][0])
     assert ends[1] == pytest.approx(2 * ends[0])
+
+
+def test_a_users_measurement_effect_stays_out_of_the_kernel():
+    """It has no hooks, so no row of the record: one too many would be written beyond the work."""
+    late = Effect(
+        name="late_clock",
+        section="measurement",
+        summary="",
+        equation="",
+        source="",
+        parameters=(EffectParameter("scale", "-", 1.0, 0.5, 2.0),),
+        sample_time=lambda recorded, values: recorded * values["scale"],
+    )
+    model = build_model(swimmer(), {"late_clock": {"scale": 1.1}}, [late])
+    assert model.declared == ()
+    assert len(model.record) == len(model.kernels.parameter_names)
+    assert true_times(model, [0.0, 10.0]) == pytest.approx([0.0, 11.0])
+    both = build_model(swimmer(), {"late_clock": {"scale": 1.1}, "current": {"north": 0.1}}, [late])
+    assert len(both.record) == len(both.kernels.parameter_names)

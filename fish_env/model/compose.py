@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
+import os
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -92,7 +93,7 @@ def load(composition: Composition) -> ModuleType:
     path = folder / f"{composition.label}.py"
     if not path.exists():
         folder.mkdir(parents=True, exist_ok=True)
-        temporary = path.with_suffix(f".{id(composition)}.tmp")
+        temporary = path.with_suffix(f".{os.getpid()}-{id(composition)}.tmp")
         temporary.write_text(composition.source())
         temporary.replace(path)
     spec = importlib.util.spec_from_file_location(name, path)

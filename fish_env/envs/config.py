@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import yaml
 
+from fish_env.envs.config_checks import check_settings, is_number, speed_range
 from fish_env.envs.layout import Setup, empty_setup
 from fish_env.errors import ConfigError
 from fish_env.model.state import INPUTS
@@ -86,6 +87,18 @@ def _default_tree() -> dict[str, Any]:
     return dict(yaml.safe_load((config_root() / "env" / DEFAULT_NAME).read_text()))
 
 
+def _read(path: Path) -> Mapping[str, Any]:
+    if not path.is_file():
+        raise ConfigError(f"{path}: no such file; give the path of a YAML file")
+    try:
+        tree = yaml.safe_load(path.read_text())
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: not readable as YAML: {error}") from error
+    if not isinstance(tree, Mapping):
+        raise ConfigError(f"{path}: must be a mapping like {DEFAULT_NAME}")
+    return tree
+
+
 def load_env_config(
     source: str | Path | Mapping[str, Any] | None = None,
     control_hz: float | None = None,
@@ -100,16 +113,13 @@ def load_env_config(
     label = "environment settings"
     if isinstance(source, (str, Path)):
         label = str(source)
-        path = Path(source)
-        if not path.is_file():
-            raise ConfigError(f"{label}: no such file; give the path of a YAML file")
-        source = yaml.safe_load(path.read_text())
-        if not isinstance(source, Mapping):
-            raise ConfigError(f"{label}: must be a mapping like {DEFAULT_NAME}")
+        source = _read(Path(source))
+    if source is not None and not isinstance(source, Mapping):
+        raise ConfigError(f"config {source!r}: give the path of a YAML file or a mapping")
     _merge(tree, source or {}, label, "")
-    for key, value in (("control", control_hz), ("physics", physics_hz)):
-        if value is not None:
-            tree["rates"][key] = float(value)
+    rates = {"control": control_hz, "physics": physics_hz}
+    given = {key: value for key, value in rates.items() if value is not None}
+    _merge(tree["rates"], given, label, "rates.")
     return _check(tree, label)
 
 
@@ -135,7 +145,7 @@ def _number_like(value: Any, default: Any, label: str, path: str) -> Any:
     ranges = isinstance(default, list) or path in ("tank.walls", "goal.cruise_speed")
     items = value if isinstance(value, (list, tuple)) and ranges else [value]
     for item in items:
-        if isinstance(item, bool) or not isinstance(item, (int, float)) or not np.isfinite(item):
+        if not is_number(item):
             raise ConfigError(f"{label}: '{path}' must be a finite number, got {item!r}")
     if isinstance(default, list) and len(items) != len(default):
         raise ConfigError(f"{label}: '{path}' must have {len(default)} numbers, got {value!r}")
@@ -143,53 +153,16 @@ def _number_like(value: Any, default: Any, label: str, path: str) -> Any:
 
 
 def _check(tree: dict[str, Any], label: str) -> EnvConfig:
-    def require(condition: bool, message: str) -> None:
-        if not condition:
-            raise ConfigError(f"{label}: {message}")
-
-    control, physics = tree["rates"]["control"], tree["rates"]["physics"]
-    require(0 < control <= physics, "rates: 0 < control <= physics is needed")
-    substeps = round(physics / control)
-    require(
-        abs(physics / control - substeps) < 1e-9,
-        f"rates: physics ({physics:g} Hz) must be a whole multiple of control ({control:g} Hz); "
-        f"use {substeps * control:g} Hz",
-    )
+    check_settings(tree, label)
+    goal = tree["goal"]
+    goal["cruise_speed"] = speed_range(f"{label}: goal.cruise_speed", goal["cruise_speed"])
     actuators = [tree["actuators"][name] for name in INPUTS]
-    for name, actuator in zip(INPUTS, actuators, strict=True):
-        require(actuator["low"] < actuator["high"], f"actuators.{name}: low must be below high")
-        slew = actuator["slew"]
-        require(slew is None or slew > 0, f"actuators.{name}.slew: positive, or null for ideal")
-    require(
-        tree["actuators"]["tail_amplitude"]["low"] >= 0, "actuators.tail_amplitude.low: at least 0"
-    )
-    require(
-        tree["actuators"]["tail_frequency"]["low"] >= 0, "actuators.tail_frequency.low: at least 0"
-    )
-    tank = tree["tank"]
-    require(0 <= 2 * tank["clearance"] < tank["depth"], "tank: twice the clearance exceeds depth")
-    low, high = tree["goal"]["depth"]
-    inside = tank["clearance"] < low <= high < tank["depth"] - tank["clearance"]
-    require(inside, "goal.depth: a range [low, high] inside the tank and its clearance")
-    walls = tank["walls"]
-    if walls is not None:
-        shape = isinstance(walls, list) and len(walls) == 4
-        require(
-            shape and walls[0] < 0 < walls[1] and walls[2] < 0 < walls[3],
-            "tank.walls: [north_min, north_max, east_min, east_max] around the start at (0, 0)",
-        )
-    margins = [*tree["reward"]["margins"].values(), tree["reward"]["power_scale"]]
-    require(all(value > 0 for value in margins), "reward: margins and power_scale must be positive")
-    require(
-        all(value >= 0 for value in tree["reward"]["weights"].values()),
-        "reward.weights: zero or positive; costs are subtracted",
-    )
     slew = [np.inf if a["slew"] is None else float(a["slew"]) for a in actuators]
     return EnvConfig(
         tree,
         np.array([a["low"] for a in actuators], float),
         np.array([a["high"] for a in actuators], float),
         np.array(slew),
-        1.0 / physics,
-        substeps,
+        1.0 / tree["rates"]["physics"],
+        round(tree["rates"]["physics"] / tree["rates"]["control"]),
     )

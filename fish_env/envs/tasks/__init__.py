@@ -1,4 +1,4 @@
-"""Tasks: what the goal of an episode is. ``hold`` keeps references constant, ``track`` moves them."""
+"""Tasks: what the goal of an episode is. ``hold`` keeps it constant, ``track`` moves it."""
 
 from collections.abc import Callable
 

@@ -27,10 +27,8 @@ def hold_goal(config: EnvConfig, draws: FloatArray) -> dict[str, FloatArray]:
         Goal field -> (N,); fields that are absent are zero (see layout.GOAL).
     """
     goal = config.tree["goal"]
-    cruise = goal["cruise_speed"]
-    cruise = cruise if isinstance(cruise, list) else [cruise, cruise]
     return {
         "depth_base": between(goal["depth"], draws[0]),
         "heading_base": np.pi * (2.0 * draws[1] - 1.0),
-        "cruise_speed": between(cruise, draws[2]),
+        "cruise_speed": between(goal["cruise_speed"], draws[2]),
     }

@@ -1,0 +1,117 @@
+"""What settings of the environment must fulfil beyond their types, rule by rule."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from fish_env.errors import ConfigError
+from fish_env.model.state import INPUTS
+
+SLOWEST_PHYSICS_HZ = 10.0
+Tree = dict[str, Any]
+Rule = Iterator[tuple[bool, str]]
+"""Pairs of a condition and what to say when it does not hold."""
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is a finite number (a bool is not)."""
+    numeric = isinstance(value, (int, float, np.integer, np.floating))
+    return numeric and not isinstance(value, bool) and math.isfinite(value)
+
+
+def speed_range(name: str, value: Any) -> list[float]:
+    """A speed or a range [low, high] as a range.
+
+    Raises:
+        ConfigError: not a number or two, negative, or the wrong way round.
+    """
+    speeds = list(value) if isinstance(value, (list, tuple)) else [value, value]
+    if len(speeds) != 2 or not all(map(is_number, speeds)) or not 0 <= speeds[0] <= speeds[1]:
+        raise ConfigError(f"{name} {value!r}: a speed >= 0 (m/s) or a range [low, high]")
+    return [float(speed) for speed in speeds]
+
+
+def check_settings(tree: Tree, label: str) -> None:
+    """Refuse settings that contradict each other.
+
+    Raises:
+        ConfigError: names the setting and what to change.
+    """
+    for rules in RULES:
+        for holds, message in rules(tree):
+            if not holds:
+                raise ConfigError(f"{label}: {message}")
+
+
+def rates(tree: Tree) -> Rule:
+    """Physics runs at a whole multiple of the control rate, and fast enough."""
+    control, physics = tree["rates"]["control"], tree["rates"]["physics"]
+    yield 0 < control <= physics, "rates: 0 < control <= physics is needed"
+    yield (
+        physics >= SLOWEST_PHYSICS_HZ,
+        f"rates: physics at {physics:g} Hz is too slow, use {SLOWEST_PHYSICS_HZ:g} Hz or more",
+    )
+    substeps = round(physics / control)
+    yield (
+        abs(physics / control - substeps) < 1e-9,
+        f"rates: physics ({physics:g} Hz) must be a whole multiple of control ({control:g} Hz); "
+        f"use {substeps * control:g} Hz",
+    )
+
+
+def actuators(tree: Tree) -> Rule:
+    """Ranges and slew limits of the actuators."""
+    settings = tree["actuators"]
+    for name in INPUTS:
+        low, high, slew = (settings[name][key] for key in ("low", "high", "slew"))
+        yield low < high, f"actuators.{name}: low must be below high"
+        yield slew is None or slew > 0, f"actuators.{name}.slew: positive, or null for ideal"
+    for name in ("tail_amplitude", "tail_frequency"):
+        yield settings[name]["low"] >= 0, f"actuators.{name}.low: at least 0"
+
+
+def tank(tree: Tree) -> Rule:
+    """Depths and walls of the tank, and goals inside it."""
+    depth, clearance, walls = (tree["tank"][key] for key in ("depth", "clearance", "walls"))
+    yield 0 <= 2 * clearance < depth, "tank: twice the clearance exceeds depth"
+    low, high = tree["goal"]["depth"]
+    inside = clearance < low <= high < depth - clearance
+    yield inside, "goal.depth: a range [low, high] inside the tank and its clearance"
+    shape = walls is None or (isinstance(walls, list) and len(walls) == 4)
+    yield (
+        shape and (walls is None or (walls[0] < 0 < walls[1] and walls[2] < 0 < walls[3])),
+        "tank.walls: [north_min, north_max, east_min, east_max] around the start at (0, 0)",
+    )
+
+
+def reward(tree: Tree) -> Rule:
+    """Reward, success and the angle at which a fish has tumbled."""
+    margins = [*tree["reward"]["margins"].values(), tree["reward"]["power_scale"]]
+    yield min(margins) > 0, "reward: margins and power_scale must be positive"
+    weights = tree["reward"]["weights"].values()
+    yield min(weights) >= 0, "reward.weights: zero or positive; costs are subtracted"
+    yield min(tree["success"].values()) >= 0, "success: zero or positive"
+    yield 0 < tree["tumble_angle"] < np.pi, "tumble_angle: between 0 and pi"
+
+
+def start(tree: Tree) -> Rule:
+    """Where episodes start."""
+    settings = tree["start"]
+    for name in ("depth_offset", "heading_offset", "tilt"):
+        yield settings[name] >= 0, f"start.{name}: the largest value, zero or positive"
+    yield settings["surge"][0] <= settings["surge"][1], "start.surge: a range [low, high]"
+
+
+def track(tree: Tree) -> Rule:
+    """Signals of the task "track"."""
+    for signal, settings in tree["goal"]["track"].items():
+        for key, (low, high) in settings.items():
+            yield 0 <= low <= high, f"goal.track.{signal}.{key}: a range [low, high] from 0 up"
+    yield tree["goal"]["track"]["sine"]["period"][0] > 0, "goal.track.sine.period: positive"
+
+
+RULES: tuple[Callable[[Tree], Rule], ...] = (rates, actuators, tank, reward, start, track)

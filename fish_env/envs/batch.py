@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fish_env.envs import start
-from fish_env.envs.layout import GOAL, MAX_BEAT_S, OBSERVATION, OUTPUTS, SENSORS
+from fish_env.envs.layout import GOAL, MAX_BEAT_S, OBSERVATION, OUTPUTS, SENSORS, Failure
 from fish_env.envs.options import EnvOptions
 from fish_env.errors import ConfigError
 from fish_env.model.runtime import Kernels, default_threads, kernels, run_in_threads
@@ -38,6 +38,7 @@ class FishBatch:
         obs: (N, observations) float32, of the last step or reset.
         reward: (N,) reward of the last step (a view).
         outputs: (len(OUTPUTS), N) what ``info`` reports (a view).
+        drawn: path -> (N,) randomised parameters of each fish in its present episode.
     """
 
     def __init__(self, options: EnvOptions, count: int, threads: int | None = None) -> None:
@@ -64,6 +65,9 @@ class FishBatch:
         self._noise_used = np.zeros(count, np.int64)
         self._noise_rngs: list[np.random.Generator | None] = [None] * count
         self.obs = np.zeros((count, len(OBSERVATION)), np.float32)
+        paths = () if options.random is None else options.random.paths
+        self.drawn = {path: np.zeros(count) for path in paths}
+        self._started = False
         self._bind()
 
     def _bind(self) -> None:
@@ -108,7 +112,8 @@ class FishBatch:
     @property
     def time(self) -> FloatArray:
         """(N,) time since the start of each episode (s, a view)."""
-        return self._data[self._rows.ROW_TIME]
+        time: FloatArray = self._data[self._rows.ROW_TIME]
+        return time
 
     def reset(
         self,
@@ -122,6 +127,9 @@ class FishBatch:
             lanes: (k,) which fish.
             rngs: their generators; each fish draws from its own alone.
             given: reset options that hold for all of them.
+
+        Raises:
+            ConfigError, ParameterError, EffectError: options that cannot be; says which.
         """
         given = start.check_reset_options(given)
         options, rows, data = self.options, self._rows, self._data
@@ -129,7 +137,8 @@ class FishBatch:
         goal = start.goals(options, draws, given)
         state = np.zeros((len(self._base.state_names), len(lanes)))
         state[: len(BASE_STATES)] = start.poses(options, draws, goal, given)
-        record = start.records(options, draws, given)
+        changes = start.parameters(options, draws, given)
+        record = start.records(options, changes, len(lanes))
         low, high = options.config.low, options.config.high
         inputs = np.repeat(np.clip(0.0, low, high)[:, None], len(lanes), axis=1)
         self._base.initialise(state, inputs, record, np.zeros(len(lanes)))
@@ -147,10 +156,14 @@ class FishBatch:
         self._queue[:, :, lanes] = inputs
         self._fill_ring(lanes, state)
         self._start_noise(lanes, rngs)
+        for path, values in self.drawn.items():
+            values[lanes] = changes[path]
         self._kernels.entry("observe_batch")(
             data, lanes, self._ring, self._ring_at - 1 + len(self._ring),
             options.observation_lag, self._trace_row, self._noise, self.obs, self._setup,
         )  # fmt: skip
+        self._check_start(lanes)
+        self._started = True
 
     def step(self, actions: npt.ArrayLike) -> None:
         """One control step of all fish; results are in ``obs``, ``reward``, ``outputs``.
@@ -159,8 +172,10 @@ class FishBatch:
             actions: (N, 5) in [-1, 1]; values beyond are clipped.
 
         Raises:
-            ConfigError: an action is not a number.
+            ConfigError: an action is not a number, or nothing was reset yet.
         """
+        if not self._started:
+            raise ConfigError("call reset() before step()")
         self._actions[:] = actions
         if len(self._noise):
             self._draw_noise()
@@ -197,6 +212,15 @@ class FishBatch:
             self._ring[:, integrals, lanes] = past
         else:
             self._ring[:, :, lanes] = past
+
+    def _check_start(self, lanes: IntArray) -> None:
+        failures = self.outputs[OUTPUTS.index("failure"), lanes]
+        if failures.any():
+            failure = Failure(int(failures.max())).name.lower()
+            raise ConfigError(
+                f"this start has failed already ({failure}): the fish must be in the tank, "
+                f"{self.options.config.top} to {self.options.config.bottom} m deep, and upright"
+            )
 
     def _start_noise(self, lanes: IntArray, rngs: list[np.random.Generator]) -> None:
         if self.options.noise_sd is None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,8 +12,9 @@ import numpy.typing as npt
 
 from fish_env.effects.extended import PREFIX, EffectValues, ExtendedModel, build_model
 from fish_env.envs.config import EnvConfig, load_env_config
+from fish_env.envs.config_checks import is_number, speed_range
 from fish_env.envs.layout import SENSORS
-from fish_env.envs.randomization import Randomization, randomization
+from fish_env.envs.randomization import Randomization, build_randomization
 from fish_env.envs.tasks import TASKS
 from fish_env.errors import ConfigError
 from fish_env.model.crank_slider import CrankSlider
@@ -72,7 +73,7 @@ def env_options(
     observation_noise: Mapping[str, float] | None = None,
     observation_delay_s: float = 0.0,
     action_delay_s: float = 0.0,
-    randomization_spec: str | Mapping[str, Any] | None = None,
+    randomization: str | Mapping[str, Any] | None = None,
 ) -> EnvOptions:
     """Check and combine what the constructor of the environment takes (see its docstring).
 
@@ -84,23 +85,21 @@ def env_options(
         raise ConfigError(f"unknown task '{task}': choose one of {', '.join(TASKS)}")
     settings = load_env_config(config, control_hz, physics_hz)
     if cruise_speed is not None:
-        speeds = np.atleast_1d(np.asarray(cruise_speed, float))
-        if speeds.size > 2 or np.any(~(speeds >= 0)) or speeds[0] > speeds[-1]:
-            raise ConfigError(f"cruise_speed {cruise_speed!r}: a speed >= 0 or a range [low, high]")
-        settings.tree["goal"]["cruise_speed"] = [float(speeds[0]), float(speeds[-1])]
+        settings.tree["goal"]["cruise_speed"] = speed_range("cruise_speed", cruise_speed)
     loaded = fish if isinstance(fish, FishParams) else load_fish(fish)
-    spec = randomization_spec
-    named = spec if isinstance(spec, Mapping) else {}
-    whole = any(path.startswith(PREFIX) for path in named)
+    whole = _names_effects(randomization, loaded)
     model = build_model(loaded, _water(effects, current, wave), whole_catalogue=whole)
     model.check_step(settings.dt)
     _check_reach(settings, loaded)
+    random = build_randomization(randomization, loaded, model)
+    if random is not None:
+        random.check_step(model, settings.dt)
     return EnvOptions(
         settings,
         model,
         task,
         TASKS[task],
-        randomization(spec, loaded, model),
+        random,
         _noise(observation_noise),
         _lag("action_delay_s", action_delay_s, settings.dt),
         _lag("observation_delay_s", observation_delay_s, settings.dt),
@@ -113,13 +112,26 @@ def _water(
     wave: Mapping[str, float] | None,
 ) -> dict[str, Mapping[str, float]]:
     combined: dict[str, Mapping[str, float]] = dict(effects or {})
+    for name, value in (("current", current), ("wave", wave)):
+        if value is not None and name in combined:
+            raise ConfigError(f"{name} is given twice, as an option and in effects; drop one")
     if current is not None:
-        if len(current) != 3:
+        if np.shape(current) != (3,) or not all(is_number(speed) for speed in current):
             raise ConfigError(f"current {current!r}: three speeds (north, east, down) in m/s")
         combined["current"] = dict(zip(("north", "east", "down"), map(float, current), strict=True))
     if wave is not None:
+        if not isinstance(wave, Mapping) or not all(map(is_number, wave.values())):
+            raise ConfigError(f"wave {wave!r}: a mapping like {{'amplitude': 0.05}} (m/s)")
         combined["wave"] = dict(wave)
     return combined
+
+
+def _names_effects(spec: str | Mapping[str, Any] | None, fish: FishParams) -> bool:
+    """Whether effects that are off now may come on by a draw, so that the kernel needs them."""
+    names: Iterable[Any] = spec if isinstance(spec, Mapping) else ()
+    if spec == "posterior" and fish.posterior is not None:
+        names = fish.posterior.names
+    return any(str(name).startswith(PREFIX) for name in names)
 
 
 def _check_reach(settings: EnvConfig, fish: FishParams) -> None:
@@ -139,7 +151,7 @@ def _noise(spec: Mapping[str, float] | None) -> FloatArray | None:
     sd = dict.fromkeys(SENSORS, 0.0)
     for name, value in spec.items():
         sensors = NOISE_GROUPS.get(name) or ((name,) if name in sd else ())
-        if not sensors or not (0 <= float(value) < np.inf):
+        if not sensors or not is_number(value) or value < 0:
             raise ConfigError(
                 f"observation_noise '{name}': {value!r}; give a standard deviation >= 0 (SI) for "
                 f"any of {', '.join([*NOISE_GROUPS, *SENSORS])}"
@@ -149,7 +161,7 @@ def _noise(spec: Mapping[str, float] | None) -> FloatArray | None:
 
 
 def _lag(name: str, delay_s: float, dt: float) -> int:
-    if not 0 <= delay_s <= 2.0:
+    if not is_number(delay_s) or not 0 <= delay_s <= 2.0:
         raise ConfigError(f"{name} = {delay_s} s: choose a delay between 0 and 2 s")
     steps = round(delay_s / dt)
     if abs(steps * dt - delay_s) > 1e-9:

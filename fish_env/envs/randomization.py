@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,12 +11,15 @@ import numpy.typing as npt
 from scipy.special import ndtr, ndtri
 
 from fish_env.effects.extended import PREFIX, ExtendedModel
-from fish_env.errors import ConfigError
+from fish_env.envs.config_checks import is_number
+from fish_env.errors import ConfigError, EffectError
 from fish_env.params.schema import FishParams
 
 FloatArray = npt.NDArray[np.float64]
 TRUNCATE = 2.5
 """Normal draws stay within this many standard deviations."""
+QUANTILES = 65
+"""Points of each distribution at which a step that is too long is looked for."""
 
 
 @dataclass(frozen=True)
@@ -53,8 +56,43 @@ class Randomization:
         bounded = np.clip(values, self.lower[:, None], self.upper[:, None])
         return dict(zip(self.paths, bounded, strict=True))
 
+    def check_step(self, model: ExtendedModel, dt: float) -> None:
+        """Refuse draws of an effect's time constant that a physics step cannot resolve.
 
-def randomization(
+        Raises:
+            EffectError: says the longest step.
+        """
+        if not any(path.startswith(PREFIX) for path in self.paths):
+            return
+        levels = np.linspace(0.0, 1.0, QUANTILES)
+        drawn = self.draw(np.tile(levels, (len(self.paths), 1)))
+        for i in range(QUANTILES):
+            with_effects(model, {path: float(v[i]) for path, v in drawn.items()}).check_step(dt)
+
+
+def with_effects(model: ExtendedModel, values: Mapping[str, float]) -> ExtendedModel:
+    """The model with other effect parameters (paths of other parameters are passed over).
+
+    Raises:
+        EffectError: an effect that the model does not contain, or a value out of bounds.
+    """
+    declared = {effect.name: effect for effect in model.declared}
+    changed: dict[str, dict[str, float]] = {}
+    for path, value in values.items():
+        if path.startswith(PREFIX):
+            name, _, parameter = path.removeprefix(PREFIX).partition(".")
+            if name not in declared:
+                raise EffectError(
+                    f"'{path}' cannot be changed: switch the effect on when the environment is "
+                    f"made, with effects={{'{name}': {{...}}}}"
+                )
+            now = changed.get(name) or model.effects.get(name) or declared[name].neutral
+            changed[name] = {**now, parameter: value}
+    complete = {name: declared[name].complete(value) for name, value in changed.items()}
+    return replace(model, effects={**model.effects, **complete})
+
+
+def build_randomization(
     spec: str | Mapping[str, Any] | None, fish: FishParams, model: ExtendedModel
 ) -> Randomization | None:
     """Build draws from what a user writes.
@@ -82,6 +120,11 @@ def randomization(
     entries = [_entry(path, value, fish, model) for path, value in spec.items()]
     uniform, first, second = (np.array(column) for column in zip(*entries, strict=True))
     lower, upper = _bounds(tuple(spec), fish, model)
+    for i in np.flatnonzero(uniform & ((first < lower) | (second > upper))):
+        path = list(spec)[i]
+        raise ConfigError(
+            f"randomization of '{path}': {spec[path]!r} leaves its bounds {lower[i]} to {upper[i]}"
+        )
     return Randomization(tuple(spec), uniform, first, second, np.eye(len(entries)), lower, upper)
 
 
@@ -120,10 +163,17 @@ def _entry(
     nominal = _nominal(path, fish, model)
     if isinstance(value, Mapping) and len(value) == 1:
         key, number = next(iter(value.items()))
-        if key in ("relative", "sd") and isinstance(number, (int, float)) and number >= 0:
-            return False, nominal, abs(nominal) * number if key == "relative" else float(number)
-    if isinstance(value, (list, tuple)) and len(value) == 2 and value[0] <= value[1]:
-        return True, float(value[0]), float(value[1])
+        scale = {"relative": abs(nominal), "sd": 1.0}.get(key, 0.0)
+        if scale == 0.0 and key == "relative":
+            raise ConfigError(
+                f"randomization of '{path}': relative to its value 0 nothing varies; "
+                "give {'sd': sd} or [low, high]"
+            )
+        if is_number(number) and number >= 0 and 0.0 < scale < np.inf:
+            return False, nominal, scale * float(number)
+    pair = value if isinstance(value, (list, tuple)) and len(value) == 2 else ()
+    if pair and all(map(is_number, pair)) and pair[0] <= pair[1]:
+        return True, float(pair[0]), float(pair[1])
     raise ConfigError(
         f"randomization of '{path}': give {{'relative': sd}}, {{'sd': sd}} or [low, high], "
         f"not {value!r}"

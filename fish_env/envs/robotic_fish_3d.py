@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
@@ -15,18 +15,32 @@ from fish_env.effects.extended import EffectValues
 from fish_env.envs.batch import FishBatch
 from fish_env.envs.layout import OBSERVATION, OBSERVATION_LIMIT, OUTPUTS
 from fish_env.envs.options import env_options
+from fish_env.errors import ConfigError
 from fish_env.params.schema import FishParams
 
 FAILURE = OUTPUTS.index("failure")
+ACTION_SHAPE = (5,)
+PARAMETER = "parameter/"
+"""Prefix of the keys of ``info`` that report randomised parameters."""
 ONE = np.zeros(1, np.int64)
 
 
-def action_space() -> Box:
+def action_space() -> Box[np.float32]:
     """Five actuators, -1 to 1."""
-    return Box(-1.0, 1.0, (5,), np.float32)
+    return Box(-1.0, 1.0, ACTION_SHAPE, np.float32)
 
 
-def observation_space() -> Box:
+def check_render_mode(render_mode: str | None) -> None:
+    """Refuse a picture that nobody draws.
+
+    Raises:
+        ConfigError: any mode but None.
+    """
+    if render_mode is not None:
+        raise ConfigError(f"render_mode '{render_mode}': nothing is drawn yet, leave it out (None)")
+
+
+def observation_space() -> Box[np.float32]:
     """Observations, clipped to a finite range."""
     return Box(-OBSERVATION_LIMIT, OBSERVATION_LIMIT, (len(OBSERVATION),), np.float32)
 
@@ -105,7 +119,7 @@ class RoboticFish3DEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]
     ``heading`` (rad, over the last beat), ``speed`` (m/s), ``goal_depth``, ``goal_heading``,
     ``goal_speed``, ``power`` (W), ``within_tolerance_s``: for how long depth, heading and speed
     have been within 5 cm, 5 degrees and 20 %, ``is_success``: 1 once that is 10 s, ``failure``,
-    ``time_s``.
+    ``time_s``. ``reset`` also reports each randomised parameter as ``parameter/<path>``.
 
     ## Reset options
 
@@ -141,7 +155,7 @@ class RoboticFish3DEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]
         ConfigError, ParameterError, EffectError: saying what to change.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": [], "render_fps": 10}  # type: ignore[misc]
+    metadata: dict[str, Any] = {"render_modes": [], "render_fps": 10}  # noqa: RUF012
 
     def __init__(
         self,
@@ -161,6 +175,7 @@ class RoboticFish3DEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]
         action_delay_s: float = 0.0,
         randomization: str | Mapping[str, Any] | None = None,
     ) -> None:
+        check_render_mode(render_mode)
         self.render_mode = render_mode
         self.options = env_options(
             task,
@@ -175,7 +190,7 @@ class RoboticFish3DEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]
             observation_noise=observation_noise,
             observation_delay_s=observation_delay_s,
             action_delay_s=action_delay_s,
-            randomization_spec=randomization,
+            randomization=randomization,
         )
         self.metadata = {**self.metadata, "render_fps": 1.0 / self.options.config.control_period}
         self.action_space = action_space()
@@ -187,15 +202,24 @@ class RoboticFish3DEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]
     ) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
         """Start an episode; see the class for ``options``."""
         super().reset(seed=seed)
-        self._batch.reset(ONE, [self.np_random], options)
-        _, *outputs = self._batch.results
-        return self._batch.obs[0].copy(), dict(zip(OUTPUTS, outputs, strict=True))
+        batch = self._batch
+        batch.reset(ONE, [self.np_random], options)
+        _, *outputs = batch.results
+        info = dict(zip(OUTPUTS, outputs, strict=True))
+        info |= {PARAMETER + path: float(value[0]) for path, value in batch.drawn.items()}
+        return batch.obs[0].copy(), info
 
     def step(
         self, action: npt.NDArray[np.float32]
     ) -> tuple[npt.NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """One control step."""
+        """One control step.
+
+        Raises:
+            ConfigError: not five numbers, one of them NaN, or a step before the first reset.
+        """
         batch = self._batch
+        if np.shape(action) != ACTION_SHAPE:
+            raise ConfigError(f"an action has shape {ACTION_SHAPE}, not {np.shape(action)}")
         batch.step(action)
         reward, *outputs = batch.results
         info = dict(zip(OUTPUTS, outputs, strict=True))

@@ -9,7 +9,7 @@ import numpy as np
 
 from fish_env.envs.layout import OUTPUTS
 from fish_env.envs.vector import RoboticFish3DVectorEnv
-from fish_env.errors import missing_extra
+from fish_env.errors import ConfigError, missing_extra
 
 try:
     from stable_baselines3.common.vec_env import VecEnv
@@ -31,7 +31,7 @@ class FishVecEnv(VecEnv):
     def __init__(self, num_envs: int, info_keys: Sequence[str] = (), **kwargs: Any) -> None:
         unknown = set(info_keys) - set(OUTPUTS)
         if unknown:
-            raise ValueError(f"unknown info_keys {sorted(unknown)}; choose from {OUTPUTS}")
+            raise ConfigError(f"unknown info_keys {sorted(unknown)}; choose from {OUTPUTS}")
         self.env = RoboticFish3DVectorEnv(num_envs, autoreset_mode="SameStep", **kwargs)
         self.info_keys = tuple(info_keys)
         self.render_mode = self.env.render_mode
@@ -40,9 +40,17 @@ class FishVecEnv(VecEnv):
         self._seed: int | None = None
 
     def reset(self) -> np.ndarray:
-        """Start episodes for all fish; a seed given before is used once."""
-        obs, infos = self.env.reset(seed=self._seed)
+        """Start episodes for all fish; a seed or options given before are used once.
+
+        Raises:
+            ConfigError: options that differ between fish.
+        """
+        options = self._options[0]
+        if any(other != options for other in self._options):
+            raise ConfigError("set_options: all fish take the same options")
+        obs, infos = self.env.reset(seed=self._seed, options=options)
         self._seed = None
+        self._reset_options()
         self.reset_infos = [self._info(infos, lane, OUTPUTS) for lane in range(self.num_envs)]
         return obs
 
@@ -56,7 +64,7 @@ class FishVecEnv(VecEnv):
         done = terminated | truncated
         keys = self.info_keys
         infos = [self._info(vector_infos, lane, keys) for lane in range(self.num_envs)]
-        for lane in np.flatnonzero(done):
+        for lane in np.flatnonzero(done).tolist():
             final = self._info(vector_infos["final_info"], lane, OUTPUTS)
             final["is_success"] = bool(final["is_success"])
             final["terminal_observation"] = vector_infos["final_obs"][lane]
@@ -70,7 +78,7 @@ class FishVecEnv(VecEnv):
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Seed the next reset: fish i gets seed + i."""
-        self._seed = seed
+        self._seed = None if seed is None else int(seed)
         return [None if seed is None else seed + i for i in range(self.num_envs)]
 
     def close(self) -> None:

@@ -8,8 +8,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from fish_env.effects.extended import PREFIX
+from fish_env.envs.config import EnvConfig
+from fish_env.envs.config_checks import is_number
 from fish_env.envs.layout import GOAL, REFERENCE
 from fish_env.envs.options import EnvOptions
+from fish_env.envs.randomization import with_effects
 from fish_env.envs.tasks import GOAL_DRAWS
 from fish_env.envs.tasks.hold import between
 from fish_env.errors import ConfigError
@@ -35,16 +39,19 @@ def draw_count(options: EnvOptions) -> int:
     return GOAL_DRAWS + POSE_DRAWS + random
 
 
-def check_reset_options(given: Mapping[str, Any] | None) -> Mapping[str, Any]:
+def check_reset_options(given: Mapping[str, Any] | None) -> Mapping[str, Mapping[str, Any]]:
     """Reset options with known keys only.
 
     Raises:
-        ConfigError: an unknown key.
+        ConfigError: an unknown key, or a value that is not a mapping.
     """
     given = given or {}
     unknown = [key for key in given if key not in OPTION_KEYS]
     if unknown:
         raise ConfigError(f"reset options {unknown} are unknown; use {', '.join(OPTION_KEYS)}")
+    for key, value in given.items():
+        if not isinstance(value, Mapping):
+            raise ConfigError(f"reset option '{key}' must be a mapping of names to numbers")
     return given
 
 
@@ -59,20 +66,30 @@ def goals(options: EnvOptions, draws: FloatArray, given: Mapping[str, Any]) -> F
     rows = np.zeros((len(GOAL), count))
     for name, values in fields.items():
         rows[GOAL.index(name)] = values
-    for key, value in given.get("goal", {}).items():
-        name = GOAL_KEYS.get(key, key)
-        if name not in GOAL or not np.isfinite(value):
+    wanted = given.get("goal", {})
+    for key, value in wanted.items():
+        if GOAL_KEYS.get(key, key) not in GOAL or not is_number(value):
             raise ConfigError(
                 f"goal '{key}' = {value!r}: finite numbers for {', '.join([*GOAL_KEYS, *GOAL])}"
             )
-        if key in ("depth", "heading"):
-            first = GOAL.index(name)
+    for key in ("depth", "heading"):
+        if key in wanted:
+            first = GOAL.index(GOAL_KEYS[key])
             rows[first : first + len(REFERENCE)] = 0.0
-        rows[GOAL.index(name)] = float(value)
-    speed = rows[GOAL.index("cruise_speed")]
-    if np.any(speed < 0):
-        raise ConfigError(f"goal cruise_speed {speed.min()} m/s: 0 or more")
+    for key, value in wanted.items():
+        rows[GOAL.index(GOAL_KEYS.get(key, key))] = value
+    _check_goal(options.config, wanted)
     return rows
+
+
+def _check_goal(config: EnvConfig, wanted: Mapping[str, float]) -> None:
+    depth, speed = wanted.get("depth", config.top), wanted.get("cruise_speed", 0.0)
+    if not config.top <= depth <= config.bottom:
+        raise ConfigError(
+            f"goal depth {depth} m: the fish may swim from {config.top} to {config.bottom} m"
+        )
+    if speed < 0:
+        raise ConfigError(f"goal cruise_speed {speed} m/s: 0 or more")
 
 
 def poses(
@@ -100,9 +117,9 @@ def poses(
     state[13] = 2.0 * np.pi * u[5]
     fixed = given.get("state", {})
     for key, value in fixed.items():
-        size = STATE_KEYS.get(key)
-        numbers = np.asarray(value, float).reshape(-1)
-        if size is None or numbers.size != size or not np.all(np.isfinite(numbers)):
+        size = STATE_KEYS.get(key, 0)
+        numbers = np.reshape(np.array(value, object), -1)
+        if not size or numbers.size != size or not all(map(is_number, numbers)):
             raise ConfigError(
                 f"state '{key}' = {value!r}: finite numbers, as many as here: {STATE_KEYS}"
             )
@@ -115,13 +132,30 @@ def poses(
     return state
 
 
-def records(options: EnvOptions, draws: FloatArray, given: Mapping[str, Any]) -> FloatArray:
-    """Parameter records (parameters, N): drawn, then changed by ``options["parameters"]``."""
-    changes: dict[str, npt.ArrayLike] = {}
-    if options.random is not None:
-        changes |= options.random.draw(draws[GOAL_DRAWS + POSE_DRAWS :])
-    changes |= given.get("parameters", {})
+def parameters(
+    options: EnvOptions, draws: FloatArray, given: Mapping[str, Any]
+) -> dict[str, FloatArray]:
+    """Parameters that differ from the fish's own, path -> (N,): drawn, then fixed by the user.
+
+    Raises:
+        ConfigError: not a number.
+        ParameterError, EffectError: an unknown path, or a value that is not possible.
+    """
+    wanted = given.get("parameters", {})
+    for path, value in wanted.items():
+        if not is_number(value):
+            raise ConfigError(f"parameter '{path}' = {value!r}: give a finite number")
+    fish = {path: value for path, value in wanted.items() if not path.startswith(PREFIX)}
+    if fish:
+        options.model.fish.replace(fish)
+    with_effects(options.model, wanted).check_step(options.config.dt)
+    random = options.random
+    drawn = random.draw(draws[GOAL_DRAWS + POSE_DRAWS :]) if random is not None else {}
+    fixed = {path: np.full(draws.shape[1], float(value)) for path, value in wanted.items()}
+    return {**drawn, **fixed}
+
+
+def records(options: EnvOptions, changes: Mapping[str, FloatArray], count: int) -> FloatArray:
+    """Parameter records (parameters, N) of N fish with these changes."""
     record = options.model.records(changes)
-    if record.shape[1] not in (1, draws.shape[1]):
-        raise ConfigError("parameters in reset options must be single numbers")
-    return np.broadcast_to(record, (len(record), draws.shape[1]))
+    return np.broadcast_to(record, (len(record), count))

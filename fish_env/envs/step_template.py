@@ -5,11 +5,13 @@ Completed and compiled by :mod:`fish_env.model.compose` behind the rollout templ
 of ``data``; the rows follow :data:`fish_env.envs.layout`.
 """
 
+# The composer keeps imports between numpy and its marks, so they cannot be sorted.
+# ruff: noqa: I001
 from __future__ import annotations
 
-import numpy as np
-
 import math
+
+import numpy as np
 
 from fish_env.envs.layout import GOAL, MAX_BEAT_S, OBSERVATION_LIMIT, OUTPUTS, Setup
 from fish_env.envs.rewards import saturating, tolerance
@@ -316,7 +318,8 @@ def step_block(
     newest = ring_at + n_sub - 1
     for k in range(count):
         lane = first + k
-        data[ROW_TIME, lane] += period
+        # A whole number of periods, so that rounding does not add up over an episode.
+        data[ROW_TIME, lane] = math.floor(data[ROW_TIME, lane] / period + 1.5) * period
         offset = INTEGRAL_ROW - trace_row
         judge(data, lane, ring, newest, offset, energy[k], change[k], period, setup)
         observe(data, lane, ring, newest, back, trace_row, noise, obs, setup)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,14 +14,21 @@ from gymnasium.vector.utils import batch_space
 from fish_env.envs.batch import FishBatch
 from fish_env.envs.layout import OUTPUTS
 from fish_env.envs.options import env_options
-from fish_env.envs.robotic_fish_3d import FAILURE, action_space, observation_space
+from fish_env.envs.robotic_fish_3d import (
+    FAILURE,
+    PARAMETER,
+    action_space,
+    check_render_mode,
+    observation_space,
+)
 from fish_env.errors import ConfigError
 
 BoolArray = npt.NDArray[np.bool_]
+FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
 
 
-class RoboticFish3DVectorEnv(VectorEnv[Float32Array, Float32Array, npt.NDArray[np.float64]]):
+class RoboticFish3DVectorEnv(VectorEnv[Float32Array, Float32Array, npt.NDArray[Any]]):
     """N independent :class:`RoboticFish3DEnv`, advanced together on all cores.
 
     Fish i behaves to the last bit like a single environment that was reset with seed + i, whatever
@@ -40,8 +47,9 @@ class RoboticFish3DVectorEnv(VectorEnv[Float32Array, Float32Array, npt.NDArray[n
         **kwargs: as for :class:`RoboticFish3DEnv`.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {  # type: ignore[misc]
+    metadata: dict[str, Any] = {  # noqa: RUF012
         "render_modes": [],
+        "render_fps": 10,
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
 
@@ -59,10 +67,14 @@ class RoboticFish3DVectorEnv(VectorEnv[Float32Array, Float32Array, npt.NDArray[n
         self.num_envs = num_envs
         self.max_episode_steps = max_episode_steps
         self.autoreset_mode = AutoresetMode(autoreset_mode)
-        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
+        check_render_mode(render_mode)
         self.render_mode = render_mode
-        kwargs["randomization_spec"] = kwargs.pop("randomization", None)
         self.options = env_options(**kwargs)
+        self.metadata = {
+            **self.metadata,
+            "render_fps": 1.0 / self.options.config.control_period,
+            "autoreset_mode": self.autoreset_mode,
+        }
         self.single_action_space = action_space()
         self.single_observation_space = observation_space()
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -82,7 +94,7 @@ class RoboticFish3DVectorEnv(VectorEnv[Float32Array, Float32Array, npt.NDArray[n
         """Start episodes for all fish, or for those in ``options["reset_mask"]``.
 
         Args:
-            seed: fish i is seeded with seed + i, or with the i-th of a sequence.
+            seed: fish i is seeded with seed + i, or with the i-th of a sequence (None: goes on).
             options: as for the single environment, for all fish alike, and ``reset_mask``:
                 (num_envs,) bool.
         """
@@ -91,35 +103,49 @@ class RoboticFish3DVectorEnv(VectorEnv[Float32Array, Float32Array, npt.NDArray[n
         lanes = self._all if mask is None else self._masked(mask)
         self._seed(seed, lanes)
         self._restart(lanes, given)
-        return self.batch.obs.copy(), self._infos(np.isin(self._all, lanes))
+        fresh = np.isin(self._all, lanes)
+        return self.batch.obs.copy(), self._infos(fresh) | self._drawn(fresh)
 
     def step(
         self, actions: npt.ArrayLike
     ) -> tuple[Float32Array, npt.NDArray[np.float64], BoolArray, BoolArray, dict[str, Any]]:
-        """One control step of every fish."""
-        batch = self.batch
-        if not self._rngs:
-            raise ConfigError("call reset() before step()")
+        """One control step of every fish.
+
+        Raises:
+            ConfigError: actions of another shape or with a NaN, a step before the first reset, or
+                a fish that has ended and was not reset (autoreset DISABLED).
+        """
+        self._check_step(np.shape(actions))
+        batch, mode = self.batch, self.autoreset_mode
         batch.step(actions)
         self._steps += 1
         reward = batch.reward.copy()
         terminated = batch.outputs[FAILURE] > 0
         truncated = (self._steps >= self.max_episode_steps) & ~terminated
-        if self.autoreset_mode is AutoresetMode.NEXT_STEP and self._ended.any():
-            fresh = np.flatnonzero(self._ended)
-            self._restart(fresh, {})
+        fresh = self._ended
+        if mode is AutoresetMode.NEXT_STEP and fresh.any():
+            self._restart(np.flatnonzero(fresh), {})
             reward[fresh] = 0.0
             terminated[fresh] = truncated[fresh] = False
         self._ended = terminated | truncated
-        infos: dict[str, Any] = {}
-        if self.autoreset_mode is AutoresetMode.SAME_STEP and self._ended.any():
-            infos = self._finish()
-        infos = {**self._infos(np.ones(self.num_envs, bool)), **infos}
+        final: dict[str, Any] = {}
+        if mode is AutoresetMode.SAME_STEP and self._ended.any():
+            fresh = self._ended.copy()
+            final = self._finish(fresh)
+        infos = self._infos(np.ones(self.num_envs, bool)) | self._drawn(fresh) | final
         return batch.obs.copy(), reward, terminated, truncated, infos
 
-    def _finish(self) -> dict[str, Any]:
+    def _check_step(self, shape: tuple[int, ...]) -> None:
+        if shape != self.action_space.shape:
+            raise ConfigError(f"actions have shape {self.action_space.shape}, not {shape}")
+        if self.autoreset_mode is AutoresetMode.DISABLED and self._ended.any():
+            raise ConfigError(
+                f"fish {np.flatnonzero(self._ended).tolist()} have ended: reset them with "
+                "options={'reset_mask': terminated | truncated}"
+            )
+
+    def _finish(self, mask: BoolArray) -> dict[str, Any]:
         """Keep the last observation and info of ended episodes, then start new ones."""
-        mask = self._ended.copy()
         final_obs = np.full(self.num_envs, None, dtype=object)
         for lane in np.flatnonzero(mask):
             final_obs[lane] = self.batch.obs[lane].copy()
@@ -127,7 +153,7 @@ class RoboticFish3DVectorEnv(VectorEnv[Float32Array, Float32Array, npt.NDArray[n
         self._restart(np.flatnonzero(mask), {})
         return {
             "final_obs": final_obs,
-            "_final_obs": mask,
+            "_final_obs": mask.copy(),
             "final_info": final_info,
             "_final_info": mask.copy(),
         }
@@ -135,7 +161,7 @@ class RoboticFish3DVectorEnv(VectorEnv[Float32Array, Float32Array, npt.NDArray[n
     def _restart(self, lanes: npt.NDArray[np.int64], given: dict[str, Any]) -> None:
         self.batch.reset(lanes, [self._rngs[lane] for lane in lanes], given)
         self._steps[lanes] = 0
-        self._ended[lanes] = False
+        self._ended = self._ended & ~np.isin(self._all, lanes)
 
     def _seed(self, seed: int | Sequence[int | None] | None, lanes: npt.NDArray[np.int64]) -> None:
         if not self._rngs:
@@ -144,7 +170,7 @@ class RoboticFish3DVectorEnv(VectorEnv[Float32Array, Float32Array, npt.NDArray[n
             self._rngs = [seeding.np_random(None)[0] for _ in self._all]
         if seed is None:
             return
-        if isinstance(seed, int):
+        if isinstance(seed, (int, np.integer)):
             self._np_random, self._np_random_seed = seeding.np_random(seed)
             seed = [seed + i for i in range(self.num_envs)]
         if len(seed) != self.num_envs:
@@ -164,9 +190,23 @@ class RoboticFish3DVectorEnv(VectorEnv[Float32Array, Float32Array, npt.NDArray[n
         return np.flatnonzero(chosen)
 
     def _infos(self, mask: BoolArray) -> dict[str, Any]:
-        infos: dict[str, Any] = {}
-        values = np.where(mask, self.batch.outputs, 0.0)
-        for name, row in zip(OUTPUTS, values, strict=True):
-            infos[name] = row
-            infos[f"_{name}"] = mask
-        return infos
+        return _masked_infos(OUTPUTS, self.batch.outputs, mask)
+
+    def _drawn(self, fresh: BoolArray) -> dict[str, Any]:
+        """Randomised parameters of the fish that have just been reset."""
+        drawn = self.batch.drawn
+        if not drawn or not fresh.any():
+            return {}
+        names = [PARAMETER + path for path in drawn]
+        return _masked_infos(names, np.stack(list(drawn.values())), fresh)
+
+
+def _masked_infos(names: Sequence[str], values: FloatArray, mask: BoolArray) -> dict[str, Any]:
+    """Gymnasium's form: an array for each name, and beside it where it holds."""
+    infos: dict[str, Any] = {}
+    rows = np.where(mask, values, 0.0)
+    masks = np.repeat(mask[None, :], len(rows), axis=0)
+    for name, row, where in zip(names, rows, masks, strict=True):
+        infos[name] = row
+        infos[f"_{name}"] = where
+    return infos

@@ -72,6 +72,36 @@ def compare(
 
 
 @app.command()
+def info(
+    fish: Annotated[str, typer.Option(help="A preset's name, or a parameter file.")] = (
+        "zheng-2021-a"
+    ),
+) -> None:
+    """Show a fish: parameters and where they come from, trim, stability, reach and speeds.
+
+    **Example:** `robofish info --fish msu-tail-fish`
+    """
+    from fish_env.commands.info import print_info
+
+    print_info(Console(), fish)
+
+
+@app.command()
+def paper(
+    out: Annotated[Path, typer.Option(help="Folder for tables and pictures.")] = Path("out/paper"),
+) -> None:
+    """Repeat the four studies of the paper and check its statements one by one.
+
+    Writes the paper's figures, `statements.md` and `paper.json`.
+
+    **Example:** `robofish paper --out out/paper`
+    """
+    from fish_env.commands.paper import run_paper
+
+    run_paper(Console(), out)
+
+
+@app.command()
 def effects() -> None:
     """List the effects that can be added to the model, with their parameters.
 

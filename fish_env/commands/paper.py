@@ -1,0 +1,46 @@
+"""`robofish paper`: the paper's four studies with this model."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from fish_env.studies.paper import Statement, all_statements, run_study, with_servo_lag
+from fish_env.studies.paper.report import write_report
+
+
+def run_paper(console: Console, out: Path) -> None:
+    """Runs the study, prints the statements and writes tables and pictures into a folder."""
+    begun = time.monotonic()
+    with console.status("starting") as status:
+        study = run_study(lambda part: status.update(f"simulating: {part}"))
+        status.update("writing")
+        written = write_report(study, out)
+        status.update("drawing")
+        from fish_env.studies.paper.figures import draw_study
+
+        pictures = draw_study(study, out)
+    statements = all_statements(study)
+    console.print(_table("The paper's statements", statements))
+    console.print(_table("Turning with a lagging servo", with_servo_lag(study)))
+    held = sum(s.held for s in statements)
+    console.print(f"{held} of {len(statements)} statements are held by the model without effects")
+    console.print(f"written: {', '.join(str(path) for path in written)}", soft_wrap=True)
+    console.print(f"pictures: {len(pictures)} in {out} (png and pdf)", soft_wrap=True)
+    console.print(f"{time.monotonic() - begun:.0f} s", style="dim")
+
+
+def _table(title: str, statements: list[Statement]) -> Table:
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    table.add_column("motion")
+    table.add_column("statement", ratio=3)
+    table.add_column("this model", ratio=3)
+    table.add_column("verdict")
+    for s in statements:
+        verdict = "[green]held[/green]" if s.held else f"[yellow]{s.verdict}[/yellow]"
+        table.add_row(s.motion, s.statement, s.measured, verdict)
+    return table

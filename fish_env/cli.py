@@ -102,6 +102,19 @@ def paper(
 
 
 @app.command()
+def demo(
+    out: Annotated[Path, typer.Option(help="Folder for pictures.")] = Path("out/demo"),
+) -> None:
+    """Show what the package does, in a minute or two.
+
+    **Example:** `robofish demo`
+    """
+    from fish_env.commands.demo import run_demo
+
+    run_demo(Console(), out)
+
+
+@app.command()
 def effects() -> None:
     """List the effects that can be added to the model, with their parameters.
 

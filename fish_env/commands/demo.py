@@ -1,0 +1,59 @@
+"""`robofish demo`: what the package does, in a minute or two. Each part is one function."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from rich.console import Console
+from rich.rule import Rule
+
+from fish_env.comparison import compare_steady
+from fish_env.comparison.words import in_words
+from fish_env.data import SteadyDataset, load_dataset
+from fish_env.errors import DatasetError
+from fish_env.params import load_fish
+
+DATASET = "msu-steady"
+Part = Callable[[Console, Path], list[Path]]
+
+
+def compare_with_a_real_fish(console: Console, out: Path) -> list[Path]:
+    """Compares a real fish's steady swimming with its simulation; returns the pictures."""
+    from fish_env.plotting.comparison import draw_steady
+
+    measured = load_dataset(DATASET)
+    if not isinstance(measured, SteadyDataset):
+        raise DatasetError(f"{DATASET}: the demonstration needs the shipped table; reinstall")
+    with console.status("simulating 29 swims of a real robotic fish (first time: compiling)"):
+        comparison = compare_steady(measured, load_fish(measured.fish))
+    console.print(
+        f"{len(measured.ids)} swims of a real robotic fish, against its simulation with starting "
+        "parameters that no data have corrected yet:"
+    )
+    for sentence in in_words(comparison):
+        console.print(f"• {sentence}", highlight=False)
+    with console.status("drawing"):
+        return draw_steady(comparison, out)
+
+
+PARTS: dict[str, Part] = {"A real fish and its simulation": compare_with_a_real_fish}
+"""Title -> what is done, in this order."""
+
+
+def run_demo(console: Console, out: Path) -> None:
+    """Runs every part of the demonstration and names the pictures it wrote.
+
+    Args:
+        console: Where words and progress go.
+        out: Folder for pictures.
+    """
+    begun, pictures = time.monotonic(), list[Path]()
+    for number, (title, part) in enumerate(PARTS.items(), 1):
+        console.print(Rule(f"{number} of {len(PARTS)}: {title}", align="left"))
+        pictures += part(console, out)
+    console.print(Rule("Pictures", align="left"))
+    for picture in pictures:
+        console.print(str(picture), soft_wrap=True)
+    console.print(f"{time.monotonic() - begun:.0f} s", style="dim")

@@ -1,0 +1,121 @@
+"""Checks of single properties, each a function, so that broken environments can be tried too.
+
+Every checker takes a function that makes the environment and raises AssertionError.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+
+from fish_env.envs.registration import ENV_ID
+from tests.conformance.cases import random_actions, run
+
+Make = Callable[..., Any]
+
+
+def fingerprint(env: gym.Env, seed: int | None, steps: int = 60) -> str:
+    """Hash of all bits of an episode."""
+    obs, rewards, infos = run(env, random_actions(steps), seed)
+    text = obs.tobytes() + rewards.tobytes() + repr(infos).encode()
+    return hashlib.sha256(text).hexdigest()
+
+
+def check_determinism(make: Make) -> None:
+    """A seed decides everything, including episodes that follow without a seed."""
+    first, second = make(), make()
+    prints = [(fingerprint(env, 5), fingerprint(env, None)) for env in (first, second, first)]
+    assert prints[0] == prints[1], "another environment with the same seed goes another way"
+    assert prints[0] == prints[2], "the same environment with the same seed goes another way"
+    assert prints[0][0] != prints[0][1], "episodes repeat"
+    assert fingerprint(first, 6) != prints[0][0], "the seed changes nothing"
+
+
+def check_observations(make: Make, steps: int = 300) -> None:
+    """Finite and inside the space, from reset on and through every end of an episode."""
+    env = make()
+    space = env.observation_space
+    obs, _ = env.reset(seed=0)
+    for action in random_actions(steps, seed=3):
+        assert np.all(np.isfinite(obs)), "an observation is not finite"
+        assert np.all((obs >= space.low) & (obs <= space.high)), "an observation is clipped wrong"
+        obs, reward, terminated, _, _ = env.step(action)
+        assert np.isfinite(reward)
+        if terminated:
+            obs, _ = env.reset()
+
+
+def _same(name: str, ours: Any, theirs: Any) -> None:
+    """Two vector infos (or parts of them) hold the same, to the last bit."""
+    if isinstance(theirs, dict):
+        assert isinstance(ours, dict), f"{name} is not a mapping"
+        assert ours.keys() == theirs.keys(), f"{name}: {set(ours) ^ set(theirs)}"
+        for key, value in theirs.items():
+            _same(f"{name}[{key!r}]", ours[key], value)
+    elif theirs.dtype == object:
+        for mine, other in zip(ours, theirs, strict=True):
+            assert (mine is None) == (other is None), f"{name}: missing or too many"
+            assert mine is None or mine.tobytes() == other.tobytes(), f"{name} differs"
+    else:
+        assert ours.dtype == theirs.dtype, f"{name}: {ours.dtype} is not {theirs.dtype}"
+        assert ours.tobytes() == theirs.tobytes(), f"{name} differs"
+
+
+def check_vector(
+    make: Make,
+    count: int,
+    mode: gym.vector.AutoresetMode,
+    options: dict[str, Any],
+    steps: int = 60,
+    limit: int = 25,
+    seed: Any = 4,
+) -> tuple[int, int]:
+    """A native batch equals Gymnasium's own vector of single environments, bit for bit.
+
+    Observations, rewards, ends, infos with their masks, final observations and final infos.
+
+    Returns:
+        How many episodes were terminated, and how many truncated.
+    """
+    ours = make(count, max_episode_steps=limit, autoreset_mode=mode, **options)
+    theirs = gym.make_vec(
+        ENV_ID,
+        num_envs=count,
+        vectorization_mode="sync",
+        vector_kwargs={"autoreset_mode": mode},
+        max_episode_steps=limit,
+        disable_env_checker=True,
+        **options,
+    )
+    return compare_vectors(ours, theirs, random_actions(steps, lanes=count), mode, seed)
+
+
+def compare_vectors(ours: Any, theirs: Any, actions: Any, mode: Any, seed: Any) -> tuple[int, int]:
+    """Step both with the same actions, resetting ended fish where the mode leaves that to us."""
+    ends = np.zeros(2, int)
+    (obs, infos), (other, other_infos) = ours.reset(seed=seed), theirs.reset(seed=seed)
+    assert obs.tobytes() == other.tobytes(), "first observations differ"
+    _same("infos", infos, other_infos)
+    for row in actions:
+        obs, reward, terminated, truncated, infos = ours.step(row)
+        other, other_reward, other_terminated, other_truncated, other_infos = theirs.step(row)
+        assert obs.tobytes() == other.tobytes(), "observations differ"
+        assert reward.tobytes() == other_reward.tobytes(), "rewards differ"
+        assert terminated.tobytes() == other_terminated.tobytes(), "terminations differ"
+        # TimeLimit says both at the last step; a fish that fails there has failed, no more.
+        other_truncated &= ~other_terminated
+        assert truncated.tobytes() == other_truncated.tobytes(), "truncations differ"
+        _same("infos", infos, other_infos)
+        ended = terminated | truncated
+        ends += terminated.sum(), truncated.sum()
+        if mode is gym.vector.AutoresetMode.DISABLED and ended.any():
+            (obs, infos), (other, other_infos) = (
+                env.reset(options={"reset_mask": ended.copy()}) for env in (ours, theirs)
+            )
+            assert obs.tobytes() == other.tobytes(), "observations after a masked reset differ"
+            _same("infos", infos, other_infos)
+    return int(ends[0]), int(ends[1])

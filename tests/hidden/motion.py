@@ -1,0 +1,180 @@
+"""d/dt of the whole state: one 6 x 6 system for the accelerations of fish, water and cargo.
+
+State: 0-2 position, 3-11 rotation matrix body to inertial by rows, 12-14 velocity and 15-17
+angular velocity in the body frame, 18 lagged tail, 19-20 flexible tail, 21 lagged block,
+22-24 remembered tail force, 25-26 sloshing water, 27-32 remembered wrench of the hull.
+"""
+
+from __future__ import annotations
+
+import math
+
+from tests.hidden.foreign import foreign_wrench, slosh
+from tests.hidden.hull import (
+    block_place,
+    centre_of_mass,
+    damping_moment,
+    extra_drag,
+    hull_force,
+    inertia_about_origin,
+    rigid_matrix,
+    weight,
+)
+from tests.hidden.jit import helper
+from tests.hidden.servo import AMPLITUDE, FREQUENCY, OFFSET, TWO_PI, block_motion, tail_motion
+from tests.hidden.tail import centre_of_pressure, reactive, steady_tail_force
+from tests.hidden.vectors import add, cross, scale, solve6, to_body, to_inertial
+
+STATES = 33
+
+
+@helper
+def put(wrench, force, moment):
+    for i in range(3):
+        wrench[i] += force[i]
+        wrench[3 + i] += moment[i]
+
+
+@helper
+def water_flow(t, y, rise, e):
+    """Flow at the fish and its rate of change along the fish's path, inertial."""
+    z = y[2]
+    turn = TWO_PI * e.wave_frequency
+    angle = turn * t + e.wave_phase
+    height = e.wave_amplitude * math.exp(-e.wave_decay * z)
+    shear = e.shear_current_rate
+    along = (math.cos(e.shear_current_heading), math.sin(e.shear_current_heading), 0.0)
+    flow = add(
+        (
+            e.current_north,
+            e.current_east,
+            e.current_down + height * math.sin(angle),
+        ),
+        scale(shear * (z - e.shear_current_depth), along),
+    )
+    wave_rate = height * (turn * math.cos(angle) - e.wave_decay * rise * math.sin(angle))
+    return flow, add((0.0, 0.0, wave_rate), scale(shear * rise, along))
+
+
+@helper
+def disturbance(t, y, e, push, wrench):
+    """Adds the random push, straight between its samples."""
+    place = (t - e.push_start) / e.push_step
+    low = min(max(int(place), 0), push.shape[0] - 2)
+    part = min(max(place - low, 0.0), 1.0)
+    force = (0.0, 0.0, 0.0)
+    moment = (0.0, 0.0, 0.0)
+    for weight_, row in ((1.0 - part, low), (part, low + 1)):
+        force = add(force, scale(weight_, (push[row, 0], push[row, 1], push[row, 2])))
+        moment = add(moment, scale(weight_, (push[row, 3], push[row, 4], push[row, 5])))
+    put(wrench, to_body(y, force) if e.push_inertial != 0.0 else force, moment)
+
+
+@helper
+def block_momentum(place, shift_rate, shift_bend, spin, fish, e, wrench):
+    """Adds what the block's own motion along the hull does to it (Newton for the whole fish)."""
+    s, m = e.block_reaction_scale, fish.block_mass
+    go = (-shift_rate, 0.0, 0.0)
+    run = scale(m, go)
+    run_rate = scale(m, (-shift_bend, 0.0, 0.0))
+    turning = cross(place, run)
+    turning_rate = cross(place, run_rate)
+    # dJ/dt of a point mass moving along x: only the y and z axes feel it.
+    spread = 2.0 * m * place[0] * go[0]
+    force = add(run_rate, scale(2.0, cross(spin, run)))
+    moment = add(add((0.0, spread * spin[1], spread * spin[2]), turning_rate), cross(spin, turning))
+    put(wrench, scale(-s, force), scale(-s, moment))
+
+
+@helper
+def added_mass(velocity, spin, drift, e, matrix, wrench):
+    """Kirchhoff: minus the rate of the water's momentum, diagonal at O_b."""
+    a = (e.added_mass_surge, e.added_mass_sway, e.added_mass_heave)
+    i = (e.added_mass_roll, e.added_mass_pitch, e.added_mass_yaw)
+    p = (a[0] * velocity[0], a[1] * velocity[1], a[2] * velocity[2])
+    h = (i[0] * spin[0], i[1] * spin[1], i[2] * spin[2])
+    late = (a[0] * drift[0], a[1] * drift[1], a[2] * drift[2])
+    force = add(late, cross(spin, p))
+    moment = add(cross(spin, h), cross(velocity, p))
+    put(wrench, scale(-1.0, force), scale(-1.0, moment))
+    for k in range(3):
+        matrix[k, k] += a[k]
+        matrix[3 + k, 3 + k] += i[k]
+
+
+@helper
+def remembered(y, dy, first, now, time_constant):
+    """First-order lag of a vector kept in three states."""
+    kept = (y[first], y[first + 1], y[first + 2])
+    for i in range(3):
+        dy[first + i] = (now[i] - kept[i]) / time_constant
+    return kept
+
+
+@helper
+def water_wrench(t, y, dy, velocity, spin, angle, rate, row, fish, e, table, wrench):
+    """Adds all quasi-steady forces of the water."""
+    tail = steady_tail_force(velocity, spin, angle, rate, fish, e)
+    if e.wake_memory_time_constant > 0.0:
+        tail = remembered(y, dy, 22, tail, e.wake_memory_time_constant)
+    put(wrench, tail, cross(centre_of_pressure(angle, fish)[1], tail))
+    force, moment = hull_force(velocity, y[2], fish, e)
+    if e.hull_memory_time_constant > 0.0:
+        force = remembered(y, dy, 27, force, e.hull_memory_time_constant)
+        moment = remembered(y, dy, 30, moment, e.hull_memory_time_constant)
+    put(wrench, force, moment)
+    put(wrench, extra_drag(velocity, table[row, OFFSET], e), damping_moment(spin, fish, e))
+
+
+@helper
+def derivative(t, y, dy, row, late, fish, e, table, push, drive, matrix, wrench):
+    dy[:] = 0.0
+    ground = (y[12], y[13], y[14])
+    spin = (y[15], y[16], y[17])
+    path = to_inertial(y, ground)
+    angle, rate, bend = tail_motion(t, y, dy, late, e, table, drive)
+    shift, shift_rate, shift_bend, turn = block_motion(y, dy, row, e, table, drive)
+    place = block_place(shift, turn, fish)
+    centre = centre_of_mass(place, fish, e)
+    inertia = inertia_about_origin(place, fish)
+    flow, flow_rate = water_flow(t, y, path[2], e)
+    stream = to_body(y, flow)
+    velocity = add(ground, scale(-1.0, stream))
+    # d(V_rel)/dt - dV/dt: the flow seen from the turning body, and its own change.
+    drift = add(cross(spin, stream), scale(-1.0, to_body(y, flow_rate)))
+
+    rigid_matrix(centre, inertia, fish.mass, matrix)
+    wrench[:] = 0.0
+    water_wrench(t, y, dy, velocity, spin, angle, rate, row, fish, e, table, wrench)
+    down = to_body(y, (0.0, 0.0, fish.gravity))
+    force, moment = weight(down, y[2], t, centre, fish, e)
+    put(wrench, force, moment)
+    disturbance(t, y, e, push, wrench)
+    k = -e.tether_stiffness
+    pull = (k * (y[0] - e.tether_x), k * (y[1] - e.tether_y), k * (y[2] - e.tether_z))
+    put(wrench, to_body(y, pull), (0.0, 0.0, 0.0))
+    added_mass(velocity, spin, drift, e, matrix, wrench)
+    if e.tail_reactive_scale != 0.0:
+        reactive(velocity, spin, drift, angle, rate, bend, fish, e, matrix, wrench)
+    if e.block_reaction_scale != 0.0:
+        block_momentum(place, shift_rate, shift_bend, spin, fish, e, wrench)
+    foreign_wrench(t, y, velocity, spin, table[row, AMPLITUDE] * table[row, FREQUENCY], e, drive,
+                   wrench)  # fmt: skip
+    slosh(y, dy, ground, spin, down, e, matrix, wrench)
+
+    drive_out = (inertia[0] * spin[0], inertia[1] * spin[1], inertia[2] * spin[2])
+    m = fish.mass
+    carried = cross(spin, add(ground, cross(spin, centre)))
+    turned = add(cross(spin, drive_out), scale(m, cross(centre, cross(spin, ground))))
+    put(wrench, scale(-m, carried), scale(-1.0, turned))
+    solve6(matrix, wrench)
+
+    for i in range(3):
+        dy[i] = path[i]
+        dy[12 + i] = wrench[i]
+        dy[15 + i] = wrench[3 + i]
+        across = cross((y[3 + 3 * i], y[4 + 3 * i], y[5 + 3 * i]), spin)
+        for j in range(3):
+            dy[3 + 3 * i + j] = across[j]
+    if e.sloshing_mass != 0.0:
+        dy[26] -= dy[12]

@@ -1,0 +1,154 @@
+"""From the commands to the tail's angle and the block's place.
+
+The order is that of a real drive: what the controller sends (amplitude, asymmetry, bias), the
+transmission delay, the servo's rate limit, the play of its gear, its lag, the tail's flexibility.
+The phase is an integral of the frequency that is known in closed form between commands, so the
+delayed command is exact. Rate limit and plays have memory and are decided once a step: within a
+step each either follows its input exactly or moves evenly. `drive` holds that memory:
+
+0-3 rate limit, 4-7 play of the tail, each: angle at the step's start, 1 when it moves evenly,
+its rate then, the step's start time; 8 place of the block behind its play; 9 side of the
+sticking fin; 10 row of the commands in force.
+"""
+
+from __future__ import annotations
+
+import math
+
+from tests.hidden.jit import helper
+
+TWO_PI = 2.0 * math.pi
+TIME, OFFSET, AMPLITUDE, FREQUENCY, SHIFT, TURN, PHASE = range(7)
+LIMIT, PLAY, BLOCK, FIN, ROW = 0, 4, 8, 9, 10
+DRIVE_SIZE = 11
+
+
+@helper
+def tail_phase(t, row, e, table):
+    """Phase and its two rates within a row of the commands."""
+    speed = TWO_PI * e.frequency_scale_scale * table[row, FREQUENCY]
+    sag = e.battery_sag_rate
+    since = table[row, TIME]
+    run = (t - since) - 0.5 * sag * (t * t - since * since)
+    return table[row, PHASE] + speed * run, speed * (1.0 - sag * t), -speed * sag
+
+
+@helper
+def sent(t, late, e, table):
+    """Angle, rate and acceleration that reach the servo at time t, after the delay.
+
+    `late` is the row that reaches it now; before the first one (-1) the tail stands where that
+    command begins.
+    """
+    row = max(late, 0)
+    then = t - e.servo_delay_delay if late >= 0 else table[0, TIME]
+    phase, rate, bend = tail_phase(then, row, e, table)
+    swing, slope = math.sin(phase), math.cos(phase)
+    side = 1.0 if swing > 0.0 or (swing == 0.0 and slope > 0.0) else -1.0
+    reach = table[row, AMPLITUDE] * e.tail_gain_gain * (1.0 + side * e.tail_asymmetry_ratio)
+    angle = table[row, OFFSET] + e.tail_bias_offset + reach * swing
+    if late < 0:
+        return angle, 0.0, 0.0
+    return angle, reach * rate * slope, reach * (bend * slope - rate * rate * swing)
+
+
+@helper
+def limited(t, late, e, table, drive):
+    """The angle behind the rate limit."""
+    if drive[LIMIT + 1] == 1.0:
+        return drive[LIMIT] + drive[LIMIT + 2] * (t - drive[LIMIT + 3]), drive[LIMIT + 2], 0.0
+    return sent(t, late, e, table)
+
+
+@helper
+def driven(t, late, e, table, drive):
+    """The angle behind rate limit and play."""
+    if drive[PLAY + 1] == 1.0:
+        return drive[PLAY] + drive[PLAY + 2] * (t - drive[PLAY + 3]), drive[PLAY + 2], 0.0
+    angle, rate, bend = limited(t, late, e, table, drive)
+    return angle + drive[PLAY + 2], rate, bend
+
+
+@helper
+def plan_limit(t, h, late, e, table, drive):
+    """Whether the servo keeps up during the step from t to t + h."""
+    if math.isinf(e.servo_rate_limit_rate):
+        return
+    here, goal = sent(t, late, e, table)[0], sent(t + h, late, e, table)[0]
+    now = drive[LIMIT]
+    needed = (goal - now) / h
+    most = e.servo_rate_limit_rate
+    keeps_up = abs(needed) <= most
+    drive[LIMIT + 1] = 0.0 if keeps_up and abs(here - now) < 1e-9 else 1.0
+    drive[LIMIT + 2] = min(max(needed, -most), most)
+    drive[LIMIT + 3] = t
+
+
+@helper
+def plan_play(t, h, late, e, table, drive):
+    """Whether the gear's flanks touch during the step; half the gap lies on either side."""
+    half = 0.5 * e.servo_backlash_gap
+    if half == 0.0:
+        return
+    here = limited(t, late, e, table, drive)[0]
+    goal = limited(t + h, late, e, table, drive)[0]
+    now = drive[PLAY]
+    after = min(max(now, goal - half), goal + half)
+    side = 0.0 if after == now else math.copysign(1.0, after - now)
+    touching = side != 0.0 and abs(here - side * half - now) < 1e-9
+    drive[PLAY + 1] = 0.0 if touching else 1.0
+    drive[PLAY + 2] = -side * half if touching else (after - now) / h
+    drive[PLAY + 3] = t
+
+
+@helper
+def close_step(t, late, e, table, drive):
+    """Remembers where the angles are at the end of a step."""
+    if not math.isinf(e.servo_rate_limit_rate):
+        drive[LIMIT] = limited(t, late, e, table, drive)[0]
+    if e.servo_backlash_gap != 0.0:
+        drive[PLAY] = driven(t, late, e, table, drive)[0]
+
+
+@helper
+def tail_motion(t, y, dy, late, e, table, drive):
+    """Tail angle, rate and acceleration; fills the rates of the servo's own states."""
+    angle, rate, bend = driven(t, late, e, table, drive)
+    lag = e.servo_lag_time_constant
+    dy[18] = 0.0
+    if lag > 0.0:
+        lagged = (angle - y[18]) / lag
+        bend = (rate - lagged) / lag
+        angle, rate = y[18], lagged
+        dy[18] = lagged
+    dy[19] = 0.0
+    dy[20] = 0.0
+    if not math.isinf(e.tail_flexibility_natural_frequency):
+        own = TWO_PI * e.tail_flexibility_natural_frequency
+        bend = own * own * (angle - y[19]) - 2.0 * e.tail_flexibility_damping_ratio * own * y[20]
+        angle, rate = y[19], y[20]
+        dy[19] = rate
+        dy[20] = bend
+    return angle, rate, bend
+
+
+@helper
+def block_goal(row, e, table, drive):
+    """Where the commands put the block: displacement and bracket angle."""
+    shift = table[row, SHIFT] * e.block_scale_scale
+    if e.block_hysteresis_play > 0.0:
+        shift = drive[BLOCK]
+    return shift, table[row, TURN]
+
+
+@helper
+def block_motion(y, dy, row, e, table, drive):
+    """Displacement, its rate and acceleration, and the bracket's angle."""
+    shift, turn = block_goal(row, e, table, drive)
+    dy[21] = 0.0
+    lag = e.block_lag_time_constant
+    if lag == 0.0:
+        return shift, 0.0, 0.0, turn
+    rate = (shift - y[21]) / lag
+    dy[21] = rate
+    return y[21], rate, -rate / lag, turn

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fish_env.errors import SimulationDiverged
-from fish_env.simulator import InitialState, Simulator, time_grid
+from fish_env.simulator import InitialState, Simulator, schedule, time_grid
 from tests.physics import checkers
 from tests.physics.cases import SWIM, TUMBLE, WATER_EFFECTS, random_states, swimmer
 
@@ -23,6 +23,33 @@ def test_a_fish_moves_alike_alone_and_in_a_batch(count):
 def test_threads_do_not_change_the_bits(threads, effects):
     """300 fish are enough to be split between two cores."""
     checkers.check_scalar_equals_batch(Simulator, 300, threads, effects)
+
+
+def test_a_run_of_the_simulator_is_a_lane_of_a_batch():
+    """Simulator.run against sixteen lanes with other fish beside it, sample by sample."""
+    sizes = np.linspace(0.8, 1.2, 16) * swimmer().get("tail.area")
+    simulator = Simulator(swimmer(), 0.01)
+    kernels, model = simulator.model.kernels, simulator.model
+    commands = schedule([*SWIM, {"t": 0.33, "tail_offset": -0.2}])
+    grid, starts = time_grid(np.arange(11) / 10, commands.times_s, 0.01)
+    state = np.repeat(TUMBLE.vector()[:, None], 16, axis=1)
+    trace = np.empty((10, len(state), 16))
+    kernels.advance(
+        state,
+        np.repeat(commands.at([0.0]).T, 16, axis=1),
+        model.records({"tail.area": sizes}),
+        np.full((5, 16), np.inf),
+        np.zeros(16),
+        commands.at(starts)[:, :, None].copy(),
+        grid,
+        tables=model.tables,
+        failed_at=np.full(16, np.inf),
+        trace=trace,
+    )
+    for lane in (0, 9, 15):
+        fish = swimmer().replace({"tail.area": sizes[lane]})
+        run = Simulator(fish, 0.01).run(commands, duration_s=1.0, initial=TUMBLE)
+        assert run.states[1:].tobytes() == np.ascontiguousarray(trace[:, :, lane]).tobytes()
 
 
 CODE = """

@@ -12,8 +12,10 @@ from typing import Any
 import gymnasium as gym
 import numpy as np
 
+from fish_env.envs.layout import OBSERVATION
 from fish_env.envs.registration import ENV_ID
-from tests.conformance.cases import random_actions, run
+from tests.conformance.cases import IDEAL, REST_ACTION, STEADY, random_actions, run
+from tests.conformance.reference_observation import Observer
 
 Make = Callable[..., Any]
 
@@ -119,3 +121,46 @@ def compare_vectors(ours: Any, theirs: Any, actions: Any, mode: Any, seed: Any) 
             assert obs.tobytes() == other.tobytes(), "observations after a masked reset differ"
             _same("infos", infos, other_infos)
     return int(ends[0]), int(ends[1])
+
+
+def check_observation_values(make: Make, goal: dict[str, float], delay_steps: int = 0) -> None:
+    """Every observation is what its row of the table says, at each physics step.
+
+    The environment must run one physics step per control step, so that its history is known.
+    """
+    env = make()
+    obs, _ = env.reset(seed=2, options={"goal": goal})
+    observer = Observer(env, goal, delay_steps)
+    _close(obs, observer.expected(REST_ACTION), "reset")
+    for step, action in enumerate(np.repeat(random_actions(25, seed=9), 10, axis=0)):
+        obs, *_ = env.step(action)
+        observer.watch()
+        _close(obs, observer.expected(action), f"step {step}")
+
+
+def _close(obs: np.ndarray, expected: np.ndarray, when: str) -> None:
+    wrong = np.flatnonzero(np.abs(obs - expected) > 2e-6 * (1 + np.abs(expected)))
+    names = [f"{i} ({OBSERVATION[i][0]}): {obs[i]} for {expected[i]}" for i in wrong]
+    assert not names, f"{when}: {'; '.join(names)}"
+
+
+SENSED = [0, 1, *range(3, 8), 9, *range(11, 21)]
+"""Observations that come from sensors, with a constant goal."""
+
+
+def check_observation_delay(make: Make, delay: float) -> None:
+    """What a delayed environment shows is what an undelayed one showed that long ago.
+
+    The undelayed one runs a control step per physics step, with the same actions held.
+    """
+    actions = np.repeat(random_actions(8, seed=1), 5, axis=0)
+    actions[:, 2] = 0.5  # one beat frequency, so that means are over the same window
+    late, *_ = run(make(config=IDEAL, observation_delay_s=delay), actions, 3, goal=STEADY)
+    fine = make(config=IDEAL, control_hz=100.0)
+    now, *_ = run(fine, np.repeat(actions, 10, axis=0), 3, goal=STEADY)
+    steps = round(delay * 100)
+    for step in range(1 + steps // 10, len(late)):
+        seen, shown = late[step, SENSED], now[10 * step - steps, SENSED]
+        assert seen.tobytes() == shown.tobytes(), f"step {step}: {seen - shown}"
+    commands = np.arange(21, 33)
+    assert late[10, commands].tobytes() == now[100, commands].tobytes()

@@ -214,8 +214,8 @@ class _Window:
         path = self.path(rates["x"] + 1j * rates["y"], yaw_rate)
         vertical = self.mean(rates["z"])
         surge, sway, heave = self.body_velocity(rates)
-        with np.errstate(divide="ignore"):
-            radius = path / np.abs(yaw_rate)
+        straight = np.full_like(path, np.inf)
+        radius = np.divide(path, np.abs(yaw_rate), out=straight, where=yaw_rate != 0.0)
         return {
             "surge_speed": self.mean(surge),
             "sway_speed": self.mean(sway),

@@ -17,6 +17,7 @@ from fish_env.simulator import InitialState
 
 FloatArray = npt.NDArray[np.float64]
 FEWEST_SAMPLES = 5
+FITTED_BEATS = 2
 POSE = ("x", "y", "z", "roll", "pitch", "yaw")
 _CORRECTIONS = 5
 
@@ -27,9 +28,9 @@ def first_beat_s(run: Run) -> float:
     return float(1.0 / frequency) if frequency > 0.0 else 1.0
 
 
-def opening(run: Run) -> npt.NDArray[np.bool_]:
-    """Which samples lie in the first tail beat, shape (n,); at least the first five."""
-    inside = run.time_s <= run.time_s[0] + first_beat_s(run)
+def opening(run: Run, beats: int = 1) -> npt.NDArray[np.bool_]:
+    """Which samples lie in the first tail beats, shape (n,); at least the first five."""
+    inside = run.time_s <= run.time_s[0] + beats * first_beat_s(run)
     inside[:FEWEST_SAMPLES] = True
     return np.asarray(inside)
 
@@ -39,9 +40,9 @@ def measured_start(run: Run, model: ExtendedModel) -> tuple[InitialState, str]:
 
     The pose is the first sample of each channel, 0 where there is none, with the model's effects
     on measurement undone. A run from rest is level and still. Otherwise velocities that were
-    measured are taken from their first samples, and the others are slopes of straight lines
-    through the first tail beat of position and attitude: means over the beat, since a slope over
-    less would mostly show the tail.
+    measured are taken from their first samples, and the others are slopes of position and attitude
+    over the first two tail beats, where a straight line and the beat's own sine and cosine are
+    fitted together: a line alone would mostly show the tail.
     """
     pose = _true_pose(model, {name: _first(run, name) for name in POSE})
     if run.start == "rest":
@@ -52,7 +53,7 @@ def measured_start(run: Run, model: ExtendedModel) -> tuple[InitialState, str]:
         velocity_body=_velocity(run, pose),
         angular_velocity_body=_angular_velocity(run, pose),
     )
-    return start, "pose from the first samples, velocities from the first tail beat"
+    return start, "pose from the first samples, velocities from the first two tail beats"
 
 
 def _first(run: Run, name: str) -> float:
@@ -79,14 +80,17 @@ def _true_pose(model: ExtendedModel, measured: dict[str, float]) -> dict[str, fl
 
 
 def _slope(run: Run, name: str) -> float:
-    """Slope of a straight line through the first beat, 0 where too little was measured."""
+    """Slope over the first beats, 0 where too little was measured."""
     if name not in run.channels:
         return 0.0
     values = _continuous(run, name)
-    used = opening(run) & np.isfinite(values)
-    if used.sum() < 3:
+    used = opening(run, FITTED_BEATS) & np.isfinite(values)
+    if used.sum() < FEWEST_SAMPLES:
         return 0.0
-    return float(np.polyfit(run.time_s[used] - run.time_s[0], values[used], 1)[0])
+    time = run.time_s[used] - run.time_s[0]
+    phase = 2.0 * np.pi * time / first_beat_s(run)
+    basis = np.column_stack([time, np.ones_like(time), np.sin(phase), np.cos(phase)])
+    return float(np.linalg.lstsq(basis, values[used], rcond=None)[0][0])
 
 
 def _continuous(run: Run, name: str) -> FloatArray:
@@ -97,12 +101,12 @@ def _continuous(run: Run, name: str) -> FloatArray:
 def _mean(run: Run, name: str, otherwise: float) -> float:
     if name not in run.channels:
         return otherwise
-    values = _continuous(run, name)[opening(run)]
+    values = _continuous(run, name)[opening(run, FITTED_BEATS)]
     return float(np.nanmean(values)) if np.isfinite(values).any() else otherwise
 
 
 def _velocity(run: Run, pose: dict[str, float]) -> tuple[float, float, float]:
-    """Velocity in the body frame, m/s; slopes belong to the beat's mean attitude."""
+    """Velocity in the body frame, m/s; slopes belong to the beats' mean attitude."""
     angles = [_mean(run, name, pose[name]) for name in ("yaw", "pitch", "roll")]
     slopes = [_slope(run, name) for name in "xyz"]
     u, v, w = Rotation.from_euler("ZYX", angles).apply(slopes, inverse=True)

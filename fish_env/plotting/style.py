@@ -21,6 +21,7 @@ PALETTE = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY, BLACK)
 MEASURED, SIMULATED = BLACK, VERMILION
 COLOUR_MAP = "viridis"
 FORMATS = ("png", "pdf")
+DOTS_PER_INCH = 150
 
 _STYLE: dict[Any, Any] = {
     "font.size": 9.0,
@@ -35,7 +36,6 @@ _STYLE: dict[Any, Any] = {
     "grid.linewidth": 0.6,
     "axes.axisbelow": True,
     "lines.linewidth": 1.3,
-    "savefig.dpi": 150,
     "pdf.fonttype": 42,
 }
 
@@ -68,12 +68,12 @@ def colours(count: int) -> list[Any]:
     return [colormaps[COLOUR_MAP](i / (count - 1)) for i in range(count)]
 
 
-def save(figure: Figure, folder: Path, name: str, formats: tuple[str, ...] = FORMATS) -> Path:
+def save(figure: Figure, folder: Path, name: str, formats: tuple[str, ...] | None = None) -> Path:
     """Writes a figure as `<folder>/<name>.<format>` for each format; returns the first path."""
     folder.mkdir(parents=True, exist_ok=True)
-    paths = [folder / f"{name}.{ending}" for ending in formats]
+    paths = [folder / f"{name}.{ending}" for ending in formats or FORMATS]
     for path in paths:
-        figure.savefig(path)
+        figure.savefig(path, dpi=DOTS_PER_INCH)
     return paths[0]
 
 

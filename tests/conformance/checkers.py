@@ -14,7 +14,9 @@ import numpy as np
 
 from fish_env.envs.layout import OBSERVATION
 from fish_env.envs.registration import ENV_ID
-from tests.conformance.cases import IDEAL, REST_ACTION, STEADY, random_actions, run
+from fish_env.model.state import INPUTS
+from fish_env.simulator import InitialState, Simulator
+from tests.conformance.cases import IDEAL, REST_ACTION, START, STEADY, random_actions, run
 from tests.conformance.reference_observation import Observer
 
 Make = Callable[..., Any]
@@ -164,3 +166,93 @@ def check_observation_delay(make: Make, delay: float) -> None:
         assert seen.tobytes() == shown.tobytes(), f"step {step}: {seen - shown}"
     commands = np.arange(21, 33)
     assert late[10, commands].tobytes() == now[100, commands].tobytes()
+
+
+def check_slew(make: Make) -> None:
+    """Every actuator moves towards its target by at most slew x period, and stops there."""
+    env = make()
+    config = env.options.config
+    env.reset(seed=0, options=START)
+    before = env.actuators
+    for action in np.repeat(random_actions(12, seed=5), 4, axis=0):
+        env.step(action)
+        target = config.low + (np.clip(action, -1, 1).astype(float) + 1) / 2 * (
+            config.high - config.low
+        )
+        limit = config.slew * config.control_period
+        expected = before + np.clip(target - before, -limit, limit)
+        assert np.allclose(env.actuators, expected, rtol=0, atol=1e-14), "ramps are not exact"
+        before = env.actuators
+
+
+def _schedule(env: Any, actions: np.ndarray, delay: float = 0.0) -> list[dict[str, float]]:
+    """The simulator's schedule for actions of ideal actuators that arrive late."""
+    config = env.options.config
+    rows = [{"t": 0.0, **dict(zip(INPUTS, np.clip(0.0, config.low, config.high), strict=True))}]
+    for i, action in enumerate(actions.astype(float)):
+        values = config.low + (np.clip(action, -1, 1) + 1) / 2 * (config.high - config.low)
+        rows.append(
+            {"t": i * config.control_period + delay, **dict(zip(INPUTS, values, strict=True))}
+        )
+    return rows[1:] if delay == 0 else rows
+
+
+def check_physics(make: Make, options: dict[str, Any], delay: float = 0.0) -> None:
+    """States after each control step equal the simulator's to 1e-12."""
+    given = {"action_delay_s": delay} if delay else {}
+    env = make(config={**IDEAL, "tank": {"depth": 4.0}}, **options, **given)
+    actions = random_actions(30, seed=7)
+    actions[0] = REST_ACTION  # the simulator's servo starts at its first command
+    start = InitialState(
+        (0.0, 0.0, 2.0), (0.1, -0.2, 1.0), (0.05, 0.01, 0.0), (0.1, 0.2, -0.1), 0.4
+    )
+    env.reset(options={"state": vars(start)})
+    states = []
+    for action in actions:
+        env.step(action)
+        states.append(list(env.state.values()))
+    water = {name: dict(env.options.model.effects[name]) for name in env.options.model.effects}
+    expected = Simulator(env.options.model.fish, env.options.config.dt, water).run(
+        _schedule(env, actions, delay), duration_s=3.0, initial=start
+    )
+    off = np.abs(np.array(states) - expected.states[1:]).max(axis=1)
+    assert off.max() < 1e-12, f"off by {off.max()} from step {np.argmax(off > 1e-12)} on"
+
+
+def check_action_delay(make: Make, delay: float) -> None:
+    """Actions act exactly ``delay`` later."""
+    check_physics(make, {}, delay)
+
+
+def check_reward(make: Make) -> None:
+    """Bounded; the sum of its terms; each term as the class docstring says."""
+    env = make()
+    tree = env.options.config.tree["reward"]
+    actions = random_actions(150, seed=8)
+    _, rewards, infos = run(env, actions)
+    last = (np.clip(0.0, env.options.config.low, env.options.config.high) - _middle(env)) / _half(
+        env
+    )
+    for action, reward, info in zip(actions, rewards, infos[1:], strict=True):
+        action = np.clip(action.astype(float), -1, 1)
+        weights, margins = tree["weights"], tree["margins"]
+        for name in ("depth", "heading", "speed"):
+            shape = 1 / (1 + (info[f"{name}_error"] / margins[name]) ** 2)
+            assert np.isclose(info[f"reward_{name}"], weights[name] * shape, atol=1e-12), name
+        share = info["power"] / (info["power"] + tree["power_scale"])
+        assert np.isclose(info["cost_power"], weights["power"] * share, atol=1e-12), "power"
+        change = np.mean((action - last) ** 2) / 4
+        assert np.isclose(info["cost_action"], weights["action"] * change, atol=1e-12), "action"
+        gains = sum(info[f"reward_{name}"] for name in ("depth", "heading", "speed"))
+        total = gains - info["cost_power"] - info["cost_action"]
+        assert abs(reward - total) < 1e-15, "the reward is not the sum of its terms"
+        assert -0.1 <= reward <= 1.0
+        last = action
+
+
+def _middle(env: Any) -> np.ndarray:
+    return (env.options.config.low + env.options.config.high) / 2
+
+
+def _half(env: Any) -> np.ndarray:
+    return (env.options.config.high - env.options.config.low) / 2

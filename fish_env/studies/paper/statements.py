@@ -204,7 +204,11 @@ def turning_rates(turning_map: Map, name: str) -> list[Statement]:
         DEG * turning_map.motion[f"{angle}_rate_amplitude"] for angle in ("yaw", "roll", "pitch")
     )
     lagging = name != "turning"
-    why = "" if lagging else "a servo that loses amplitude with frequency would explain the print"
+    why = (
+        ""
+        if lagging
+        else "a servo that loses amplitude with frequency would explain the print; see below"
+    )
     grows = (
         ""
         if lagging
@@ -262,7 +266,7 @@ def gliding(study: Study) -> list[Statement]:
             f"{fast.time_s.max():.1f} s; means on the way {fast.mean_speed.min():.3f} to "
             f"{fast.mean_speed.max():.3f} m/s",
             bool(np.all(share < 98.0)),
-            "fish B pitches less here, so it takes longer to cross the tank",
+            "the steepness of the paper's fish and the depth it had left are not printed",
         ),
     ]
 

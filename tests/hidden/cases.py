@@ -15,7 +15,7 @@ import numpy as np
 
 from fish_env.params import FishParams
 from tests.hidden.fishes import draw_fish, move_coefficients
-from tests.hidden.plans import PLANS, Plan
+from tests.hidden.plans import Plan, plan_of
 from tests.hidden.recording import Experiment, record, write
 from tests.hidden.sizes import FOREIGN_SIZES, SIZES, draw_effect
 from tests.hidden.steady import write_steady
@@ -33,13 +33,13 @@ def make_case(
     """Writes the dataset of a case and returns what is hidden in it.
 
     Args:
-        tier: one of `PLANS`.
+        tier: one of `plans.PLANS`.
         seed: number of the case; in tiers with one effect, consecutive numbers go through the
             catalogue in order.
         folder: new folder for the dataset.
         effects: strength by effect, to choose other effects than the seed does.
     """
-    target, plan = Path(folder), PLANS[tier]
+    target, plan = Path(folder), plan_of(tier, seed)
     streams = np.random.default_rng([zlib.crc32(tier.encode()), seed]).spawn(5)
     truth = draw_truth(tier, seed, plan, effects, streams[0])
     fish, truth = hidden_fish(truth, plan, streams[1])
@@ -58,6 +58,8 @@ def draw_truth(
     """Which effects act, and how much."""
     strengths = dict(chosen) if chosen is not None else choose(plan, seed, rng)
     drawn = {name: draw_effect(name, strength, rng) for name, strength in strengths.items()}
+    if "pitch" not in plan.noise and "attitude_misalignment" in drawn:
+        drawn["attitude_misalignment"] |= {"roll": 0.0, "pitch": 0.0}
     effects = {name: values for name, values in drawn.items() if name in SIZES}
     return Truth(
         tier=tier,

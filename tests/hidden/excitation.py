@@ -45,8 +45,7 @@ def exciting(
         rng: source of randomness.
         still: time at the start in which nothing moves; drawn if not given.
     """
-    every = round(rate / 5.0)
-    grid = np.arange(0.0, duration, every / rate)
+    grid = grid_of(rate, duration)
     if style == "steps":
         amplitude = levels(grid, duration, lambda: rng.uniform(0.12, 0.6), 1.5, 5.0, rng)
         frequency = levels(grid, duration, lambda: rng.uniform(0.8, 2.6), 1.5, 5.0, rng)
@@ -75,3 +74,53 @@ def merged(rows: np.ndarray) -> np.ndarray:
     """The rows without those that repeat the commands before them."""
     change = np.any(rows[1:, 1:] != rows[:-1, 1:], axis=1)
     return rows[np.concatenate([[True], change])]
+
+
+def grid_of(rate: float, duration: float) -> np.ndarray:
+    """Times of at most five changes a second, on the samples."""
+    return np.arange(0.0, duration, round(rate / 5.0) / rate)
+
+
+def steady_straight(rate: float, duration: float, rng: np.random.Generator) -> np.ndarray:
+    """One beat, straight ahead, the block at rest: shows next to nothing."""
+    return np.array(
+        [[0.0, 0.0, round(rng.uniform(0.3, 0.4), 3), round(rng.uniform(1, 2), 2), 0, 0]]
+    )
+
+
+def without_tail(rate: float, duration: float, rng: np.random.Generator) -> np.ndarray:
+    """The tail never beats; the block moves, the fish hangs and glides."""
+    rows = exciting(rate, duration, "steps", rng, still=0.0)
+    rows[:, 1:3] = 0.0
+    return rows
+
+
+def without_block(rate: float, duration: float, rng: np.random.Generator) -> np.ndarray:
+    """The tail beats in every way, the block never moves."""
+    rows = exciting(rate, duration, "steps", rng, still=0.0)
+    rows[:, 4:] = 0.0
+    return rows
+
+
+def without_offset(rate: float, duration: float, rng: np.random.Generator) -> np.ndarray:
+    """The tail beats about its middle only."""
+    rows = exciting(rate, duration, "steps", rng, still=0.0)
+    rows[:, 1] = 0.0
+    return rows
+
+
+def slow_strokes(rate: float, duration: float, rng: np.random.Generator) -> np.ndarray:
+    """No stroke is faster than 1.8 rad/s and the offset stays, so no servo limit is met."""
+    rows = exciting(rate, duration, "waves", rng, still=0.0)
+    rows[:, 1] = 0.0
+    rows[:, 2] = np.minimum(rows[0, 2], 1.8 / (2 * np.pi * rows[:, 3].max()))
+    return rows
+
+
+POOR = {
+    "steady_straight": steady_straight,
+    "without_tail": without_tail,
+    "without_block": without_block,
+    "without_offset": without_offset,
+    "slow_strokes": slow_strokes,
+}

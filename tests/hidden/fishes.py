@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from fish_env.errors import ParameterError
 from fish_env.params import FishParams, load_fish
 
 FARTHEST_SD = 2.0
@@ -61,15 +62,21 @@ def move_coefficients(
 ) -> tuple[FishParams, dict[str, float]]:
     """The fish with some coefficients three to six prior sd off, and their values by path."""
     nominal = load_fish(name)
-    chosen = rng.choice(len(MOVABLE), size=count, replace=False)
-    moved = {}
-    for path in (MOVABLE[i] for i in chosen):
-        away = rng.uniform(3.0, 6.0) * nominal.prior_sd(path)
-        sign = 1.0 if nominal.get(path) - away <= 0.0 < nominal.get(path) else rng.choice([-1, 1])
-        if nominal.get(path) < 0.0:
-            sign = -1.0 if abs(nominal.get(path)) <= away else sign
-        moved[path] = float(nominal.get(path) + sign * away)
-    return fish.replace(moved), moved
+    while True:
+        paths = rng.choice(MOVABLE, size=count, replace=False).tolist()
+        moved = {path: moved_value(nominal, path, rng) for path in paths}
+        try:
+            return fish.replace(moved), moved
+        except ParameterError:  # no rigid body has such moments of inertia
+            continue
+
+
+def moved_value(nominal: FishParams, path: str, rng: np.random.Generator) -> float:
+    """A value far from the nominal one that keeps its sign."""
+    value = nominal.get(path)
+    away = float(rng.uniform(3.0, 6.0)) * nominal.prior_sd(path) * float(rng.choice([-1.0, 1.0]))
+    moved = value + away
+    return moved if moved * value > 0.0 else value - away
 
 
 MOVABLE = (

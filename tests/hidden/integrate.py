@@ -22,7 +22,6 @@ from tests.hidden.servo import (
     plan_play,
     sent,
 )
-from tests.hidden.tail import centre_of_pressure, steady_tail_force
 from tests.hidden.vectors import add, cross, orthonormalise, rotate, scale, solve6, to_inertial
 
 NODES = np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0])
@@ -177,21 +176,6 @@ def begin(y, fish, e, table, drive):
     y[18] = angle
     y[19] = angle
     y[21] = drive[BLOCK]
-
-
-@entry_point
-def derivative_at(t, y, row, fish, e, table, push, drive):
-    """d(state)/dt, for comparison with other implementations."""
-    dy = np.zeros(y.shape[0])
-    derivative(t, y, dy, row, row, fish, e, table, push, drive, np.empty((6, 6)), np.empty(6))
-    return dy
-
-
-@entry_point
-def tail_force_at(velocity, spin, angle, rate, fish, e):
-    """Quasi-steady tail force and its place, for comparison with theory."""
-    v, w = (velocity[0], velocity[1], velocity[2]), (spin[0], spin[1], spin[2])
-    return steady_tail_force(v, w, angle, rate, fish, e), centre_of_pressure(angle, fish)[1]
 
 
 @entry_point

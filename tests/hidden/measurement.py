@@ -48,13 +48,3 @@ def distorted(channels: Mapping[str, np.ndarray], effects: Effects) -> dict[str,
         for name, bias in effects.get(effect, {}).items():
             measured[name] = measured[name] + bias
     return measured
-
-
-def with_noise(
-    channels: Mapping[str, np.ndarray], sigma: Mapping[str, float], rng: np.random.Generator
-) -> dict[str, np.ndarray]:
-    """The channels named in `sigma` with white noise added."""
-    return {
-        name: channels[name] + sd * rng.standard_normal(len(channels[name]))
-        for name, sd in sigma.items()
-    }

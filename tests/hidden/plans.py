@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from tests.hidden.measurement import ALL_CHANNELS, CAMERA_CHANNELS
-from tests.hidden.sizes import FOREIGN_SIZES, SIZES
+from tests.hidden.sizes import FOREIGN_SIZES, INVISIBLE, SIZES
 
 DEGREE = math.radians(1.0)
 SENSORS = {
@@ -34,6 +34,7 @@ class Plan:
         missing: share of samples that are lost.
         start: "rest" with known tail phase, or "unknown".
         schedule: "exciting", "controller" or one of the poor ones.
+        depth: range of the start depth, m.
         colours: colours of the disturbance, one is drawn.
         force: range of its rms force, N.
         memory: range of its correlation time, s.
@@ -51,6 +52,7 @@ class Plan:
     missing: float = 0.0
     start: str = "rest"
     schedule: str = "exciting"
+    depth: tuple[float, float] = (0.2, 1.2)
     colours: tuple[str, ...] = ("ou",)
     force: tuple[float, float] = (0.002, 0.004)
     memory: tuple[float, float] = (0.3, 1.5)
@@ -59,10 +61,113 @@ class Plan:
 
 
 RICH = Plan(SINGLE)
+NOT_BY_CAMERA = ("gyro_bias", *INVISIBLE)
+PAIRS = (
+    ("servo_lag", "current"),
+    ("added_mass", "buoyancy_offset"),
+    ("tail_reactive", "gyro_bias"),
+    ("block_scale", "linear_drag"),
+    ("frequency_scale", "tether"),
+    ("wake_fraction", "sensor_delay"),
+    ("servo_delay", "hull_compression"),
+    ("tail_bias", "added_mass"),
+    ("battery_sag", "block_lag"),
+    ("position_scale", "quadratic_damping"),
+    ("attitude_misalignment", "tail_gain"),
+    ("cross_flow_drag", "water_ingress"),
+    ("offset_drag", "wave"),
+    ("clock_scale", "wake_memory"),
+    ("servo_backlash", "surface_drag"),
+    ("tail_asymmetry", "block_reaction"),
+)
+TRIPLES = (
+    ("servo_lag", "current", "buoyancy_offset"),
+    ("added_mass", "linear_drag", "tail_bias"),
+    ("tail_reactive", "block_lag", "gyro_bias"),
+    ("wake_fraction", "water_ingress", "sensor_delay"),
+    ("frequency_scale", "attitude_misalignment", "quadratic_damping"),
+    ("servo_delay", "block_scale", "current"),
+)
+STEADY_TABLE = (
+    (),
+    ("tail_bias",),
+    ("tail_gain",),
+    ("servo_lag",),
+    ("frequency_scale",),
+    ("linear_drag",),
+    ("wake_fraction",),
+    ("offset_drag",),
+    ("tail_reactive",),
+    ("tail_flexibility",),
+    ("buoyancy_offset",),
+    ("block_scale",),
+)
+STRONG = {
+    "colours": ("ou", "band", "pink", "steps"),
+    "force": (0.005, 0.010),
+    "memory": (1.0, 5.0),
+}
+AS_CAMERA = replace(
+    RICH,
+    choices=tuple((name,) for name in SIZES if name not in NOT_BY_CAMERA),
+    rate=15.0,
+    noise=CAMERA,
+    missing=0.02,
+    start="unknown",
+)
+CLOSED = replace(
+    RICH, choices=tuple((n,) for n in SIZES if n not in INVISIBLE), schedule="controller"
+)
+SHORT = Plan(runs=3, duration=12.0, visible=False)
 PLANS: dict[str, Plan] = {
     "rich": RICH,
+    "small": replace(RICH, strength=0.3),
     "null": replace(RICH, choices=()),
+    "null_strong": replace(RICH, choices=(), **STRONG),
+    "camera": AS_CAMERA,
+    "null_camera": replace(AS_CAMERA, choices=()),
+    "closed_loop": CLOSED,
+    "null_closed_loop": replace(CLOSED, choices=()),
+    "pairs": replace(RICH, choices=PAIRS),
+    "triples": replace(RICH, choices=TRIPLES),
+    "outside": replace(RICH, choices=tuple((name,) for name in FOREIGN_SIZES)),
+    "coefficients": replace(RICH, choices=(), moved=(1, 4)),
+    "poor": SHORT,
+    "steady": Plan(
+        STEADY_TABLE,
+        noise={"surge_speed": 0.002, "sway_speed": 0.002, "yaw_rate": 0.005, "pitch": 0.005},
+        steady=True,
+    ),
 }
+POOR_CASES: tuple[tuple[str, str], ...] = (
+    ("block_lag", "without_block"),
+    ("servo_lag", "without_tail"),
+    ("offset_drag", "without_offset"),
+    ("block_scale", "steady_straight"),
+    ("frequency_scale", "without_tail"),
+    ("servo_rate_limit", "slow_strokes"),
+    ("block_reaction", "without_block"),
+    ("tail_gain", "without_tail"),
+    ("surface_drag", "deep"),
+    ("tail_asymmetry", "without_tail"),
+)
+"""An effect, and runs that cannot show it: its signal in them is zero, or next to it."""
+
+
+def plan_of(tier: str, seed: int) -> Plan:
+    """The plan of one case; the poor tier has one for each of its cases.
+
+    Raises:
+        KeyError: No such tier.
+    """
+    plan = PLANS[tier]
+    if tier != "poor":
+        return plan
+    name, schedule = POOR_CASES[seed % len(POOR_CASES)]
+    if schedule == "deep":
+        return replace(plan, choices=((name,),), depth=(2.0, 2.2))
+    return replace(plan, choices=((name,),), schedule=schedule)
+
 
 assert set(SENSORS) == set(ALL_CHANNELS)
 assert set(CAMERA) == set(CAMERA_CHANNELS)

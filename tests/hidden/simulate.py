@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tests.hidden.integrate import advance, begin, derivative_at
+from tests.hidden.integrate import advance, begin
 from tests.hidden.motion import STATES
 from tests.hidden.records import extra_record, fish_record
 from tests.hidden.servo import DRIVE_SIZE, FREQUENCY, PHASE, TIME
@@ -110,12 +110,6 @@ class Swim:
         )  # fmt: skip
         self.time = until
         return out
-
-    def derivative(self, time: float, row: int = 0) -> np.ndarray:
-        """d(state)/dt now, with the commands of a row."""
-        return derivative_at(
-            time, self.state, row, self.fish, self.extra, self.table, self.push.values, self.drive
-        )
 
     def _phases(self) -> np.ndarray:
         """Tail phase at each row: the integral of the frequency, which may be scaled and sag."""

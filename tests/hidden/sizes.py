@@ -113,8 +113,13 @@ INVISIBLE = ("depth_bias",)
 EQUIVALENT = {
     "buoyancy_offset": ("parameter:mass.buoyancy",),
     "com_offset": tuple(f"parameter:mass.static_moment_rest[{i}]" for i in range(3)),
+    "parameter:body.plane_xz.drag.c0": ("parameter:body.plane_xy.drag.c0",),
+    "parameter:body.plane_xy.drag.c0": ("parameter:body.plane_xz.drag.c0",),
 }
-"""Baseline parameters that say the same thing as an effect, to the last bit."""
+"""Names that say the same: both planes' drags at zero incidence act along the fish alike."""
+
+ABSORBED = ("com_offset",)
+"""Effects that are a draw from the baseline's own prior: a refit explains them."""
 
 
 def draw_effect(

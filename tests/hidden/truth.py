@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from tests.hidden.sizes import EQUIVALENT, INVISIBLE
+from tests.hidden.sizes import ABSORBED, EQUIVALENT, INVISIBLE
 
 Values = dict[str, dict[str, float]]
 
@@ -53,7 +53,14 @@ class Truth:
             return ("not_excited", "no_misfit")
         if self.moved:
             return ("parameters",)
-        return ("cause",) if self.effects else ("no_misfit",)
+        if not self.effects:
+            return ("no_misfit",)
+        verdicts = ["cause"]
+        if any(name in EQUIVALENT for name in self.effects):
+            verdicts.append("parameters")
+        if all(name in ABSORBED for name in self.effects):
+            verdicts.append("no_misfit")
+        return tuple(verdicts)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -1,0 +1,90 @@
+"""Runs the hidden-effect suite and writes its confusion matrix and rates to a dated file.
+
+Each finished case is kept, so a stopped run goes on where it was:
+
+    python scripts/benchmark_diagnosis.py --tiers rich,null --limit 20
+"""
+
+from __future__ import annotations
+
+import argparse
+import datetime
+import json
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+# One thread a process: the processes are what runs side by side.
+for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
+    os.environ.setdefault(variable, "1")
+
+from rich.progress import track  # noqa: E402
+
+from tests.hidden.scoring import Row  # noqa: E402
+from tests.hidden.suite import FULL, PIPELINE, Job, do, jobs  # noqa: E402
+from tests.hidden.summary import markdown, summarise  # noqa: E402
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    options = parse(arguments)
+    work = options.work / ("quick" if options.quick else "full")
+    work.mkdir(parents=True, exist_ok=True)
+    todo = jobs(work, options.tiers, options.limit, options.seed0, options.diagnose, options.quick)
+    if options.fresh:
+        for job in todo:
+            job.file.unlink(missing_ok=True)
+    finished = track(run(todo, options.processes), f"{len(todo)} cases", total=len(todo))
+    write(sorted(finished, key=lambda row: (row.tier, row.seed)), options.out, options.quick)
+
+
+def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    add = parser.add_argument
+    add("--tiers", type=tiers, default=(), help=f"some of {', '.join(FULL)}")
+    add("--limit", type=int, help="at most this many cases")
+    add("--seed0", type=int, default=0, help="number of the first case of each tier")
+    add("--quick", action="store_true", help="let the diagnosis take its quick way")
+    add("--fresh", action="store_true", help="do finished cases again")
+    add("--processes", type=int, default=2)
+    add("--work", type=Path, default=ROOT / "out" / "benchmark-diagnosis")
+    add("--out", type=Path, default=ROOT / "results", help="folder of the dated result")
+    add("--diagnose", default=PIPELINE, help="module:function to judge instead")
+    return parser.parse_args(arguments)
+
+
+def tiers(text: str) -> tuple[str, ...]:
+    names = tuple(text.split(","))
+    unknown = set(names) - set(FULL)
+    if unknown:
+        raise argparse.ArgumentTypeError(f"no tier {', '.join(unknown)}; use {', '.join(FULL)}")
+    return names
+
+
+def run(todo: list[Job], processes: int) -> Iterator[Row]:
+    if processes == 1:
+        yield from map(do, todo)
+        return
+    with ProcessPoolExecutor(processes) as pool:
+        for future in as_completed([pool.submit(do, job) for job in todo]):
+            yield future.result()
+
+
+def write(rows: list[Row], folder: Path, quick: bool) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    summary = summarise(rows)
+    today = datetime.date.today().isoformat()
+    name = f"diagnosis-{'quick-' if quick else ''}{today}"
+    content = {"date": today, **summary, "rows": [asdict(row) for row in rows]}
+    (folder / f"{name}.json").write_text(json.dumps(content, indent=1), encoding="utf-8")
+    page = f"# Hidden-effect suite, {today}\n\n{len(rows)} cases.\n\n{markdown(summary)}"
+    (folder / f"{name}.md").write_text(page, encoding="utf-8")
+    print(page)
+
+
+if __name__ == "__main__":
+    main()

@@ -67,8 +67,9 @@ def statements_markdown(study: Study) -> str:
 def _lag_words(study: Study) -> str:
     lag, tried = max(study.lagged), ", ".join(f"{value:g}" for value in study.lagged)
     return (
-        "The paper's rate amplitudes fall with frequency. With an ideal servo this model cannot show "
-        "that: its yaw amplitude is nearly constant in frequency, so the rate grows. The effect `servo_lag` takes "
+        "The paper's rate amplitudes fall with frequency. With an ideal servo this model cannot "
+        "show that: its yaw amplitude is nearly constant in frequency, so the rate grows. The "
+        "effect `servo_lag` takes "
         f"amplitude away as the beat quickens. Of the time constants {tried} s the longest, {lag:g}"
         " s, is shown. It makes all three amplitudes fall, but then the turning rate no longer "
         "grows with f1: a first-order lag alone does not give both."

@@ -26,7 +26,7 @@ def compare_with_a_real_fish(console: Console, out: Path) -> list[Path]:
     measured = load_dataset(DATASET)
     if not isinstance(measured, SteadyDataset):
         raise DatasetError(f"{DATASET}: the demonstration needs the shipped table; reinstall")
-    with console.status("simulating 29 swims of a real robotic fish (first time: compiling)"):
+    with console.status(f"simulating {len(measured.ids)} swims (the first time: compiling)"):
         comparison = compare_steady(measured, load_fish(measured.fish))
     console.print(
         f"{len(measured.ids)} swims of a real robotic fish, against its simulation with starting "

@@ -27,6 +27,7 @@ TOLD_ROWS = len(COMMAND_FIELDS) + 1
 """Rows of the work array for what is told now, the last one being how late it arrives (s)."""
 RECORD = len(COMMAND_FIELDS) + 1
 
+FloatArray = npt.NDArray[np.float64]
 _TWO_PI = 6.283185307179586
 _ROUNDING = 1e-9  # s; times closer than this are one
 
@@ -59,7 +60,7 @@ def recall(work, width, told, past, start, shift, h, history, first, count):
         time = work[start * width + k] + shift - late
         newest = int(history[0, lane]) - 1
         oldest = max(0, newest + 1 - slots)
-        step = max(oldest, newest - int(late / h))
+        step = max(oldest, newest - int(min(late / h, float(slots))))
         while (step > oldest) & (history[1 + RECORD * (step % slots), lane] > time + edge):
             step -= 1
         while step < newest and history[1 + RECORD * ((step + 1) % slots), lane] <= time + edge:
@@ -133,3 +134,36 @@ def history_rows_on(grid: Grid, longest_delay: float) -> int:
     begins = np.repeat(grid.starts, counts) + index * np.repeat(grid.sizes, counts)
     reached = np.searchsorted(begins, begins - longest_delay - 2 * _ROUNDING)
     return 1 + RECORD * (int(np.max(np.arange(begins.size) - reached)) + 3)
+
+
+def forget(history: FloatArray, lanes: npt.NDArray[np.int64], rows: int) -> FloatArray:
+    """Let fish begin anew, as told nothing yet.
+
+    Args:
+        history: (rows, N), changed in place if it is long enough.
+        lanes: (k,) which fish.
+        rows: how many rows they need.
+
+    Returns:
+        The history, or a longer one that holds what the other fish were told.
+    """
+    if rows > len(history):
+        history = _lengthened(history, rows)
+    if len(history):
+        history[0, lanes] = 0.0
+    return history
+
+
+def _lengthened(history: FloatArray, rows: int) -> FloatArray:
+    longer = np.zeros((rows, history.shape[1]))
+    if not len(history):
+        return longer
+    longer[0] = history[0]
+    slots, more = (len(history) - 1) // RECORD, (rows - 1) // RECORD
+    for age in range(1, slots + 1):
+        step = history[0].astype(int) - age
+        lanes = np.flatnonzero(step >= 0)
+        for i in range(1, RECORD + 1):
+            told = history[RECORD * (step[lanes] % slots) + i, lanes]
+            longer[RECORD * (step[lanes] % more) + i, lanes] = told
+    return longer

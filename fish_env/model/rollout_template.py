@@ -99,6 +99,8 @@ def rk4_step(work, width, elapsed, h, tables, late, history, first, count):
         work[X * width + n] = work[X0 * width + n]
     for n in range(N_SLOPES * width):
         work[SUM * width + n] = 0.0
+    if late:
+        tell_tail(work, width, elapsed, history, first, count)
     for stage in range(4):
         fraction = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
         weight = 1.0 if (stage == 0) | (stage == 3) else 2.0
@@ -167,8 +169,6 @@ def advance_block(
         for i in range(steps[segment]):
             elapsed = starts[segment] + i * h
             plan_actuators(work, width, commands, slots[segment], first, count, h)
-            if late:
-                tell_tail(work, width, elapsed, history, first, count)
             rk4_step(work, width, elapsed, h, tables, late, history, first, count)
             accept_step(work, width, elapsed + h, failed_at, first, count)
             if (trace.shape[0] > 0) & ((i + 1) % every[segment] == 0):

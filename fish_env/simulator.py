@@ -171,7 +171,8 @@ class Simulator:
         steps = commands if isinstance(commands, CommandSteps) else schedule(commands)
         self._warn_reach(steps)
         times = _sample_times(duration_s, rate_hz, sample_times_s)
-        grid, starts = time_grid(times, steps.times_s, self.dt)
+        arrivals = np.concatenate([steps.times_s, steps.times_s + self.model.command_delay])
+        grid, starts = time_grid(times, arrivals, self.dt)
         start = initial or InitialState()
         kernels = self.model.kernels
         state = np.zeros((len(kernels.state_names), 1))
@@ -216,7 +217,8 @@ class Simulator:
             input_rates: (5,) their rates.
 
         Returns:
-            (states,), SI: velocities inertial, accelerations in the body frame.
+            (states,), SI: velocities inertial, accelerations in the body frame. A tail whose
+            command is late (``servo_delay``) is taken to have been told ``inputs`` all along.
         """
         arrays = self._columns(state, inputs, input_rates, time_s)
         return self.model.kernels.derivative(*arrays, self.model.tables)[:, 0]
@@ -243,7 +245,8 @@ class Simulator:
         """Derived quantities along a trajectory of this fish, each (T,).
 
         ``tail_angle`` (rad), ``tail_rate`` (rad/s), ``tail_power`` (W), ``barycentre_*`` (m, body)
-        and the velocity through the water (m/s, body).
+        and the velocity through the water (m/s, body). A tail whose command is late is taken to
+        have been told the command of each sample all along.
         """
         states = np.ascontiguousarray(trajectory.states.T)
         inputs = np.ascontiguousarray(trajectory.inputs.T)

@@ -31,7 +31,7 @@ class ExtendedModel:
         effects: complete parameter values of the effects that are on, by name.
         declared: the effects the kernel contains, in the order their hooks run. None for a fish
             without effects: then the lean kernel runs it.
-        measurement: effects that act on what is recorded, not on the motion.
+        measurement: effects that act on what is recorded, not on the motion, in catalogue order.
     """
 
     fish: FishParams
@@ -92,6 +92,15 @@ class ExtendedModel:
             values |= {f"{effect.name}.{name}": complete[name] for name in effect.neutral}
         return values
 
+    @property
+    def command_delay(self) -> float:
+        """How late the tail's command is (s)."""
+        return sum(
+            self.effects[effect.name][effect.command_delay]
+            for effect in self.declared
+            if effect.command_delay is not None and effect.name in self.effects
+        )
+
     def longest_step(self) -> float:
         """Longest physics step that resolves the fastest effect (s)."""
         scales = (
@@ -135,6 +144,8 @@ def build_model(
         EffectError: an unknown effect or parameter, or a value out of bounds.
     """
     own = {effect.name: effect for effect in user_effects}
+    for name in own.keys() & catalogue().keys():
+        raise EffectError(f"effect {name}: the name is taken by a shipped effect, choose another")
     wanted: dict[str, dict[str, float]] = {name: dict(v) for name, v in fish.effects.items()}
     for name, values in (effects or {}).items():
         wanted[name] = {**wanted.get(name, {}), **values}
@@ -144,11 +155,11 @@ def build_model(
     found = {name: own.get(name) or get_effect(name) for name in wanted}
     complete = {name: found[name].complete(values) for name, values in wanted.items()}
     on = {name: v for name, v in complete.items() if v != found[name].neutral}
-    compiled = tuple(effect for effect in own.values() if effect.hooks)
-    moving = any(found[name].hooks for name in on) or bool(compiled) or whole_catalogue
-    shipped = tuple(effect for effect in catalogue().values() if effect.hooks) if moving else ()
-    measured = tuple(found[name] for name in on if found[name].sample_time or found[name].measure)
-    return ExtendedModel(fish, on, (*shipped, *compiled), measured)
+    everything = (*catalogue().values(), *own.values())
+    acting = tuple(effect for effect in everything if effect.acts_on_motion)
+    needed = whole_catalogue or any(e.name in on or e.name in own for e in acting)
+    measured = tuple(e for e in everything if e.name in on and (e.sample_time or e.measure))
+    return ExtendedModel(fish, on, acting if needed else (), measured)
 
 
 def _beside(fish: FishParams, name: str) -> Effect:

@@ -21,14 +21,14 @@ _NOT_EFFECTS = {"registry", "extended"}
 
 @cache
 def catalogue() -> dict[str, Effect]:
-    """All shipped effects by name, in the order of their sections, then by name.
+    """All shipped effects by name, in the order of their sections, then ``order``, then name.
 
     This order is also the order in which their hooks run.
     """
     package = importlib.import_module("fish_env.effects")
     names = [m.name for m in pkgutil.iter_modules(package.__path__) if m.name not in _NOT_EFFECTS]
     found = [importlib.import_module(f"fish_env.effects.{name}").EFFECT for name in names]
-    found.sort(key=lambda effect: (SECTIONS.index(effect.section), effect.name))
+    found.sort(key=lambda effect: (SECTIONS.index(effect.section), effect.order, effect.name))
     return {effect.name: effect for effect in found}
 
 

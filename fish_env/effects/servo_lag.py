@@ -5,7 +5,6 @@ from __future__ import annotations
 from fish_env.model.effect import Effect, EffectParameter
 from fish_env.model.jit import kernel
 from fish_env.model.records import Tail
-from fish_env.model.tail import commanded_tail
 
 
 @kernel
@@ -25,9 +24,9 @@ def lag_tail(tail, inputs, phase, time, fish, e, states):
 
 
 @kernel
-def start_at_command(inputs, phase, fish, e):
+def start_at_command(inputs, tail, fish, e):
     """The run starts with the tail where it is commanded."""
-    return (commanded_tail(inputs, phase).angle,)
+    return (tail.angle,)
 
 
 def fastest(values):

@@ -14,6 +14,7 @@ from fish_env.envs import start
 from fish_env.envs.layout import GOAL, MAX_BEAT_S, OBSERVATION, OUTPUTS, SENSORS, Failure
 from fish_env.envs.options import EnvOptions
 from fish_env.errors import ConfigError
+from fish_env.model.history import forget, history_rows
 from fish_env.model.runtime import Kernels, default_threads, kernels, run_in_threads
 from fish_env.model.state import BASE_STATES, INTEGRAL_ROW
 
@@ -58,6 +59,7 @@ class FishBatch:
         traced = len(options.model.kernels.state_names) if options.observation_lag else 3
         self._ring = np.zeros((slots, traced, count))
         self._ring_at = 0
+        self._history = np.zeros((0, count))
         self._setup = config.setup()
         self._slew = config.slew
         self._noise = np.zeros((0 if options.noise_sd is None else len(SENSORS), count))
@@ -142,6 +144,8 @@ class FishBatch:
         low, high = options.config.low, options.config.high
         inputs = np.repeat(np.clip(0.0, low, high)[:, None], len(lanes), axis=1)
         self._base.initialise(state, inputs, record, np.zeros(len(lanes)))
+        reach = history_rows(self._base.longest_delay(record), options.config.dt)
+        self._history = forget(self._history, lanes, reach)
         action = (inputs - (high + low)[:, None] / 2) / ((high - low)[:, None] / 2)
         data[: rows.N_STATES, lanes] = state
         data[rows.ROW_INPUTS : rows.ROW_SLEW, lanes] = inputs
@@ -193,8 +197,8 @@ class FishBatch:
             self._step(
                 self._data, self._actions, self._queue, self._queue_at, self._ring, self._ring_at,
                 self._noise, self.obs, self._setup, self._substeps, self.options.action_lag,
-                self.options.observation_lag, self._trace_row, self.options.model.tables, first,
-                last,
+                self.options.observation_lag, self._trace_row, self._history,
+                self.options.model.tables, first, last,
             )
         )  # fmt: skip
 

@@ -272,7 +272,7 @@ def observe(data, lane, ring, newest, back, trace_row, noise, obs, setup):
 @kernel
 def step_block(
     width, data, actions, queue, queue_at, ring, ring_at, noise, obs, setup, n_sub, lag, back,
-    trace_row, tables, first, count,
+    trace_row, history, tables, first, count,
 ):  # fmt: skip
     """Step lanes first..first+count (see :func:`step_lanes`)."""
     dt = setup[DT]
@@ -313,7 +313,7 @@ def step_block(
     advance_block(
         width, data[:ROW_INPUTS], data[ROW_INPUTS:ROW_SLEW], data[ROW_PAR:ROW_TIME],
         data[ROW_SLEW:ROW_PAR], data[ROW_TIME], queue, slots, starts, steps, sizes, every,
-        trace_row, ring_at, ring, data[ROW_FAILED], tables, first, count,
+        trace_row, ring_at, ring, data[ROW_FAILED], history, tables, first, count,
     )  # fmt: skip
     newest = ring_at + n_sub - 1
     for k in range(count):
@@ -329,7 +329,7 @@ def step_block(
 @entry_point
 def step_lanes(
     data, actions, queue, queue_at, ring, ring_at, noise, obs, setup, n_sub, lag, back, trace_row,
-    tables, first, last,
+    history, tables, first, last,
 ):  # fmt: skip
     """One control step of fish first..last, in place.
 
@@ -347,6 +347,7 @@ def step_lanes(
         lag: action delay in physics steps.
         back: observation delay in physics steps.
         trace_row: first state row that the ring holds.
+        history: (rows, N) what tails were told (see :mod:`fish_env.model.history`), or no rows.
         tables: packed coefficient curves.
         first: first fish.
         last: one past the last.
@@ -358,7 +359,7 @@ def step_lanes(
     for block in range(first, last, LANES):
         bad += step_block(
             LANES, data, actions, queue, queue_at, ring, ring_at, noise, obs, setup, n_sub, lag,
-            back, trace_row, tables, block, min(LANES, last - block),
+            back, trace_row, history, tables, block, min(LANES, last - block),
         )  # fmt: skip
     return bad
 
@@ -366,14 +367,14 @@ def step_lanes(
 @entry_point
 def step_one(
     data, actions, queue, queue_at, ring, ring_at, noise, obs, setup, n_sub, lag, back, trace_row,
-    tables, first, last,
+    history, tables, first, last,
 ):  # fmt: skip
     """As :func:`step_lanes`, one fish at a time: for a single fish."""
     bad = 0
     for lane in range(first, last):
         bad += step_block(
             1, data, actions, queue, queue_at, ring, ring_at, noise, obs, setup, n_sub, lag, back,
-            trace_row, tables, lane, 1,
+            trace_row, history, tables, lane, 1,
         )  # fmt: skip
     return bad
 

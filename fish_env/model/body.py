@@ -53,6 +53,30 @@ def relative_motion(time, place, velocity, omega, attitude, water):
 
 
 @kernel
+def with_surge(motion, surge):
+    """The same motion with another surge speed through the water (m/s)."""
+    return Motion(
+        motion.time,
+        motion.x,
+        motion.y,
+        motion.z,
+        surge,
+        motion.v,
+        motion.w,
+        motion.p,
+        motion.q,
+        motion.r,
+        motion.ground_u,
+        motion.ground_v,
+        motion.ground_w,
+        motion.water_u,
+        motion.water_v,
+        motion.water_w,
+        motion.attitude,
+    )
+
+
+@kernel
 def plane_xz_velocity(motion):
     """V_1 = (V_x, 0, V_z) (m/s, body)."""
     return Vector(motion.u, 0.0, motion.w)

@@ -47,14 +47,24 @@ class Composition:
 
     @property
     def state_names(self) -> tuple[str, ...]:
-        """Rows of the state."""
-        extra = (f"{e.name}.{s}" for e in self.effects for s in e.state_names)
-        return (*BASE_STATES, *extra)
+        """Rows of the state: the fish, states of effects, then what effects remember."""
+        states = (f"{e.name}.{s}" for e in self.effects for s in e.state_names)
+        return (*BASE_STATES, *states, *self.memory_names)
+
+    @property
+    def memory_names(self) -> tuple[str, ...]:
+        """The last rows of the state: kept from step to step, not integrated."""
+        return tuple(f"{e.name}.{m}" for e in self.effects for m in e.memory_names)
+
+    @property
+    def delays(self) -> tuple[str, ...]:
+        """Parameters by which the tail's command is late (s)."""
+        return tuple(f"{e.name}.{e.command_delay}" for e in self.effects if e.command_delay)
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
         """Rows of the parameter record: the fish, then ``effect.parameter``."""
-        extra = (f"{e.name}.{p.name}" for e in self.effects for p in e.parameters if e.hooks)
+        extra = (f"{e.name}.{p.name}" for e in self.effects for p in e.parameters)
         return (*RECORD_FIELDS, *extra)
 
     @property

@@ -17,9 +17,17 @@ stage           hook                                                     value
 ``inertia``     (inertia, tail, fish, e)                                 Inertia
 =============== ======================================================== =================
 
-``e`` is the named tuple of the effect's parameters. A hook named in ``states`` takes a further
-argument, the tuple of the effect's own states, and returns ``(value, tuple of derivatives)``.
-At neutral parameters a hook must return its value unchanged to the last bit.
+``e`` is the named tuple of the effect's parameters. At neutral parameters a hook must return its
+value unchanged to the last bit.
+
+A hook may carry numbers of its own through time. *States* obey a differential equation: the hook
+takes their tuple as a further argument and returns ``(value, derivatives)``. *Memory* follows a
+rule from one physics step to the next, such as "move at most so far": the hook takes the tuple
+that the last step left and the time since then (s), and returns ``(value, memory)``, the memory
+as it is at this instant; the engine keeps what it is at the end of the step. A hook with both
+takes ``(..., e, states, memory, since)`` and returns ``(value, derivatives, memory)``.
+
+Hooks of a stage run in the order of section, ``order`` and name, those of users' effects last.
 """
 
 from __future__ import annotations
@@ -91,7 +99,11 @@ class Effect:
         parameters: its parameters, in the order hooks read them.
         hooks: stage -> kernel (see the module's table); empty for measurement effects.
         states: stage -> names of the states integrated with the fish (at most one stage).
-        initial_states: (inputs, phase, fish, e) -> tuple of the states at the start of a run.
+        memory: stage -> names of the numbers kept from step to step (at most one stage).
+        initial_states: (inputs, tail, fish, e) -> tuple of states, then memory, at the start of a
+            run; inputs and tail as the hooks before this one leave them.
+        command_delay: name of the parameter (s) by which the tail's command is late.
+        order: place among the effects of its section, low ones first.
         sample_time: (recorded time array, parameters) -> true time array (measurement).
         measure: (channel arrays by name, parameters) -> channel arrays (measurement).
         time_scale: parameters -> its fastest time constant (s); a physics step must not be longer.
@@ -107,7 +119,10 @@ class Effect:
     parameters: tuple[EffectParameter, ...]
     hooks: Mapping[str, Callable[..., Any]] = field(default_factory=dict)
     states: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    memory: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     initial_states: Callable[..., Any] | None = None
+    command_delay: str | None = None
+    order: int = 0
     sample_time: Callable[..., Any] | None = None
     measure: Callable[..., Any] | None = None
     time_scale: Callable[[Mapping[str, float]], float] | None = None
@@ -127,10 +142,15 @@ class Effect:
             raise EffectError(
                 f"effect {self.name}: no stage {sorted(unknown)}, the stages are {STAGES}"
             )
-        if len(self.states) > 1 or set(self.states) - set(self.hooks):
-            raise EffectError(f"effect {self.name}: states belong to one of its own hooks")
-        if self.states and self.initial_states is None:
-            raise EffectError(f"effect {self.name}: give initial_states for its states")
+        stages = {*self.states, *self.memory}
+        if len(stages) > 1 or stages - set(self.hooks):
+            raise EffectError(
+                f"effect {self.name}: states and memory belong to one of its own hooks"
+            )
+        if stages and self.initial_states is None:
+            raise EffectError(f"effect {self.name}: give initial_states for its states and memory")
+        if self.command_delay not in (None, *self.neutral):
+            raise EffectError(f"effect {self.name}: no parameter '{self.command_delay}'")
 
     @cached_property
     def record_type(self) -> type:
@@ -143,9 +163,19 @@ class Effect:
         return {p.name: p.neutral for p in self.parameters}
 
     @property
+    def acts_on_motion(self) -> bool:
+        """Whether the kernel must contain it; if not, it acts on what is recorded alone."""
+        return bool(self.hooks or self.command_delay)
+
+    @property
     def state_names(self) -> tuple[str, ...]:
         """Names of the states the effect adds."""
         return next(iter(self.states.values()), ())
+
+    @property
+    def memory_names(self) -> tuple[str, ...]:
+        """Names of what it keeps from step to step."""
+        return next(iter(self.memory.values()), ())
 
     def complete(self, values: Mapping[str, float]) -> dict[str, float]:
         """Values for all parameters, neutral where not given.

@@ -9,10 +9,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from fish_env.model.history import COMMAND_FIELDS
 from fish_env.params.packing import CURVES, RECORD_FIELDS
 
 if TYPE_CHECKING:
     from fish_env.model.compose import Composition
+    from fish_env.model.effect import Effect
 
 BASE_TERMS = (
     "gravity",
@@ -52,6 +54,9 @@ from fish_env.model.coefficients import (
     analytic_drag, analytic_lift, analytic_moment, table_drag, table_lift, table_moment,
 )
 from fish_env.model.frames import quaternion_rate, rotation, to_body, to_inertial
+from fish_env.model.history import (
+    COMMAND_FIELDS, TOLD_ROWS, assume_running, late_command, recall, remember, running_command,
+)
 from fish_env.model.hydrostatics import buoyancy_force, gravity_wrench
 from fish_env.model.jit import entry_point, kernel
 from fish_env.model.mass_properties import barycentre, rigid_inertia
@@ -69,7 +74,7 @@ class Emitter:
 
     def __init__(self, composition: Composition) -> None:
         self.composition = composition
-        self.effects = [effect for effect in composition.effects if effect.hooks]
+        self.effects = composition.effects
         self.states = composition.state_names
         self.parameters = composition.parameter_names
         self.coefficients = "table" if composition.tables else "analytic"
@@ -77,10 +82,13 @@ class Emitter:
     def text(self) -> str:
         """All functions of one composition."""
         sizes = (
-            f"N_STATES = {len(self.states)}\nN_PARAMETERS = {len(self.parameters)}\n"
+            f"N_STATES = {len(self.states)}\nN_MEMORY = {len(self.composition.memory_names)}\n"
+            f"N_PARAMETERS = {len(self.parameters)}\n"
             f"N_TERMS = {len(self.composition.term_names)}\n"
+            f"LATE_TAIL = {bool(self.composition.delays)}\n"
         )
-        return "\n".join([sizes, self.derivative(), self.terms(), self.initialise()])
+        functions = (self.derivative(), self.terms(), self.initialise(), self.command())
+        return "\n".join([sizes, *functions])
 
     def function(self, name: str, arguments: str, lines: Sequence[str]) -> str:
         """One kernel from its lines."""
@@ -108,21 +116,56 @@ class Emitter:
         return self.function("lane_terms", arguments, lines)
 
     def initialise(self) -> str:
-        """States of effects at the start of a run."""
-        lines = [*self.unpack(), *self.apply("inputs", "inputs", "time, fish")]
-        lines.append("inputs_at_start = inputs")
+        """States and memory of effects at the start of a run, each behind the hooks before it."""
+        lines = ["elapsed = 0.0", "shift = 0.0", *self.unpack()]
+        lines += self.apply("inputs", "inputs", "time, fish", "commanded_tail(inputs, phase)")
+        lines += self.command_lines("running_command(inputs, phase, late)")
+        lines += self.apply("tail", "tail", "tail_inputs, tail_phase, time, fish", "tail")
         for effect in self.effects:
-            if not effect.state_names:
-                continue
-            names = ", ".join(f"s_{effect.name}_{i}" for i in range(len(effect.state_names)))
-            call = f"{effect.name}_initial(inputs_at_start, phase, fish, e_{effect.name})"
-            lines.append(f"{names}, = {call}")
-            for i, state in enumerate(effect.state_names):
-                row = self.states.index(f"{effect.name}.{state}")
-                lines.append(f"work[(X + {row}) * width + k] = s_{effect.name}_{i}")
-        return self.function(
-            "lane_initialise", "k, width, work", ["elapsed = 0.0", "shift = 0.0", *lines]
-        )
+            if {*effect.states, *effect.memory} - {"inputs", "tail"}:
+                lines += self.start(effect, "tail")
+        return self.function("lane_initialise", "k, width, work", lines)
+
+    def start(self, effect: Effect, tail: str) -> list[str]:
+        """Store where the run starts an effect's states and memory."""
+        call = f"{effect.name}_initial(inputs, {tail}, fish, e_{effect.name})"
+        return [
+            f"begin_{effect.name} = {call}",
+            *(
+                f"work[(X + {row}) * width + k] = begin_{effect.name}[{i}]"
+                for i, row in enumerate(self.rows_of(effect))
+            ),
+        ]
+
+    def command(self) -> str:
+        """What the tail's servo is told at the start of a step, for a command that comes late."""
+        lines = ["shift = 0.0", *self.unpack(), *self.apply("inputs", "inputs", "time, fish")]
+        told = (*(f"inputs.tail_{name}" for name in COMMAND_FIELDS[:-1]), "phase", self.delay())
+        lines += [f"work[(TOLD + {i}) * width + k] = {value}" for i, value in enumerate(told)]
+        return self.function("lane_command", "k, width, elapsed, work", lines)
+
+    def delay(self) -> str:
+        """How late the tail's command is (s)."""
+        return " + ".join(f"e_{name}" for name in self.composition.delays) or "0.0"
+
+    def command_lines(self, recalled: str) -> list[str]:
+        """The commanded tail: of now, or of what was recalled for a lane whose command is late."""
+        if not self.composition.delays:
+            return [
+                "tail_inputs = inputs",
+                "tail_phase = phase",
+                "tail = commanded_tail(tail_inputs, tail_phase)",
+            ]
+        return [
+            f"late = {self.delay()}",
+            f"tail_inputs, tail_phase = {recalled}",
+            "tail = commanded_tail(tail_inputs, tail_phase)",
+        ]
+
+    def rows_of(self, effect: Effect) -> list[int]:
+        """Rows of an effect's states, then of its memory."""
+        names = (*effect.state_names, *effect.memory_names)
+        return [self.states.index(f"{effect.name}.{name}") for name in names]
 
     def unpack(self) -> list[str]:
         """Read parameters, state and inputs of a lane."""
@@ -151,22 +194,35 @@ class Emitter:
         lines.append("inputs = Inputs(u0, u1, u2, u3, u4, u0_rate, u1_rate, u3_rate, u4_rate)")
         return lines
 
-    def apply(self, stage: str, value: str, arguments: str) -> list[str]:
-        """Calls of all hooks of a stage, each replacing ``value``."""
+    def apply(self, stage: str, value: str, arguments: str, tail: str = "") -> list[str]:
+        """Calls of all hooks of a stage, each replacing ``value``.
+
+        With ``tail``, the name of the tail so far, each effect's states are set before its hook.
+        """
         lines = []
         for effect in self.effects:
-            if stage not in effect.hooks:
-                continue
-            call = f"{effect.name}_{stage}({value}, {arguments}, e_{effect.name}"
-            names = effect.states.get(stage, ())
-            if not names:
-                lines.append(f"{value} = {call})")
-                continue
-            rows = [self.states.index(f"{effect.name}.{name}") for name in names]
-            states = "".join(f"work[(X + {row}) * width + k], " for row in rows)
-            slopes = ", ".join(f"d_{effect.name}_{i}" for i in range(len(rows)))
-            lines.append(f"{value}, ({slopes},) = {call}, ({states}))")
+            if stage in effect.hooks:
+                if tail and stage in {*effect.states, *effect.memory}:
+                    lines += self.start(effect, tail)
+                lines.append(self.call(effect, stage, value, f"{value}, {arguments}"))
         return lines
+
+    def call(self, effect: Effect, stage: str, target: str, arguments: str) -> str:
+        """Call of one hook, which also gives the slopes of its states and its new memory."""
+        targets, given = [target], [arguments, f"e_{effect.name}"]
+        rows = [f"work[(X + {row}) * width + k], " for row in self.rows_of(effect)]
+        count = len(effect.state_names)
+        if stage in effect.states:
+            given.append(f"({''.join(rows[:count])})")
+            targets.append(self.names("d", effect, effect.state_names))
+        if stage in effect.memory:
+            given.append(f"({''.join(rows[count:])}), shift")
+            targets.append(self.names("m", effect, effect.memory_names))
+        return f"{', '.join(targets)} = {effect.name}_{stage}({', '.join(given)})"
+
+    def names(self, letter: str, effect: Effect, values: Sequence[str]) -> str:
+        """A tuple of variables of an effect."""
+        return f"({''.join(f'{letter}_{effect.name}_{i}, ' for i in range(len(values)))})"
 
     def has(self, stage: str) -> bool:
         """Whether any effect has a hook for this stage."""
@@ -179,11 +235,12 @@ class Emitter:
 
     def evaluation(self) -> list[str]:
         """Everything up to the wrench terms."""
+        past = ", ".join(f"work[(PAST + {i}) * width + k]" for i in range(len(COMMAND_FIELDS)))
         lines = [
             *self.unpack(),
             *self.apply("inputs", "inputs", "time, fish"),
-            "tail = commanded_tail(inputs, phase)",
-            *self.apply("tail", "tail", "inputs, phase, time, fish"),
+            *self.command_lines(f"late_command(late, inputs, phase, {past})"),
+            *self.apply("tail", "tail", "tail_inputs, tail_phase, time, fish"),
             "centre = barycentre(inputs, fish)",
             *self.apply("barycentre", "centre", "place, inputs, time, fish"),
             "water = Vector(0.0, 0.0, 0.0)",
@@ -199,10 +256,8 @@ class Emitter:
         ]
         for effect in self.effects:
             if "wrench" in effect.hooks:
-                lines.append(
-                    f"t_{effect.name} = {effect.name}_wrench(motion, tail, inputs, centre, fish, "
-                    f"e_{effect.name})"
-                )
+                given = "motion, tail, inputs, centre, fish"
+                lines.append(self.call(effect, "wrench", f"t_{effect.name}", given))
         return lines
 
     def tail_lines(self) -> list[str]:
@@ -226,9 +281,7 @@ class Emitter:
         for effect in self.effects:
             if "tail_force" in effect.hooks:
                 lines.append("before = force")
-                one = Emitter(self.composition)
-                one.effects = [effect]
-                lines += one.apply("tail_force", "force", "motion, tail, fish")
+                lines.append(self.call(effect, "tail_force", "force", "force, motion, tail, fish"))
                 change = ", ".join(f"force.{axis} - before.{axis}" for axis in "xyz")
                 lines.append(f"t_{effect.name} = tail_wrench(arm, Vector({change}), fish)")
         return [*lines, "power = hinge_power(tail, arm, force)"]
@@ -297,7 +350,7 @@ class Emitter:
         ]
 
     def rates(self) -> list[str]:
-        """Store the derivative of every state."""
+        """Store the derivative of every state, and what is remembered as it is at this instant."""
         quaternion = ", ".join(f"work[(X + {i}) * width + k]" for i in range(3, 7))
         values = [
             "drift.x",
@@ -313,6 +366,8 @@ class Emitter:
         ]
         for effect in self.effects:
             values += [f"d_{effect.name}_{i}" for i in range(len(effect.state_names))]
+        for effect in self.effects:
+            values += [f"m_{effect.name}_{i}" for i in range(len(effect.memory_names))]
         return [
             "drift = to_inertial(attitude, velocity)",
             f"spin = quaternion_rate({quaternion}, omega.x, omega.y, omega.z)",

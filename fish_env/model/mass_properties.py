@@ -83,6 +83,22 @@ def with_buoyancy(centre, buoyancy_mass):
 
 
 @kernel
+def with_offset(centre, x, y, z):
+    """The same mass properties with the barycentre displaced (m, body)."""
+    return Barycentre(
+        centre.mass,
+        centre.inverse_mass,
+        centre.buoyancy_mass,
+        centre.x + x,
+        centre.y + y,
+        centre.z + z,
+        centre.jx,
+        centre.jy,
+        centre.jz,
+    )
+
+
+@kernel
 def add_rank_one(inertia, factor, a, b):
     """inertia + factor (a b^T + b a^T) / 2 for two 6-vectors given as wrenches."""
     half = 0.5 * factor

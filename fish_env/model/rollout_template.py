@@ -12,17 +12,22 @@ import numpy as np
 
 # --- completed by compose ---
 from fish_env.model.composed import (  # type: ignore[import-not-found]
+    LATE_TAIL,
+    N_MEMORY,
     N_PARAMETERS,
     N_STATES,
+    lane_command,
     lane_derivative,
     lane_initialise,
     lane_terms,
 )
+from fish_env.model.history import COMMAND_FIELDS, TOLD_ROWS, assume_running, recall, remember
 from fish_env.model.jit import entry_point, kernel
 
 # --- end ---
 
 LANES = 16
+N_SLOPES = N_STATES - N_MEMORY  # rows that are integrated; the others are memory of effects
 X0 = 0
 X = X0 + N_STATES
 DX = X + N_STATES
@@ -32,7 +37,10 @@ U_RATE = U + 5
 U_END = U_RATE + 5
 SLEW = U_END + 5
 TIME = SLEW + 5
-PAR = TIME + 1
+BEGIN = TIME + 1  # time at which a step begins (s), then the tail's command (see model.history)
+TOLD = BEGIN + LATE_TAIL
+PAST = TOLD + LATE_TAIL * TOLD_ROWS
+PAR = PAST + LATE_TAIL * len(COMMAND_FIELDS)
 WORK_ROWS = PAR + N_PARAMETERS
 LARGEST = 1e4  # a state beyond this many SI units has diverged
 
@@ -76,26 +84,42 @@ def plan_actuators(work, width, commands, slot, first, count, h):
 
 
 @kernel
-def rk4_step(work, width, elapsed, h, tables):
-    """One classical Runge-Kutta step of every lane: X0 -> X."""
+def tell_tail(work, width, elapsed, history, first, count):
+    """Remember what each tail is told in the step that begins now."""
+    for k in range(width):
+        work[BEGIN * width + k] = work[TIME * width + k] + elapsed
+        lane_command(k, width, elapsed, work)
+    remember(work, width, TOLD, BEGIN, history, first, count)
+
+
+@kernel
+def rk4_step(work, width, elapsed, h, tables, late, history, first, count):
+    """One classical Runge-Kutta step of every lane: X0 -> X. Memory takes its value at the end."""
     for n in range(N_STATES * width):
         work[X * width + n] = work[X0 * width + n]
+    for n in range(N_SLOPES * width):
         work[SUM * width + n] = 0.0
+    if late:
+        tell_tail(work, width, elapsed, history, first, count)
     for stage in range(4):
         fraction = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
         weight = 1.0 if (stage == 0) | (stage == 3) else 2.0
         ahead = 0.5 * h if stage < 2 else h
+        if late:
+            recall(work, width, TOLD, PAST, BEGIN, fraction * h, h, history, first, count)
         for k in range(width):
             lane_derivative(k, width, elapsed, fraction * h, work, tables)
         if stage < 3:
-            for n in range(N_STATES * width):
+            for n in range(N_SLOPES * width):
                 slope = work[DX * width + n]
                 work[SUM * width + n] += weight * slope
                 work[X * width + n] = work[X0 * width + n] + ahead * slope
         else:
-            for n in range(N_STATES * width):
+            for n in range(N_SLOPES * width):
                 total = work[SUM * width + n] + work[DX * width + n]
                 work[X * width + n] = work[X0 * width + n] + (h / 6.0) * total
+    for n in range(N_SLOPES * width, N_STATES * width):
+        work[X * width + n] = work[DX * width + n]
 
 
 @kernel
@@ -110,7 +134,8 @@ def accept_step(work, width, elapsed, failed_at, first, count):
         size = 0.0
         for j in range(N_STATES):
             value = work[(X + j) * width + k]
-            size += abs(value) if (j < 13) | (j >= 18) else 0.0 * value
+            bounded = (j < 13) | ((j >= 18) & (j < N_SLOPES))
+            size += abs(value) if bounded else 0.0 * value
         lane = first + (k if k < count else count - 1)
         good = (size < LARGEST) & (failed_at[lane] == np.inf)
         for j in range(N_STATES):
@@ -127,7 +152,7 @@ def accept_step(work, width, elapsed, failed_at, first, count):
 @kernel
 def advance_block(
     width, state, inputs, par, slew, time, commands, slots, starts, steps, sizes, every, trace_row,
-    trace_at, trace, failed_at, tables, first, count,
+    trace_at, trace, failed_at, history, tables, first, count,
 ):  # fmt: skip
     """Advance lanes first..first+count through all segments (see :func:`advance_lanes`)."""
     work = np.empty(WORK_ROWS * width)
@@ -137,13 +162,14 @@ def advance_block(
     gather(work, width, PAR, par, first, count)
     for k in range(width):
         work[TIME * width + k] = time[first + (k if k < count else count - 1)]
+    late = LATE_TAIL & (history.shape[0] > 0)
     stored = trace_at
     for segment in range(steps.shape[0]):
         h = sizes[segment]
         for i in range(steps[segment]):
             elapsed = starts[segment] + i * h
             plan_actuators(work, width, commands, slots[segment], first, count, h)
-            rk4_step(work, width, elapsed, h, tables)
+            rk4_step(work, width, elapsed, h, tables, late, history, first, count)
             accept_step(work, width, elapsed + h, failed_at, first, count)
             if (trace.shape[0] > 0) & ((i + 1) % every[segment] == 0):
                 sample = stored % trace.shape[0]
@@ -158,7 +184,7 @@ def advance_block(
 @entry_point
 def advance_lanes(
     state, inputs, par, slew, time, commands, slots, starts, steps, sizes, every, trace_row,
-    trace_at, trace, failed_at, tables, first, last,
+    trace_at, trace, failed_at, history, tables, first, last,
 ):  # fmt: skip
     """Advance fish first..last in place, sixteen at a time.
 
@@ -178,6 +204,8 @@ def advance_lanes(
         trace_at: slot of the first stored sample; slots wrap around.
         trace: (slots, rows, N) stored samples; no slots = nothing is stored.
         failed_at: (N,) time at which a fish diverged (s), infinite where none did.
+        history: (rows, N) what tails were told (see :mod:`fish_env.model.history`), in place; no
+            rows = no tail's command is late.
         tables: packed coefficient curves.
         first: first fish.
         last: one past the last fish.
@@ -185,26 +213,39 @@ def advance_lanes(
     for block in range(first, last, LANES):
         advance_block(
             LANES, state, inputs, par, slew, time, commands, slots, starts, steps, sizes, every,
-            trace_row, trace_at, trace, failed_at, tables, block, min(LANES, last - block),
+            trace_row, trace_at, trace, failed_at, history, tables, block, min(LANES, last - block),
         )  # fmt: skip
 
 
 @entry_point
 def advance_one(
     state, inputs, par, slew, time, commands, slots, starts, steps, sizes, every, trace_row,
-    trace_at, trace, failed_at, tables, first, last,
+    trace_at, trace, failed_at, history, tables, first, last,
 ):  # fmt: skip
     """As :func:`advance_lanes`, one fish at a time: for a single fish."""
     for lane in range(first, last):
         advance_block(
             1, state, inputs, par, slew, time, commands, slots, starts, steps, sizes, every,
-            trace_row, trace_at, trace, failed_at, tables, lane, 1,
+            trace_row, trace_at, trace, failed_at, history, tables, lane, 1,
         )  # fmt: skip
+
+
+@kernel
+def presume_told(work, width):
+    """Presume that tails whose command is late were always told what they are told now."""
+    if LATE_TAIL:
+        for k in range(width):
+            lane_command(k, width, 0.0, work)
+        assume_running(work, width, TOLD, PAST)
 
 
 @entry_point
 def derivative_batch(work, width, tables):
-    """Fill the derivative rows of a work array of ``width`` fish, in place."""
+    """Fill the derivative rows of a work array of ``width`` fish, in place.
+
+    The state does not say what a late tail was told: it is taken to have been told the same.
+    """
+    presume_told(work, width)
     for k in range(width):
         lane_derivative(k, width, 0.0, 0.0, work, tables)
 
@@ -215,6 +256,7 @@ def terms_batch(work, width, terms, outputs, tables):
 
     ``outputs``, (len(OUTPUTS), N), takes the quantities that compose lists as OUTPUTS.
     """
+    presume_told(work, width)
     for k in range(width):
         lane_terms(k, width, 0.0, 0.0, work, tables, terms, outputs)
 

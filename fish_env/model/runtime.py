@@ -18,6 +18,7 @@ import numpy.typing as npt
 from fish_env.model import compose
 from fish_env.model.compose import Composition
 from fish_env.model.emit import OUTPUTS
+from fish_env.model.history import history_rows_on
 
 FloatArray = npt.NDArray[np.float64]
 NO_TRACE = np.zeros((0, 0, 0))
@@ -106,20 +107,33 @@ class Kernels:
         trace_row: int = 0,
         trace_at: int = 0,
         threads: int | None = None,
+        history: FloatArray | None = None,
     ) -> None:
-        """Advance all fish in place; arguments as in ``rollout_template.advance_lanes``."""
+        """Advance all fish in place; arguments as in ``rollout_template.advance_lanes``.
+
+        Without ``history``, what tails were told is remembered within this call alone: before it,
+        each is taken to have been told the first command all along. Pass an array of zeros of
+        ``history_rows`` rows to carry it from call to call.
+        """
         count = state.shape[1]
+        if history is None:
+            history = np.zeros((history_rows_on(grid, self.longest_delay(par)), count))
         name = "advance_one" if count == 1 else "advance_lanes"
         function = self.entry(name)
 
         def task(first: int, last: int) -> int:
             function(
                 state, inputs, par, slew, time, commands, *grid, trace_row, trace_at, trace,
-                failed_at, tables, first, last,
+                failed_at, history, tables, first, last,
             )  # fmt: skip
             return 0
 
         run_in_threads(task, count, self.lanes, threads or default_threads())
+
+    def longest_delay(self, par: FloatArray) -> float:
+        """How late the latest tail command of these records (parameters, N) is (s)."""
+        rows = [self.parameter_names.index(name) for name in self.composition.delays]
+        return float(np.max(par[rows].sum(axis=0), initial=0.0))
 
     def derivative(
         self,
@@ -130,10 +144,15 @@ class Kernels:
         time: FloatArray,
         tables: FloatArray,
     ) -> FloatArray:
-        """d(state)/dt, shape (states, N), at actuator positions and rates (5, N)."""
+        """d(state)/dt, shape (states, N), at actuator positions and rates (5, N).
+
+        Rows of memory, which is not integrated, are zero.
+        """
         work = self._work(state, inputs, rates, par, time)
         self.entry("derivative_batch")(work, state.shape[1], tables)
-        return self._rows(work, self.module.DX, state.shape[1])
+        slopes = self._rows(work, self.module.DX, state.shape[1])
+        slopes[self.module.N_SLOPES :] = 0.0
+        return slopes
 
     def terms(
         self,

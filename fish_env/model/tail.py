@@ -7,6 +7,8 @@ from fish_env.model.records import Tail, Vector, Wrench
 from fish_env.model.trigonometry import sincos
 
 TWO_PI = 6.283185307179586
+SETTLING_TIME = 0.02
+"""s. A jump of the tail's rate reaches the water's inertia over about this time."""
 
 
 @kernel
@@ -81,3 +83,18 @@ def hinge_power(tail, arm, force):
     moment = arm.x * force.y - arm.y * force.x
     power = -moment * tail.rate
     return power if power > 0.0 else 0.0
+
+
+@kernel
+def spread_jumps(tail, settled_rate):
+    """The tail with an acceleration that integrates to its rate even where that rate jumps.
+
+    d(settled)/dt = acceleration + (rate - settled) / SETTLING_TIME. Where the rate is smooth and
+    the acceleration is its derivative, settled = rate and nothing changes; a jump is made up for
+    within some SETTLING_TIME, so that the water's inertia receives its whole impulse.
+
+    Returns:
+        The tail, and d(settled)/dt (rad/s^2), which is its acceleration.
+    """
+    slope = tail.acceleration + (tail.rate - settled_rate) * (1.0 / SETTLING_TIME)
+    return Tail(tail.angle, tail.rate, slope), slope

@@ -1,0 +1,29 @@
+"""Battery sag: the tail beats ever more slowly as the battery empties."""
+
+from __future__ import annotations
+
+from fish_env.model.effect import Effect, EffectParameter
+from fish_env.model.inputs import with_tail_frequency
+from fish_env.model.jit import kernel
+
+
+@kernel
+def slow_down(inputs, time, fish, e):
+    """f1 -> f1 (1 - rate t), t since the run's start (s); never below zero."""
+    return with_tail_frequency(inputs, max(1.0 - e.rate * time, 0.0) * inputs.tail_frequency)
+
+
+EFFECT = Effect(
+    name="battery_sag",
+    section="actuation",
+    summary="The same command beats more slowly late in a run than early.",
+    equation="f1 -> f1 (1 - rate t), t since the run's start, f1 >= 0",
+    source="Speed of a d.c. motor under load follows its voltage, which falls with the charge used",
+    parameters=(
+        EffectParameter(
+            "rate", "1/s", 0.0, -0.01, 0.1, (0.0002, 0.005), "share of f1 lost a second"
+        ),
+    ),
+    hooks={"inputs": slow_down},
+    confusable_with=("clock_scale", "frequency_scale"),
+)

@@ -1,0 +1,40 @@
+"""Centre-of-mass offset: the ballast is not where the drawing has it."""
+
+from __future__ import annotations
+
+from fish_env.model.effect import Effect, EffectParameter
+from fish_env.model.jit import kernel
+from fish_env.model.mass_properties import with_offset
+
+
+@kernel
+def move_barycentre(centre, place, inputs, time, fish, e):
+    """C_m + (x, y, z); the inertia about O_b stays."""
+    return with_offset(centre, e.x, e.y, e.z)
+
+
+def _component(axis: str, way: str) -> EffectParameter:
+    text = f"displacement of the barycentre {way}"
+    return EffectParameter(axis, "m", 0.0, -0.02, 0.02, (-0.001, 0.001), text)
+
+
+EFFECT = Effect(
+    name="com_offset",
+    section="hydrostatics",
+    summary="The fish does not hang level: it pitches or rolls at rest; its path climbs or bends.",
+    equation="C_m -> C_m + (x, y, z)",
+    source="Statics: tan(pitch at rest) = -x / z of the barycentre",
+    parameters=(
+        _component("x", "forward"),
+        _component("y", "to starboard"),
+        _component("z", "down"),
+    ),
+    hooks={"barycentre": move_barycentre},
+    confusable_with=(
+        "attitude_misalignment",
+        "block_scale",
+        "buoyancy_offset",
+        "tail_asymmetry",
+        "tail_bias",
+    ),
+)

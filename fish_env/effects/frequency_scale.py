@@ -1,0 +1,27 @@
+"""Frequency scale: the tail beats faster or slower than commanded."""
+
+from __future__ import annotations
+
+from fish_env.model.effect import Effect, EffectParameter
+from fish_env.model.inputs import with_tail_frequency
+from fish_env.model.jit import kernel
+
+
+@kernel
+def scale_frequency(inputs, time, fish, e):
+    """f1 -> scale f1."""
+    return with_tail_frequency(inputs, e.scale * inputs.tail_frequency)
+
+
+EFFECT = Effect(
+    name="frequency_scale",
+    section="actuation",
+    summary="The tail beats at another frequency than commanded, always by the same factor.",
+    equation="f1 -> scale f1",
+    source="Rate error of the clock that generates the stroke",
+    parameters=(
+        EffectParameter("scale", "-", 1.0, 0.2, 3.0, (0.9, 1.05), "beat over commanded beat"),
+    ),
+    hooks={"inputs": scale_frequency},
+    confusable_with=("battery_sag", "clock_scale", "tail_gain"),
+)

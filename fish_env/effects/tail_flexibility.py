@@ -1,0 +1,58 @@
+"""Tail flexibility: the tail follows its root as a damped second-order system."""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+
+from fish_env.model.effect import Effect, EffectParameter
+from fish_env.model.jit import kernel
+from fish_env.model.records import Tail
+from fish_env.model.tail import TWO_PI
+
+
+@kernel
+def bend(tail, inputs, phase, time, fish, e, states):
+    """d2(xi)/dt2 = w^2 (cmd - xi) - 2 zeta w d(xi)/dt, w = 2 pi natural_frequency."""
+    angle, rate = states
+    on = e.natural_frequency < inf
+    omega = TWO_PI * (e.natural_frequency if on else 1.0)
+    acceleration = omega * (omega * (tail.angle - angle) - 2.0 * e.damping_ratio * rate)
+    seen = Tail(
+        angle if on else tail.angle,
+        rate if on else tail.rate,
+        acceleration if on else tail.acceleration,
+    )
+    return seen, (rate if on else 0.0, acceleration if on else 0.0)
+
+
+@kernel
+def start_straight(inputs, tail, fish, e):
+    """The run starts with the tail unbent, moving with its root."""
+    return tail.angle, tail.rate
+
+
+def fastest(values):
+    """Inverse of the larger eigenvalue; infinite when the effect is off."""
+    if values["natural_frequency"] == inf:
+        return inf
+    zeta = max(values["damping_ratio"], 1.0)
+    return 1.0 / (TWO_PI * values["natural_frequency"] * (zeta + sqrt(zeta * zeta - 1.0)))
+
+
+EFFECT = Effect(
+    name="tail_flexibility",
+    section="actuation",
+    summary="A soft tail: it swings further near its resonance and trails beyond it.",
+    equation="xi'' + 2 damping_ratio w xi' + w^2 xi = w^2 cmd, w = 2 pi natural_frequency",
+    source="Pseudo-rigid-body model, Howell, Compliant Mechanisms, chapter 5",
+    parameters=(
+        EffectParameter("natural_frequency", "Hz", inf, 0.1, inf, (2.0, 8.0), "in water, undamped"),
+        EffectParameter("damping_ratio", "-", 1.0, 0.05, 5.0, (0.2, 1.2), "1 is critical"),
+    ),
+    hooks={"tail": bend},
+    states={"tail": ("angle", "rate")},
+    initial_states=start_straight,
+    time_scale=fastest,
+    order=7,
+    confusable_with=("servo_delay", "servo_lag", "tail_gain", "tail_reactive", "wake_memory"),
+)

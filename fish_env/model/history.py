@@ -1,0 +1,169 @@
+"""What the tail's servo was told a while ago, for commands that reach it late.
+
+A *told* command is (offset, amplitude, frequency, rate of the offset, rate of the amplitude,
+phase). It is constant in a physics step but for its rates, so that remembering it at the start
+of every step recalls any instant between exactly.
+
+A history is an array of shape (1 + slots * RECORD, N): row 0 counts the steps remembered, then
+come the slots, used in turn, each with the time (s) at which its step began and what was told.
+Before its first step a fish is taken to have been told the same all along.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from fish_env.model.inputs import with_tail_command
+from fish_env.model.jit import kernel
+
+if TYPE_CHECKING:
+    from fish_env.model.runtime import Grid
+
+COMMAND_FIELDS = ("offset", "amplitude", "frequency", "offset_rate", "amplitude_rate", "phase")
+TOLD_ROWS = len(COMMAND_FIELDS) + 1
+"""Rows of the work array for what is told now, the last one being how late it arrives (s)."""
+RECORD = len(COMMAND_FIELDS) + 1
+
+FloatArray = npt.NDArray[np.float64]
+_TWO_PI = 6.283185307179586
+_ROUNDING = 1e-9  # s; times closer than this are one
+
+
+@kernel
+def remember(work, width, told, start, history, first, count):
+    """Append what fish first..first+count are told in the step that begins at ``work[start]``."""
+    slots = (history.shape[0] - 1) // RECORD
+    for k in range(count):
+        steps = history[0, first + k]
+        row = 1 + RECORD * (int(steps) % slots)
+        history[row, first + k] = work[start * width + k]
+        for i in range(RECORD - 1):
+            history[row + 1 + i, first + k] = work[(told + i) * width + k]
+        history[0, first + k] = steps + 1.0
+
+
+@kernel
+def recall(work, width, told, past, start, shift, h, history, first, count):
+    """Set the ``past`` rows to what each fish was told its delay ago, ``shift`` into a step of h.
+
+    Where that is the very moment at which a command changed, the beginning of a step sees the
+    new command and its end the old one, as for commands that act at once.
+    """
+    slots = (history.shape[0] - 1) // RECORD
+    edge = _ROUNDING if shift == 0.0 else -_ROUNDING
+    for k in range(width):
+        lane = first + (k if k < count else count - 1)
+        late = work[(told + RECORD - 1) * width + k]
+        time = work[start * width + k] + shift - late
+        newest = int(history[0, lane]) - 1
+        oldest = max(0, newest + 1 - slots)
+        step = max(oldest, newest - int(min(late / h, float(slots))))
+        while (step > oldest) & (history[1 + RECORD * (step % slots), lane] > time + edge):
+            step -= 1
+        while step < newest and history[1 + RECORD * ((step + 1) % slots), lane] <= time + edge:
+            step += 1
+        row = 1 + RECORD * (step % slots)
+        since = time - history[row, lane]
+        moving = 0.0 if since < -_ROUNDING else 1.0
+        offset_rate = moving * history[row + 4, lane]
+        amplitude_rate = moving * history[row + 5, lane]
+        frequency = history[row + 3, lane]
+        work[past * width + k] = history[row + 1, lane] + since * offset_rate
+        work[(past + 1) * width + k] = history[row + 2, lane] + since * amplitude_rate
+        work[(past + 2) * width + k] = frequency
+        work[(past + 3) * width + k] = offset_rate
+        work[(past + 4) * width + k] = amplitude_rate
+        work[(past + 5) * width + k] = history[row + 6, lane] + _TWO_PI * frequency * since
+
+
+@kernel
+def assume_running(work, width, told, past):
+    """Set the ``past`` rows as if every fish had always been told what it is told now."""
+    for k in range(width):
+        late = work[(told + RECORD - 1) * width + k]
+        frequency = work[(told + 2) * width + k]
+        for i in range(3):
+            work[(past + i) * width + k] = work[(told + i) * width + k]
+        work[(past + 3) * width + k] = 0.0
+        work[(past + 4) * width + k] = 0.0
+        work[(past + 5) * width + k] = work[(told + 5) * width + k] - _TWO_PI * frequency * late
+
+
+@kernel
+def late_command(
+    late, inputs, phase, offset, amplitude, frequency, offset_rate, amplitude_rate, past_phase
+):  # fmt: skip
+    """Inputs and phase that reach the tail: those recalled if they come late, else those of now."""
+    on = late > 0.0
+    heard = with_tail_command(
+        inputs,
+        offset if on else inputs.tail_offset,
+        amplitude if on else inputs.tail_amplitude,
+        frequency if on else inputs.tail_frequency,
+        offset_rate if on else inputs.tail_offset_rate,
+        amplitude_rate if on else inputs.tail_amplitude_rate,
+    )
+    return heard, past_phase if on else phase
+
+
+@kernel
+def running_command(inputs, phase, late):
+    """Inputs and phase that reach the tail when the present command has been running all along."""
+    heard = with_tail_command(
+        inputs, inputs.tail_offset, inputs.tail_amplitude, inputs.tail_frequency, 0.0, 0.0
+    )
+    return heard, phase - _TWO_PI * inputs.tail_frequency * late
+
+
+def history_rows(longest_delay: float, shortest_step: float) -> int:
+    """Rows of a history that reaches back far enough for steps of this size or longer (s)."""
+    if longest_delay <= 0.0:
+        return 0
+    return 1 + RECORD * (int(np.ceil(longest_delay / shortest_step)) + 2)
+
+
+def history_rows_on(grid: Grid, longest_delay: float) -> int:
+    """Rows of a history that reaches back far enough on this grid, with room for no more."""
+    if longest_delay <= 0.0:
+        return 0
+    counts: npt.NDArray[np.int64] = grid.steps
+    index = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    begins = np.repeat(grid.starts, counts) + index * np.repeat(grid.sizes, counts)
+    reached = np.searchsorted(begins, begins - longest_delay - 2 * _ROUNDING)
+    return 1 + RECORD * (int(np.max(np.arange(begins.size) - reached)) + 3)
+
+
+def forget(history: FloatArray, lanes: npt.NDArray[np.int64], rows: int) -> FloatArray:
+    """Let fish begin anew, as told nothing yet.
+
+    Args:
+        history: (rows, N), changed in place if it is long enough.
+        lanes: (k,) which fish.
+        rows: how many rows they need.
+
+    Returns:
+        The history, or a longer one that holds what the other fish were told.
+    """
+    if rows > len(history):
+        history = _lengthened(history, rows)
+    if len(history):
+        history[0, lanes] = 0.0
+    return history
+
+
+def _lengthened(history: FloatArray, rows: int) -> FloatArray:
+    longer = np.zeros((rows, history.shape[1]))
+    if not len(history):
+        return longer
+    longer[0] = history[0]
+    slots, more = (len(history) - 1) // RECORD, (rows - 1) // RECORD
+    for age in range(1, slots + 1):
+        step = history[0].astype(int) - age
+        lanes = np.flatnonzero(step >= 0)
+        for i in range(1, RECORD + 1):
+            told = history[RECORD * (step[lanes] % slots) + i, lanes]
+            longer[RECORD * (step[lanes] % more) + i, lanes] = told
+    return longer

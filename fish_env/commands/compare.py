@@ -52,7 +52,9 @@ def compare_dataset(
     print_comparison(console, comparison, every_run)
     if json_file is not None:
         json_file.parent.mkdir(parents=True, exist_ok=True)
-        json_file.write_text(json.dumps(comparison.as_dict(), indent=1, allow_nan=False) + "\n")
+        json_file.write_text(
+            json.dumps(comparison.as_dict(), indent=1, allow_nan=False) + "\n", encoding="utf-8"
+        )
         console.print(f"numbers: {json_file}", soft_wrap=True)
     if out is not None:
         draw(console, comparison, out)

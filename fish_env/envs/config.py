@@ -84,14 +84,14 @@ class EnvConfig:
 
 @cache
 def _default_tree() -> dict[str, Any]:
-    return dict(yaml.safe_load((config_root() / "env" / DEFAULT_NAME).read_text()))
+    return dict(yaml.safe_load((config_root() / "env" / DEFAULT_NAME).read_text(encoding="utf-8")))
 
 
 def _read(path: Path) -> Mapping[str, Any]:
     if not path.is_file():
         raise ConfigError(f"{path}: no such file; give the path of a YAML file")
     try:
-        tree = yaml.safe_load(path.read_text())
+        tree = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise ConfigError(f"{path}: not readable as YAML: {error}") from error
     if not isinstance(tree, Mapping):

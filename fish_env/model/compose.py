@@ -84,7 +84,7 @@ class Composition:
 
     def source(self) -> str:
         """The composed module as text."""
-        texts = [path.read_text() for path in self.templates]
+        texts = [path.read_text(encoding="utf-8") for path in self.templates]
         bodies = [text[text.index(_END) :] for text in texts]
         imports = [_kept_imports(text) for text in texts]
         return "\n".join([HEADER, *imports, Emitter(self).text(), *bodies])
@@ -104,7 +104,7 @@ def load(composition: Composition) -> ModuleType:
     if not path.exists():
         folder.mkdir(parents=True, exist_ok=True)
         temporary = path.with_suffix(f".{os.getpid()}-{id(composition)}.tmp")
-        temporary.write_text(composition.source())
+        temporary.write_text(composition.source(), encoding="utf-8")
         temporary.replace(path)
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None and spec.loader is not None

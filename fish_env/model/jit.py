@@ -47,7 +47,12 @@ def cache_root() -> Path:
         return Path(named)
     base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
     root = Path(base) / "robofish"
-    return root if _writable(root) else Path(tempfile.gettempdir()) / f"robofish-{os.getuid()}"
+    return root if _writable(root) else Path(tempfile.gettempdir()) / f"robofish-{_user()}"
+
+
+def _user() -> str:
+    """Tells users of a shared folder apart; on Windows that folder is each user's own."""
+    return str(os.getuid()) if hasattr(os, "getuid") else "user"
 
 
 def _writable(folder: Path) -> bool:

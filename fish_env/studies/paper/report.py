@@ -113,5 +113,7 @@ def write_report(study: Study, folder: Path) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     words, numbers = folder / "statements.md", folder / "paper.json"
     words.write_text(statements_markdown(study), encoding="utf-8")
-    numbers.write_text(json.dumps(study_json(study), indent=1, allow_nan=False) + "\n")
+    numbers.write_text(
+        json.dumps(study_json(study), indent=1, allow_nan=False) + "\n", encoding="utf-8"
+    )
     return [words, numbers]

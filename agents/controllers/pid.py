@@ -83,7 +83,7 @@ class PIDController:
                 0.0,
             ]
         )
-        return np.clip(action, -1.0, 1.0).astype(np.float32)
+        return np.asarray(np.clip(action, -1.0, 1.0), np.float32)
 
     def _block_displacement(self, obs: npt.NDArray[np.float64]) -> float:
         gains = self.gains

@@ -86,7 +86,7 @@ class ExtendedModel:
         return record
 
     def _effect_values(self) -> dict[str, float]:
-        values = {}
+        values: dict[str, float] = {}
         for effect in self.declared:
             complete = self.effects.get(effect.name, effect.neutral)
             values |= {f"{effect.name}.{name}": complete[name] for name in effect.neutral}

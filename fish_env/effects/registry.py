@@ -9,6 +9,7 @@ import importlib
 import importlib.util
 import pkgutil
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -80,7 +81,7 @@ def _restore(name: str, file: Path | None) -> Effect:
     return get_effect(name) if file is None else load_effect_file(file)
 
 
-def _reduce(effect: Effect) -> tuple[object, tuple[str, Path | None]]:
+def _reduce(effect: Effect) -> tuple[Callable[..., Effect], tuple[str, Path | None]]:
     return _restore, (effect.name, effect.file)
 
 

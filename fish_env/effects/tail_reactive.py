@@ -54,7 +54,10 @@ def dot(a, b):
 
 @kernel
 def reactive_inertia(inertia, tail, fish, e):
-    """m [L e0 e0^T + L^2/2 (e0 e1^T + e1 e0^T) + L^3/3 e1 e1^T]; e0 = [n, root x n], e1 = [0, -z]."""
+    """m [L e0 e0^T + L^2/2 (e0 e1^T + e1 e0^T) + L^3/3 e1 e1^T].
+
+    e0 = [n, root x n], e1 = [0, -z].
+    """
     s = strip(tail, fish, e)
     length = s.length
     e0 = Wrench(s.normal.x, s.normal.y, 0.0, s.lever.x, s.lever.y, s.lever.z)

@@ -19,7 +19,7 @@ from fish_env.model.state import INTEGRAL_ROW
 from fish_env.model.trigonometry import sincos
 
 # --- completed by compose ---
-from fish_env.model.composed import (  # type: ignore[import-not-found]
+from fish_env.model.composed import (
     LANES,
     N_PARAMETERS,
     N_STATES,

@@ -107,7 +107,8 @@ def load(composition: Composition) -> ModuleType:
         temporary.write_text(composition.source(), encoding="utf-8")
         temporary.replace(path)
     spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     for effect in composition.effects:
         _inject(module, effect)

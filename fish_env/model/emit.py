@@ -41,7 +41,7 @@ OUTPUTS = {
     "heave_through_water": "motion.w",
 }
 """Quantities reported beside the wrenches (rad, rad/s, W, m, m/s) and what they are called here."""
-HEADER = '''"""Composed physics (generated; edit the sources in fish_env/model and fish_env/effects)."""
+HEADER = '''"""Composed physics, generated: edit the sources in fish_env/model and effects."""
 import math
 
 import numpy as np

@@ -18,7 +18,7 @@ import numba
 F = TypeVar("F", bound=Callable[..., Any])
 
 # IEEE semantics on purpose (no fastmath): one lane or sixteen then give the same bits.
-_COMMON = {"error_model": "numpy", "nogil": True}
+_COMMON: dict[str, Any] = {"error_model": "numpy", "nogil": True}
 
 
 def kernel(function: F) -> F:
@@ -27,12 +27,14 @@ def kernel(function: F) -> F:
     Kernels take and return floats, arrays and named tuples of floats: no random numbers, no I/O,
     no exceptions. Effects written by users carry the same decorator.
     """
-    return numba.njit(forceinline=True, **_COMMON)(function)
+    compile_: Callable[[F], F] = numba.njit(forceinline=True, **_COMMON)
+    return compile_(function)
 
 
 def entry_point(function: F) -> F:
     """Compile a function that Python calls; its machine code is kept on disk."""
-    return numba.njit(cache=True, **_COMMON)(function)
+    compile_: Callable[[F], F] = numba.njit(cache=True, **_COMMON)
+    return compile_(function)
 
 
 def py_function(function: Callable[..., Any]) -> Callable[..., Any]:

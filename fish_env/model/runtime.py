@@ -19,6 +19,7 @@ from fish_env.model import compose
 from fish_env.model.compose import Composition
 from fish_env.model.emit import OUTPUTS
 from fish_env.model.history import history_rows_on
+from fish_env.model.state import BASE_STATES
 
 FloatArray = npt.NDArray[np.float64]
 NO_TRACE = np.zeros((0, 0, 0))
@@ -187,7 +188,7 @@ class Kernels:
         self, state: FloatArray, inputs: FloatArray, par: FloatArray, time: FloatArray
     ) -> None:
         """Set the effect states where the start of a run leaves them, in place."""
-        if len(self.state_names) == len(compose.BASE_STATES):
+        if len(self.state_names) == len(BASE_STATES):
             return
         work = self._work(state, inputs, np.zeros_like(inputs), par, time)
         self.entry("initialise_batch")(work, state.shape[1])
@@ -222,7 +223,7 @@ class Kernels:
 
 def announce_compilation(function: Any, file: Path, name: str) -> None:
     """Tell the user, once for a machine, that a kernel is being compiled."""
-    if getattr(function, "signatures", True) or numba.config.DISABLE_JIT:
+    if getattr(function, "signatures", True) or numba.config.DISABLE_JIT:  # type: ignore[attr-defined]
         return
     marker = file.with_suffix(f".{name}.compiled")
     if marker.exists():

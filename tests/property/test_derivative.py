@@ -8,7 +8,6 @@ from fish_env.simulator import Simulator
 from tests import reference_model
 from tests.physics.cases import random_inputs, random_states, random_values, swimmer
 
-
 # Next to 90 degrees the reference's arcsin loses digits, so no motion is next to nothing.
 factor = st.just(0.0) | st.floats(0.05, 10.0)
 

@@ -48,7 +48,10 @@ class Randomization:
     def draw(self, uniforms: FloatArray) -> dict[str, FloatArray]:
         """Parameter values from uniform numbers (n, N): path -> (N,)."""
         edge = ndtr(TRUNCATE)
-        normal = self.factor @ ndtri((1.0 - edge) + (2.0 * edge - 1.0) * uniforms)
+        single = ndtri((1.0 - edge) + (2.0 * edge - 1.0) * uniforms)
+        # Fish by fish: a product of matrices may round otherwise than one of a single fish.
+        columns = np.ascontiguousarray(single.T)
+        normal = np.stack([self.factor @ column for column in columns], axis=1)
         first, second = self.first[:, None], self.second[:, None]
         values = np.where(
             self.uniform[:, None], first + (second - first) * uniforms, first + second * normal

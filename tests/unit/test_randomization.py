@@ -94,6 +94,26 @@ def test_the_fish_of_a_batch_differ():
     assert np.all(infos[f"parameter/{MASS}"][~mask] == 0)
 
 
+@pytest.mark.parametrize("spec", ["prior", "posterior"])
+def test_a_fish_draws_alike_alone_and_in_a_batch(spec):
+    """Correlated draws too, to the last bit, whatever the size of the batch."""
+    fish = load_fish("zheng-2021-a")
+    names = tuple(path for path in fish.values() if fish.prior_sd(path) > 0)
+    mixing = np.random.default_rng(1).normal(size=(len(names), len(names)))
+    sd = np.array([fish.prior_sd(path) for path in names]) / np.linalg.norm(mixing, axis=1)
+    mixing *= sd[:, None]
+    mean = np.array([fish.get(path) for path in names])
+    posterior = Posterior(names, mean, mixing @ mixing.T, {})
+    random = env_options(
+        fish=dataclasses.replace(fish, posterior=posterior), randomization=spec
+    ).random
+    uniforms = np.random.default_rng(0).random((len(names), 37))
+    together = random.draw(uniforms)
+    for lane in range(37):
+        alone = random.draw(uniforms[:, [lane]])
+        assert all(alone[path][0] == together[path][lane] for path in names)
+
+
 def test_randomised_effects_need_not_be_switched_on():
     """Naming an effect's parameter brings its kernel in."""
     env = RoboticFish3DEnv(randomization={"effects.current.north": [-0.1, 0.1]})

@@ -92,7 +92,8 @@ class RoboticFish3DEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]
 
     Errors are goal minus measured. The tail swings the heading by some degrees in every stroke, so
     the heading error that counts is that of the mean heading vector over the last tail beat (at
-    most 1.5 s); the instantaneous one stands beside it.
+    most 1.5 s); the instantaneous one stands beside it. Before an episode's start the fish counts
+    as having kept its first heading and speed.
 
     ## Reward
 
@@ -143,7 +144,8 @@ class RoboticFish3DEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]
         cruise_speed: goal speed (m/s) or range; default 0.10, 0 is allowed.
         effects: effects to switch on: name -> parameters (fish_env.effects).
         current: steady flow towards (north, east, down) (m/s).
-        wave: parameters of the wave effect: ``amplitude`` (m/s), ``frequency`` (Hz), ...
+        wave: parameters of the wave effect: ``amplitude`` (m/s), ``frequency`` (Hz), ``decay``
+            (1/m), and ``phase`` (rad) at the start of each episode.
         observation_noise: standard deviations (SI) for ``depth``, ``depth_rate``, ``attitude``,
             ``heading``, ``velocity``, ``rates``, or single sensors.
         observation_delay_s: age of what the sensors show (s); commands are known at once.

@@ -36,7 +36,8 @@ class RoboticFish3DVectorEnv(VectorEnv[Float32Array, Float32Array, npt.NDArray[A
 
     Args:
         num_envs: number of fish.
-        max_episode_steps: control steps until truncation.
+        max_episode_steps: control steps until truncation. A fish that fails at its last step is
+            terminated, not truncated.
         autoreset_mode: NEXT_STEP (default): the step after an end returns the reset observation
             and zero reward; SAME_STEP: the step that ends an episode returns the first
             observation of the next, with the last one in ``info["final_obs"]`` and its info in

@@ -126,7 +126,7 @@ def compare_vectors(ours: Any, theirs: Any, actions: Any, mode: Any, seed: Any) 
 
 
 def check_observation_values(make: Make, goal: dict[str, float], delay_steps: int = 0) -> None:
-    """Every observation is what its row of the table says, at each physics step.
+    """Every observation is what its row of the table says, and info the truth, at each step.
 
     The environment must run one physics step per control step, so that its history is known.
     """
@@ -135,9 +135,11 @@ def check_observation_values(make: Make, goal: dict[str, float], delay_steps: in
     observer = Observer(env, goal, delay_steps)
     _close(obs, observer.expected(REST_ACTION), "reset")
     for step, action in enumerate(np.repeat(random_actions(25, seed=9), 10, axis=0)):
-        obs, *_ = env.step(action)
+        obs, _, _, _, info = env.step(action)
         observer.watch()
         _close(obs, observer.expected(action), f"step {step}")
+        for name, value in observer.truth().items():
+            assert np.isclose(info[name], value, rtol=0, atol=1e-9), f"step {step}: info {name}"
 
 
 def _close(obs: np.ndarray, expected: np.ndarray, when: str) -> None:

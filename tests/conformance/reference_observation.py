@@ -118,6 +118,30 @@ class Observer:
             ]
         )
 
+    def truth(self) -> dict[str, float]:
+        """What ``info`` says of goal, errors and place: now, without delay or noise."""
+        now, goal = len(self.states) - 1, self.goal
+        state = self.states[-1]
+        turn = rotation(*(state[f"q{a}"] for a in "wxyz"))
+        heading, surge = self.beat_means(now)
+        depth_goal, _ = reference(goal, "depth", now * self.dt)
+        heading_goal, _ = reference(goal, "heading", now * self.dt)
+        return {
+            "depth_error": depth_goal - state["z"],
+            "heading_error": wrapped(heading_goal - heading),
+            "heading_error_instant": wrapped(heading_goal - np.arctan2(turn[1, 0], turn[0, 0])),
+            "speed_error": goal["cruise_speed"] - surge,
+            "depth": state["z"],
+            "heading": heading,
+            "speed": surge,
+            "goal_depth": depth_goal,
+            "goal_heading": heading_goal,
+            "goal_speed": goal["cruise_speed"],
+            "north": state["x"],
+            "east": state["y"],
+            "time_s": now * self.dt,
+        }
+
     def expected(self, action: np.ndarray) -> np.ndarray:
         """The observation, scaled as the layout's table says and clipped to the space."""
         scaled = self.physical(action) / declared_scales()

@@ -98,6 +98,11 @@ class Nudged(Broken):
         return result
 
 
+class NoisyInfo(Broken):
+    def spoil(self, obs, reward, terminated, truncated, info):
+        return obs, reward, terminated, truncated, info | {"depth": info["depth"] + 1e-3}
+
+
 def late(option):
     """The environment with a delay, where it has one, that is one physics step too long."""
 
@@ -129,6 +134,7 @@ SINGLE = {
     "two observations swapped": lambda: values(Swapped),
     "a wrong scale": lambda: values(WrongScale),
     "instantaneous heading": lambda: values(HeadingOfTheInstant),
+    "an info that is not the truth": lambda: values(NoisyInfo),
     "observation delay off by one": lambda: values(Broken, 0.14, 13),
     "observed too late": lambda: checkers.check_observation_delay(
         late("observation_delay_s"), 0.13

@@ -69,6 +69,19 @@ def test_a_diverged_fish_stays_finite_and_diverged():
     assert all(np.isfinite(list(env.state.values())))
 
 
+def test_a_diverged_fish_leaves_the_rest_of_its_batch_untouched():
+    """All other lanes have the bits they have beside a tame fish."""
+    mask = np.arange(20) == 4
+    seen = []
+    for speed in (0.0, 5000.0):
+        env = RoboticFish3DVectorEnv(20, autoreset_mode="SameStep")
+        env.reset(seed=0)
+        state = {**REST, "velocity_body": [speed, 0, 0]}
+        env.reset(options={"reset_mask": mask, "state": state})
+        seen.append([env.step(row)[0][~mask] for row in random_actions(10, lanes=20)])
+    np.testing.assert_array_equal(*seen)
+
+
 def test_tolerance_does_not_count_for_a_failed_fish():
     """A fish at its goal that fails is not a success."""
     env = RoboticFish3DEnv()

@@ -86,12 +86,12 @@ class Spread:
 def build(
     builders: Sequence[tuple[str, Callable[[], Contender]]],
 ) -> tuple[list[Contender], list[Missing]]:
-    """Build every contender; one whose packages are not installed is kept as missing."""
+    """Build every contender; one without its packages or enough memory is kept as missing."""
     ready, missing = [], []
     for name, builder in builders:
         try:
             ready.append(builder())
-        except ImportError as error:
+        except (ImportError, MemoryError) as error:
             missing.append(Missing(name, str(error)))
     return ready, missing
 

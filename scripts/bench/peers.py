@@ -12,6 +12,8 @@ from scripts.bench.ours import DRAWN, drawn_actions
 
 INTEGRATORS = ("Euler", "RK4", "implicit", "implicitfast")
 """MuJoCo's, in the order of its option."""
+ENVPOOL_BYTES = 13_000_000
+"""Memory that EnvPool takes for one environment."""
 
 
 def swimmer() -> Contender:
@@ -60,6 +62,10 @@ def dm_control_fish() -> Contender:
 def envpool_fish(envs: int, batch: int, threads: int) -> Contender:
     """EnvPool's C++ copy of fish-swim; with ``batch < envs`` the asynchronous loop it advises."""
     import envpool
+
+    needed, free = envs * ENVPOOL_BYTES, os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    if needed > free:
+        raise MemoryError(f"needs {needed / 1e9:.0f} GB of memory, {free / 1e9:.0f} GB are free")
 
     env = envpool.make(
         "FishSwim-v1", env_type="gymnasium", num_envs=envs, batch_size=batch,
@@ -126,9 +132,8 @@ BUILDERS: list[tuple[str, Callable[[], Contender]]] = [
     _envpool(1, 1, 1),
     _envpool(64, 64, 1),
     _envpool(64, 64, 2),
-    _envpool(256, 128, 2),
+    _envpool(128, 64, 2),
     _envpool(1024, 1024, 2),
-    _envpool(1024, 512, 2),
     _rotorpy(1),
     _rotorpy(64),
     _rotorpy(512),

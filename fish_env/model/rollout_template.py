@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 # --- completed by compose ---
-from fish_env.model.composed import (  # type: ignore[import-not-found]
+from fish_env.model.composed import (
     LATE_TAIL,
     N_MEMORY,
     N_PARAMETERS,
@@ -93,8 +93,11 @@ def tell_tail(work, width, elapsed, history, first, count):
 
 
 @kernel
-def rk4_step(work, width, elapsed, h, tables, late, history, first, count):
-    """One classical Runge-Kutta step of every lane: X0 -> X. Memory takes its value at the end."""
+def rk4_step(work, width, elapsed, h, tables, late, history, first, count, pace):
+    """One classical Runge-Kutta step of every lane: X0 -> X. Memory takes its value at the end.
+
+    ``pace``, (width,), multiplies the rate of each lane's own time; without entries it is one.
+    """
     for n in range(N_STATES * width):
         work[X * width + n] = work[X0 * width + n]
     for n in range(N_SLOPES * width):
@@ -109,6 +112,10 @@ def rk4_step(work, width, elapsed, h, tables, late, history, first, count):
             recall(work, width, TOLD, PAST, BEGIN, fraction * h, h, history, first, count)
         for k in range(width):
             lane_derivative(k, width, elapsed, fraction * h, work, tables)
+        if pace.shape[0] > 0:
+            for i in range(N_SLOPES):
+                for k in range(width):
+                    work[(DX + i) * width + k] *= pace[k]
         if stage < 3:
             for n in range(N_SLOPES * width):
                 slope = work[DX * width + n]
@@ -163,13 +170,14 @@ def advance_block(
     for k in range(width):
         work[TIME * width + k] = time[first + (k if k < count else count - 1)]
     late = LATE_TAIL & (history.shape[0] > 0)
+    own_time = np.empty(0)
     stored = trace_at
     for segment in range(steps.shape[0]):
         h = sizes[segment]
         for i in range(steps[segment]):
             elapsed = starts[segment] + i * h
             plan_actuators(work, width, commands, slots[segment], first, count, h)
-            rk4_step(work, width, elapsed, h, tables, late, history, first, count)
+            rk4_step(work, width, elapsed, h, tables, late, history, first, count, own_time)
             accept_step(work, width, elapsed + h, failed_at, first, count)
             if (trace.shape[0] > 0) & ((i + 1) % every[segment] == 0):
                 sample = stored % trace.shape[0]

@@ -1,0 +1,270 @@
+"""What each cause would change, seen through a refit of the baseline: before looking, and after.
+
+All in the whitened prediction errors of the filter, where noise is white with unit variance. A
+cause's signal is projected on what the baseline (under its priors) cannot follow; the rest decides
+how detectable it is, how alike two causes are, and how much of the misfit it explains.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import brentq
+from scipy.stats import chi2, ncx2
+
+from fish_env.diagnosis.causes import Cause, effect_values
+from fish_env.identification.estimator import Fit
+
+FloatArray = npt.NDArray[np.float64]
+DRAWS = 4000
+BLOCK_S = 3.0
+
+
+@dataclass(frozen=True, eq=False)
+class Signal:
+    """A cause at one of its alternatives.
+
+    Attributes:
+        cause: the cause.
+        probe: index of the alternative (-1: a baseline coefficient).
+        left: (D, m) change of the residuals for the settings probed, after a refit.
+        energy: squared size of that change before the refit.
+        projected: (m, m) information about the settings after a refit of the baseline.
+        score: (m,) projected signal times residuals.
+        inflation: factor by which coloured residuals widen the score, at least 1.
+    """
+
+    cause: Cause
+    probe: int
+    left: FloatArray
+    energy: float
+    projected: FloatArray
+    score: FloatArray
+    inflation: float
+
+    @property
+    def freedom(self) -> int:
+        """Number of settings."""
+        return len(self.score)
+
+    @property
+    def statistic(self) -> float:
+        """Likelihood ratio of the linearised fit: chi-squared with ``freedom`` under no effect."""
+        return float(self.score @ np.linalg.solve(self.projected, self.score)) / self.inflation
+
+    @property
+    def p_value(self) -> float:
+        """Of this one test, in logarithm, so that overwhelming evidence still ranks."""
+        return float(chi2.logsf(self.statistic, self.freedom))
+
+    @property
+    def absorbed_share(self) -> float:
+        """Share of the signal's energy that a refit of the baseline swallows."""
+        return 1.0 - float(np.trace(self.projected)) / self.energy
+
+
+@dataclass(frozen=True, eq=False)
+class Screen:
+    """All causes against one fit.
+
+    Attributes:
+        signals: every cause at every alternative.
+        threshold: log p-value that the smallest one falls below by chance in ``level`` of data
+            sets without an effect.
+        level: family-wise error rate.
+    """
+
+    signals: tuple[Signal, ...]
+    threshold: float
+    level: float
+
+    def best(self) -> list[Signal]:
+        """The best alternative of each cause, most significant first."""
+        chosen: dict[str, Signal] = {}
+        for signal in self.signals:
+            known = chosen.get(signal.cause.name)
+            if known is None or signal.p_value < known.p_value:
+                chosen[signal.cause.name] = signal
+        return sorted(chosen.values(), key=lambda s: s.p_value)
+
+
+class Projector:
+    """Removes from signals what a refit of the free parameters of a fit would follow."""
+
+    def __init__(self, fit: Fit) -> None:
+        self.lin = fit.linearised
+        slopes = self.lin.slopes
+        count = slopes.shape[1]
+        self.prior = np.zeros(count)
+        self.prior[: len(fit.problem.baseline)] = 1.0
+        for path in fit.released:
+            self.prior[fit.problem.baseline.paths.index(path)] = 1e-4
+        information = slopes.T @ slopes
+        self.hessian = information + np.diag(self.prior + 1e-9 * np.diag(information) + 1e-12)
+        self.factor = np.linalg.cholesky(self.hessian)
+        self.block = self._blocks()
+
+    def _blocks(self) -> npt.NDArray[np.int64]:
+        key = self.lin.run_of * 10_000 + np.floor(self.lin.time_of / BLOCK_S).astype(np.int64)
+        return np.unique(key, return_inverse=True)[1]
+
+    def coefficients(self, columns: FloatArray) -> FloatArray:
+        """How a refit follows the columns: (n, m)."""
+        right = self.lin.slopes.T @ columns
+        return np.asarray(
+            np.linalg.solve(self.factor.T, np.linalg.solve(self.factor, right))
+        )
+
+    def signal(self, cause: Cause, probe: int, columns: FloatArray) -> Signal | None:
+        """Project a cause; None where nothing of it is left."""
+        followed = self.coefficients(columns)
+        left = columns - self.lin.slopes @ followed
+        projected = left.T @ left + followed.T @ (self.prior[:, None] * followed)
+        energy = np.einsum("ij,ij->j", columns, columns)
+        if np.any(np.diag(projected) < 1e-4) or np.any(energy < 1e-3):
+            return None
+        projected += 1e-9 * np.diag(np.diag(projected))
+        score = -left.T @ self.lin.residuals
+        step = np.linalg.solve(projected, score)
+        remaining = self.lin.residuals + left @ step
+        inflation = self._inflation(left, remaining)
+        return Signal(cause, probe, left, float(energy.sum()), projected, score, inflation)
+
+    def _inflation(self, left: FloatArray, residuals: FloatArray) -> float:
+        """Spread of block sums of the score against what white residuals would give."""
+        sums = np.zeros((self.block.max() + 1, left.shape[1]))
+        np.add.at(sums, self.block, left * residuals[:, None])
+        white = np.einsum("ij,ij->j", left, left)
+        ratios = np.einsum("ij,ij->j", sums, sums) / np.maximum(white, 1e-12)
+        return float(max(1.0, ratios.max()))
+
+
+def screen(
+    fit: Fit, causes: Sequence[Cause], rng: np.random.Generator, level: float = 0.05
+) -> Screen:
+    """Test every cause against a fit.
+
+    Args:
+        fit: baseline, perhaps with effects already in it.
+        causes: what to test; causes already in the fit are left out.
+        rng: for the null distribution of the smallest p-value.
+        level: family-wise error rate.
+    """
+    projector = Projector(fit)
+    taken = {*fit.effects, *fit.released}
+    tested = [c for c in causes if c.name not in taken and c.path not in taken]
+    signals = [*_effect_signals(fit, projector, tested), *_coefficient_signals(projector, tested, fit)]
+    return Screen(tuple(signals), null_threshold(signals, rng, level), level)
+
+
+def _effect_signals(fit: Fit, projector: Projector, causes: Sequence[Cause]) -> list[Signal]:
+    problem = fit.problem
+    jobs = [
+        (cause, index, probe)
+        for cause in causes
+        if cause.is_effect
+        for index, alternative in enumerate(cause.probes)
+        for probe in alternative
+    ]
+    values = [effect_values(problem, cause.name, probe) for cause, _, probe in jobs]
+    base = dict(fit.point.effects)
+    for cause in causes:
+        if cause.is_effect:
+            base |= problem.neutral([cause.name])
+    columns = np.empty((len(fit.linearised.residuals), len(jobs)))
+    chunk = 64
+    for first in range(0, len(jobs), chunk):
+        part = values[first : first + chunk]
+        lanes = {
+            path: np.array([own.get(path, base[path]) for own in part]) for path in base
+        }
+        z = np.repeat(fit.point.z[:, None], len(part), axis=1)
+        out = problem.innovations(z, lanes, fit.noise, fit.filtered)
+        columns[:, first : first + len(part)] = (out - fit.linearised.residuals).T
+    signals = []
+    names = [(cause.name, index) for cause, index, _ in jobs]
+    for key in dict.fromkeys(names):
+        chosen = [i for i, name in enumerate(names) if name == key]
+        signal = projector.signal(jobs[chosen[0]][0], key[1], columns[:, chosen])
+        if signal is not None:
+            signals.append(signal)
+    return signals
+
+
+def _coefficient_signals(
+    projector: Projector, causes: Sequence[Cause], fit: Fit
+) -> list[Signal]:
+    """Lifting the prior of one baseline coefficient.
+
+    Under the prior the posterior mean of z has variance 1 - s^2 (s^2: its posterior variance), so
+    z^2 / (1 - s^2) is chi-squared with one degree of freedom when the prior holds.
+    """
+    inverse = np.linalg.inv(projector.hessian)
+    signals = []
+    for cause in causes:
+        if cause.is_effect:
+            continue
+        i = fit.problem.baseline.paths.index(cause.path or "")
+        left = 1.0 - inverse[i, i]
+        if left < 0.05:
+            continue
+        column = projector.lin.slopes[:, [i]]
+        score = np.array([fit.point.z[i]])
+        energy = float((column**2).sum())
+        signals.append(Signal(cause, -1, column, energy, np.array([[left]]), score, 1.0))
+    return signals
+
+
+def null_threshold(signals: Sequence[Signal], rng: np.random.Generator, level: float) -> float:
+    """Log p-value below which the smallest of all falls by chance with probability ``level``.
+
+    Draws scores of all causes jointly as white noise would make them; signals that are alike move
+    together, so this is less strict than Bonferroni's bound.
+    """
+    effects = [s for s in signals if s.probe >= 0]
+    smallest = np.zeros(DRAWS)
+    if effects:
+        stacked = np.concatenate([s.left for s in effects], axis=1)
+        gram = stacked.T @ stacked
+        scale = np.sqrt(np.diag(gram))
+        correlation = gram / np.outer(scale, scale)
+        values, vectors = np.linalg.eigh(correlation)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        draws = root @ rng.standard_normal((len(scale), DRAWS))
+        at = 0
+        for s in effects:
+            part = slice(at, at + s.freedom)
+            block = correlation[part, part] + 1e-9 * np.eye(s.freedom)
+            statistic = np.einsum("ij,ij->j", draws[part], np.linalg.solve(block, draws[part]))
+            smallest = np.minimum(smallest, chi2.logsf(statistic, s.freedom))
+            at += s.freedom
+    coefficients = sum(s.probe < 0 for s in signals)
+    if coefficients:
+        uniform = rng.random(DRAWS)
+        smallest = np.minimum(smallest, np.log1p(-((1 - uniform) ** (1.0 / coefficients))) )
+    return float(np.quantile(smallest, level))
+
+
+def smallest_detectable(
+    signal: Signal, setting: int, threshold: float, power: float = 0.8
+) -> float:
+    """Multiple of one probed setting that would be found with this power.
+
+    The statistic is then noncentral chi-squared with as many degrees of freedom as settings; its
+    noncentrality is the multiple squared times the projected information.
+    """
+    bound = float(chi2.isf(np.exp(threshold), signal.freedom))
+    target = brentq(
+        lambda nc: ncx2.sf(bound, signal.freedom, nc) - power, 1e-3, 4.0 * bound + 100.0
+    )
+    information = float(signal.projected[setting, setting]) / signal.inflation
+    return float(np.sqrt(target / max(information, 1e-12)))
+
+
+def confusability(a: Signal, b: Signal) -> float:
+    """Largest cosine between what two causes leave after a refit of the baseline (0 to 1)."""
+    cosines = np.linalg.svd(np.linalg.qr(a.left)[0].T @ np.linalg.qr(b.left)[0], compute_uv=False)
+    return float(cosines[0])

@@ -1,0 +1,201 @@
+"""Runs the compiled filter over all runs of a problem, on all cores."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from fish_env.effects.extended import ExtendedModel
+from fish_env.identification.applied_wrench import EFFECT as APPLIED_WRENCH
+from fish_env.identification.runs import CHANNEL_CODES, N_ERROR, RunData
+from fish_env.model.history import history_rows
+from fish_env.model.runtime import Kernels, default_threads, kernels
+from fish_env.model.state import BASE_STATES
+
+FloatArray = npt.NDArray[np.float64]
+FILTER_TEMPLATE = Path(__file__).with_name("filter_template.py")
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """What is random in a measured run.
+
+    Attributes:
+        sensor_sd: (C,) white noise of each channel.
+        force_sd: stationary standard deviation of the disturbance force, each axis (N).
+        moment_sd: of the disturbance moment, each axis (N m).
+        correlation_s: correlation time of the disturbance (s).
+    """
+
+    sensor_sd: FloatArray
+    force_sd: float
+    moment_sd: float
+    correlation_s: float
+
+    @property
+    def wrench_variance(self) -> FloatArray:
+        """(6,) variances of force and moment."""
+        return np.repeat([self.force_sd**2, self.moment_sd**2], 3)
+
+
+@dataclass(frozen=True, eq=False)
+class Filtered:
+    """Result of the filter on one run (arrays as in ``filter_template.ekf_run``)."""
+
+    gains: FloatArray
+    whitening: FloatArray
+    innovations: FloatArray
+    states: FloatArray
+    wrench: FloatArray
+    log_likelihood: float
+
+
+@dataclass(frozen=True, eq=False)
+class Measurement:
+    """How channels show the true state: recorded time and affine distortion, per lane.
+
+    Attributes:
+        pace: (N,) true seconds per recorded second.
+        delay: (N,) age of the samples (s).
+        gain: (C, N).
+        bias: (C, N).
+    """
+
+    pace: FloatArray
+    delay: FloatArray
+    gain: FloatArray
+    bias: FloatArray
+
+
+class RunFilter:
+    """The filter of one model on some runs.
+
+    Args:
+        model: fish and effects; built with ``user_effects=(APPLIED_WRENCH,)`` last.
+        runs: prepared runs.
+        channels: their channels.
+    """
+
+    def __init__(
+        self, model: ExtendedModel, runs: Sequence[RunData], channels: Sequence[str]
+    ) -> None:
+        self.model = model
+        self.runs = tuple(runs)
+        self.channels = tuple(channels)
+        self.codes = np.array([CHANNEL_CODES[name] for name in channels], np.int64)
+        self.kernels = filter_kernels(model)
+
+    def _history_rows(self, records: FloatArray, data: RunData) -> int:
+        """Room for tail commands that come late."""
+        step = float(np.min(np.diff(data.clock) / data.substeps[1:]))
+        return history_rows(self.kernels.longest_delay(records), step)
+
+    def run(
+        self, record: FloatArray, measurement: Measurement, noise: NoiseModel
+    ) -> list[Filtered]:
+        """Filter every run with one parameter set.
+
+        Args:
+            record: (parameters, 1).
+            measurement: for one lane.
+            noise: noise model.
+        """
+        entry = self.kernels.entry("ekf_run")
+
+        def one(data: RunData) -> Filtered:
+            samples, channels = data.measured.shape
+            states = len(self.kernels.state_names)
+            k = np.zeros((samples, N_ERROR, channels))
+            w = np.zeros((samples, channels, channels))
+            e = np.zeros((samples, channels))
+            x = np.zeros((samples, states))
+            d = np.zeros((samples, 6))
+            state0 = np.zeros(states)
+            state0[: len(BASE_STATES)] = data.state0
+            value = entry(
+                state0, record, measurement.pace[0], measurement.delay[0], measurement.gain[:, 0],
+                measurement.bias[:, 0], data.clock, data.substeps, data.command_times,
+                data.command_values, data.measured, self.codes, noise.sensor_sd**2,
+                data.covariance0, noise.wrench_variance, noise.correlation_s,
+                self._history_rows(record, data), self.model.tables, k, w, e, x, d,
+            )  # fmt: skip
+            return Filtered(k, w, e, x, d, float(value))
+
+        return list(_threads().map(one, self.runs))
+
+    def innovations(
+        self,
+        records: FloatArray,
+        measurement: Measurement,
+        noise: NoiseModel,
+        filtered: Sequence[Filtered],
+        pushes: Pushes | None = None,
+    ) -> list[FloatArray]:
+        """Whitened innovations of many parameter sets with given gains, per run (N, T, C).
+
+        ``pushes`` adds a prescribed wrench to each lane.
+        """
+        entry = self.kernels.entry("filter_lanes")
+        count = records.shape[1]
+        outs = [np.empty((count, *data.measured.shape)) for data in self.runs]
+        states = len(self.kernels.state_names)
+        column = np.zeros(count, np.int64) if pushes is None else pushes.column
+        size = np.zeros(count) if pushes is None else pushes.size
+        none = [np.zeros((0, 0))] * len(self.runs)
+        bases = none if pushes is None else pushes.bases
+        jobs = []
+        for data, gains, out, basis in zip(self.runs, filtered, outs, bases, strict=True):
+            state0 = np.zeros((states, count))
+            state0[: len(BASE_STATES)] = data.state0[:, None]
+            step = 16 * max(1, -(-count // 64))
+            for first in range(0, count, step):
+                last = min(count, first + step)
+                jobs.append((data, gains, out, basis, state0, first, last))
+
+        def one(
+            job: tuple[RunData, Filtered, FloatArray, FloatArray, FloatArray, int, int],
+        ) -> None:
+            data, gains, out, basis, state0, first, last = job
+            entry(
+                state0, records, measurement.pace, measurement.delay, measurement.gain,
+                measurement.bias, data.clock, data.substeps, data.command_times,
+                data.command_values, data.measured, self.codes, gains.gains, gains.whitening,
+                noise.correlation_s, self._history_rows(records, data), basis, column, size,
+                self.model.tables, out, first, last,
+            )  # fmt: skip
+
+        list(_threads().map(one, jobs))
+        return outs
+
+
+@dataclass(frozen=True, eq=False)
+class Pushes:
+    """A prescribed wrench for each lane: function of time times a direction.
+
+    Attributes:
+        bases: per run (T, J) functions of time.
+        column: (N,) 6 * function + direction (body force x y z, moment x y z).
+        size: (N,) N or N m.
+    """
+
+    bases: Sequence[FloatArray]
+    column: npt.NDArray[np.int64]
+    size: FloatArray
+
+
+@cache
+def _threads() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(default_threads(), thread_name_prefix="filter")
+
+
+def filter_kernels(model: ExtendedModel) -> Kernels:
+    """Compiled filter for a model whose last effect is the applied wrench."""
+    composition = model.kernels.composition
+    assert composition.effects[-1].name == APPLIED_WRENCH.name
+    return kernels(replace(composition, templates=(*composition.templates, FILTER_TEMPLATE)))

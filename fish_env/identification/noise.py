@@ -1,0 +1,128 @@
+"""Noise floor: white sensor noise from the data, and the disturbance by maximum likelihood."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from math import comb
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import minimize
+
+from fish_env.data.schema import Dataset
+from fish_env.identification.filtering import NoiseModel
+
+FloatArray = npt.NDArray[np.float64]
+
+
+ORDER = 4
+WINDOW = 30
+QUANTILE = 0.15
+
+
+def white_noise_sd(dataset: Dataset, channel: str) -> float:
+    """Standard deviation of the white part of a channel, from differences of high order.
+
+    Differences of order 4 remove motion that is smooth over five samples; a quick tail beat is
+    not. So the runs are cut into windows of 30 samples, and the quiet windows count: a low
+    quantile of their spreads, corrected for being low by what white noise itself gives. What a
+    beat still leaves makes this an upper bound, which :func:`fit_noise` may only lower.
+    """
+    spreads = []
+    for run in dataset.runs:
+        values = run.channels[channel]
+        values = values[np.isfinite(values)]
+        if channel in ("roll", "yaw"):
+            values = np.unwrap(values)
+        spreads += _window_spreads(values)
+    if not spreads:
+        return 1e-5
+    return max(float(np.quantile(spreads, QUANTILE)) / _quantile_of_white_noise(), 1e-5)
+
+
+def _window_spreads(values: FloatArray) -> list[float]:
+    scale = np.sqrt(sum(comb(ORDER, k) ** 2 for k in range(ORDER + 1)))
+    differences = np.diff(values, ORDER) / scale
+    window = min(WINDOW, len(differences))
+    if window < 3:
+        return []
+    count = len(differences) // window
+    blocks = differences[: count * window].reshape(count, window)
+    return list(np.sqrt(np.mean(blocks**2, axis=1)))
+
+
+@cache
+def _quantile_of_white_noise() -> float:
+    """What the low quantile is when the noise is white with unit spread (fixed draws)."""
+    normals = np.random.default_rng(0).standard_normal(WINDOW * 4000 + ORDER)
+    return float(np.quantile(_window_spreads(normals), QUANTILE))
+
+
+def fit_noise(
+    log_likelihood: Callable[[NoiseModel], float],
+    start: NoiseModel,
+    evaluations: int = 40,
+    largest_sensor_sd: FloatArray | None = None,
+) -> NoiseModel:
+    """Maximum likelihood of the noise model, from a start.
+
+    Args:
+        log_likelihood: of a noise model, the parameters of the fish being fixed.
+        start: first guess.
+        evaluations: effort for the three numbers of the disturbance.
+        largest_sensor_sd: (C,) bound on each channel's noise; the noise is then fitted too.
+            Without it the sensors keep theirs: a misfit of the model must not pass for noise.
+    """
+
+    def model(x: FloatArray, sensor: FloatArray) -> NoiseModel:
+        force, moment, correlation = np.exp(x)
+        return NoiseModel(
+            sensor,
+            float(np.clip(force, 1e-4, 5.0)),
+            float(np.clip(moment, 1e-6, 0.5)),
+            float(np.clip(correlation, 0.05, 30.0)),
+        )
+
+    def start_of(noise: NoiseModel) -> FloatArray:
+        return np.log([noise.force_sd, noise.moment_sd, noise.correlation_s])
+
+    def disturbance(noise: NoiseModel, effort: int) -> NoiseModel:
+        simplex = start_of(noise) + np.vstack([np.zeros(3), 0.7 * np.eye(3)])
+        found = minimize(
+            lambda x: -log_likelihood(model(x, noise.sensor_sd)),
+            start_of(noise),
+            method="Nelder-Mead",
+            options={"maxfev": effort, "initial_simplex": simplex, "xatol": 0.05, "fatol": 0.5},
+        )
+        return model(found.x, noise.sensor_sd)
+
+    noise = disturbance(start, evaluations)
+    if largest_sensor_sd is None:
+        return noise
+    noise = _sensors(log_likelihood, noise, largest_sensor_sd)
+    return disturbance(noise, evaluations // 2)
+
+
+def _sensors(
+    log_likelihood: Callable[[NoiseModel], float], noise: NoiseModel, largest: FloatArray
+) -> NoiseModel:
+    """One Newton step in the log of each channel's noise, from three likelihoods a channel."""
+    sensor = noise.sensor_sd.copy()
+    centre = log_likelihood(noise)
+    step = 0.15
+    for i in range(len(sensor)):
+        values = []
+        for sign in (-1.0, 1.0):
+            trial = noise.sensor_sd.copy()
+            trial[i] *= np.exp(sign * step)
+            values.append(
+                log_likelihood(
+                    NoiseModel(trial, noise.force_sd, noise.moment_sd, noise.correlation_s)
+                )
+            )
+        slope = (values[1] - values[0]) / (2 * step)
+        curve = (values[1] - 2 * centre + values[0]) / step**2
+        move = -slope / curve if curve < 0 else np.sign(slope) * 0.3
+        sensor[i] = min(sensor[i] * np.exp(np.clip(move, -0.5, 0.5)), largest[i])
+    return NoiseModel(sensor, noise.force_sd, noise.moment_sd, noise.correlation_s)

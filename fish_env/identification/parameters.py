@@ -1,0 +1,124 @@
+"""Free parameters of a problem: baseline coefficients under their priors, and effect parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from fish_env.effects.extended import PREFIX, ExtendedModel
+from fish_env.identification.filtering import Measurement
+from fish_env.model.effect import Effect
+from fish_env.params.packing import PATHS
+from fish_env.params.schema import FishParams
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class EffectFreedom:
+    """A free parameter of an effect.
+
+    Attributes:
+        path: ``effects.<effect>.<parameter>``.
+        lower: smallest value allowed.
+        upper: largest value allowed.
+        step: size for finite differences, about a hundredth of what matters.
+    """
+
+    path: str
+    lower: float
+    upper: float
+    step: float
+
+
+def freedoms(effect: Effect) -> tuple[EffectFreedom, ...]:
+    """All parameters of an effect, free within their physical bounds."""
+    return tuple(
+        EffectFreedom(
+            f"{PREFIX}{effect.name}.{p.name}",
+            p.lower,
+            p.upper,
+            0.02 * (p.plausible[1] - p.plausible[0]),
+        )
+        for p in effect.parameters
+    )
+
+
+class Baseline:
+    """Baseline coefficients with a prior, in units where the prior is a standard normal.
+
+    Args:
+        fish: nominal parameters and priors.
+        paths: which coefficients are free; default: all with a prior that the model reads.
+    """
+
+    def __init__(self, fish: FishParams, paths: Sequence[str] | None = None) -> None:
+        self.fish = fish
+        read = set(PATHS.values()) - {"weight_block.crank.l1", "weight_block.crank.l2"}
+        free = [p for p in fish.values() if p in read and fish.prior_sd(p) > 0]
+        self.paths = tuple(free if paths is None else paths)
+        self.mean = np.array([fish.get(path) for path in self.paths])
+        covariance = fish.prior_covariance(list(self.paths))
+        self.sd = np.sqrt(np.diag(covariance))
+        correlation = covariance / np.outer(self.sd, self.sd)
+        self.factor = self.sd[:, None] * np.linalg.cholesky(correlation)
+
+    def __len__(self) -> int:
+        """Number of coefficients."""
+        return len(self.paths)
+
+    def values(self, z: FloatArray) -> FloatArray:
+        """Coefficients (n, N) of normalised ones (n, N)."""
+        return self.mean[:, None] + self.factor @ z
+
+    @cached_property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Physical bounds (n,), (n,)."""
+        known = [self.fish.info(path) for path in self.paths]
+        return np.array([i.lower for i in known]), np.array([i.upper for i in known])
+
+
+def measurement_of(
+    model: ExtendedModel,
+    effects: Sequence[Effect],
+    values: Mapping[str, FloatArray],
+    channels: Sequence[str],
+    count: int,
+) -> Measurement:
+    """What measurement effects do to clock and channels, for each of ``count`` lanes.
+
+    Their functions are affine in time and channels, so two probes give factor and offset.
+
+    Args:
+        model: unused effects of the model keep their own values.
+        effects: measurement effects in play.
+        values: ``effects.<name>.<parameter>`` -> (count,).
+        channels: measured channels.
+        count: number of lanes.
+    """
+    pace, delay = np.ones(count), np.zeros(count)
+    gain, bias = np.ones((len(channels), count)), np.zeros((len(channels), count))
+    for effect in effects:
+        base = model.effects.get(effect.name, effect.neutral)
+        own = {
+            p: np.broadcast_to(values.get(f"{PREFIX}{effect.name}.{p}", base[p]), (count,))
+            for p in base
+        }
+        if effect.sample_time is not None:
+            zero = effect.sample_time(np.zeros(count), own)
+            one = effect.sample_time(np.ones(count), own)
+            slope = one - zero
+            pace, delay = pace * slope, delay * slope - zero
+        if effect.measure is not None:
+            zeros = {name: np.zeros(count) for name in channels}
+            ones = {name: np.ones(count) for name in channels}
+            low, high = effect.measure(zeros, own), effect.measure(ones, own)
+            for i, name in enumerate(channels):
+                factor = high[name] - low[name]
+                gain[i] = gain[i] * factor
+                bias[i] = bias[i] * factor + low[name]
+    return Measurement(pace, delay, np.ascontiguousarray(gain), np.ascontiguousarray(bias))

@@ -1,0 +1,163 @@
+"""An identification problem: fish, runs, what is free, what is noise."""
+
+from __future__ import annotations
+
+from copy import copy
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from fish_env.data.schema import Dataset
+from fish_env.effects import catalogue
+from fish_env.effects.extended import PREFIX, ExtendedModel, build_model
+from fish_env.errors import EffectError
+from fish_env.identification.applied_wrench import EFFECT as APPLIED_WRENCH
+from fish_env.identification.filtering import Filtered, NoiseModel, RunFilter
+from fish_env.identification.noise import white_noise_sd
+from fish_env.identification.parameters import Baseline, EffectFreedom, freedoms, measurement_of
+from fish_env.identification.runs import prepare_run, usable_channels
+from fish_env.model.effect import Effect
+from fish_env.params.io import load_fish
+from fish_env.params.schema import FishParams
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Values of all free parameters.
+
+    Attributes:
+        z: (n,) baseline coefficients in units of their prior.
+        effects: ``effects.<name>.<parameter>`` -> value, of the effects in play.
+    """
+
+    z: FloatArray
+    effects: Mapping[str, float]
+
+
+class Problem:
+    """Measured runs of a fish, the model that should explain them, and its freedom.
+
+    Args:
+        dataset: measured runs.
+        fish: parameters; default: the dataset's own fish.
+        run_ids: runs to use; default: all.
+        paths: free baseline coefficients; default: all with a prior.
+        effects: names of effects whose parameters are free.
+        user_effects: effects of the caller's own, among ``effects`` or not.
+        dt: longest RK4 step (s).
+    """
+
+    def __init__(
+        self,
+        dataset: Dataset,
+        fish: FishParams | None = None,
+        run_ids: Sequence[str] | None = None,
+        paths: Sequence[str] | None = None,
+        effects: Iterable[str] = (),
+        user_effects: Iterable[Effect] = (),
+        dt: float = 0.01,
+    ) -> None:
+        self.dataset = dataset
+        self.fish = fish or load_fish(dataset.fish)
+        self.known = {**catalogue(), **{e.name: e for e in user_effects}}
+        own = tuple(effect for effect in self.known.values() if effect.name not in catalogue())
+        self.model: ExtendedModel = build_model(
+            self.fish, user_effects=(*own, APPLIED_WRENCH), whole_catalogue=True
+        )
+        self.channels = usable_channels(dataset.channels)
+        self.sensor_sd = np.array(
+            [dataset.noise.get(n) or white_noise_sd(dataset, n) for n in self.channels]
+        )
+        chosen = dataset.ids if run_ids is None else tuple(run_ids)
+        self.runs = tuple(
+            prepare_run(dataset.run(i), self.channels, self.sensor_sd, dt) for i in chosen
+        )
+        self.baseline = Baseline(self.fish, paths)
+        self.effects = tuple(effects)
+        unknown = [name for name in self.effects if name not in self.known]
+        if unknown:
+            raise EffectError(f"unknown effects {unknown}; known: {', '.join(self.known)}")
+
+    @cached_property
+    def filter(self) -> RunFilter:
+        """Compiled filter on these runs."""
+        return RunFilter(self.model, self.runs, self.channels)
+
+    def subset(self, count: int) -> Problem:
+        """The same problem on at most ``count`` runs, spread over all of them."""
+        if len(self.runs) <= count:
+            return self
+        chosen = np.linspace(0, len(self.runs) - 1, count).round().astype(int)
+        smaller = copy(self)
+        smaller.runs = tuple(self.runs[i] for i in chosen)
+        smaller.__dict__.pop("filter", None)
+        return smaller
+
+    @property
+    def samples(self) -> int:
+        """Number of measured values."""
+        return int(sum(np.isfinite(run.measured).sum() for run in self.runs))
+
+    @property
+    def start(self) -> Point:
+        """Nominal coefficients, effects at what the fish's file says."""
+        return Point(np.zeros(len(self.baseline)), self.neutral(self.effects))
+
+    def neutral(self, names: Iterable[str]) -> dict[str, float]:
+        """Values of effects as the fish's file has them, neutral where it says nothing."""
+        values = {}
+        for name in names:
+            own = self.model.effects.get(name, self.known[name].neutral)
+            values |= {f"{PREFIX}{name}.{p}": v for p, v in own.items()}
+        return values
+
+    def freedoms(self, names: Iterable[str]) -> tuple[EffectFreedom, ...]:
+        """Free parameters of effects."""
+        return tuple(f for name in names for f in freedoms(self.known[name]))
+
+    def innovations(
+        self,
+        z: FloatArray,
+        effects: Mapping[str, FloatArray],
+        noise: NoiseModel,
+        filtered: Sequence[Filtered],
+    ) -> FloatArray:
+        """Whitened innovations of many points, shape (N, residuals), runs one after another.
+
+        Args:
+            z: (n, N) baseline coefficients.
+            effects: effect parameter -> (N,).
+            noise: noise model.
+            filtered: gains to use.
+        """
+        count = z.shape[1]
+        records, measurement = self._lanes(z, effects, count)
+        parts = self.filter.innovations(records, measurement, noise, filtered)
+        return np.concatenate([part.reshape(count, -1) for part in parts], axis=1)
+
+    def filtered(self, point: Point, noise: NoiseModel) -> list[Filtered]:
+        """Extended Kalman filter of every run at one point."""
+        effects = {path: np.array([value]) for path, value in point.effects.items()}
+        record, measurement = self._lanes(point.z[:, None], effects, 1)
+        return self.filter.run(record, measurement, noise)
+
+    def _lanes(self, z: FloatArray, effects: Mapping[str, FloatArray], count: int):  # type: ignore[no-untyped-def]
+        changes: dict[str, FloatArray] = dict(
+            zip(self.baseline.paths, self.baseline.values(z), strict=True)
+        )
+        names = {path.removeprefix(PREFIX).split(".")[0] for path in effects}
+        moving = {n for n in names if self.known[n].hooks}
+        changes |= {
+            path: values
+            for path, values in effects.items()
+            if path.removeprefix(PREFIX).split(".")[0] in moving
+        }
+        sensing = [self.known[n] for n in sorted(names - moving)]
+        own = [e for e in self.model.measurement if e.name not in names]
+        measurement = measurement_of(self.model, [*own, *sensing], effects, self.channels, count)
+        return np.ascontiguousarray(self.model.records(changes)), measurement

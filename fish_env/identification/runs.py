@@ -1,0 +1,157 @@
+"""Measured runs as the filter reads them: clocks, commands, channels, initial states."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fish_env.data.schema import Run
+from fish_env.errors import DatasetError
+from fish_env.model.frames import quaternion_from_euler
+from fish_env.model.state import BASE_STATES
+
+FloatArray = npt.NDArray[np.float64]
+CHANNEL_CODES = {
+    name: code
+    for code, name in enumerate(
+        ("x", "y", "z", "roll", "pitch", "yaw", "u", "v", "w", "p", "q", "r")
+    )
+}
+"""Channels the filter uses, with the code its kernel knows them by."""
+N_ERROR = 19
+POSITION, ROTATION, VELOCITY, RATE, PHASE = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), 18
+
+
+@dataclass(frozen=True, eq=False)
+class RunData:
+    """One run, ready for the filter.
+
+    Attributes:
+        id: the run's id.
+        condition: repeats share it.
+        clock: (T,) sample times from the first (s).
+        substeps: (T,) RK4 steps up to each sample.
+        command_times: (m,) switch times on the same clock (s).
+        command_values: (m, 5).
+        measured: (T, C), NaN where missing.
+        state0: (18,) initial base state.
+        covariance0: (19, 19) of its error state.
+        phase_known: whether the tail phase at the start is known.
+    """
+
+    id: str
+    condition: str | None
+    clock: FloatArray
+    substeps: npt.NDArray[np.int64]
+    command_times: FloatArray
+    command_values: FloatArray
+    measured: FloatArray
+    state0: FloatArray
+    covariance0: FloatArray
+    phase_known: bool
+
+    @property
+    def duration(self) -> float:
+        """Length (s)."""
+        return float(self.clock[-1])
+
+
+def usable_channels(names: Sequence[str]) -> tuple[str, ...]:
+    """Channels among those measured that the filter uses, in its order."""
+    return tuple(name for name in CHANNEL_CODES if name in names)
+
+
+def prepare_run(
+    run: Run, channels: Sequence[str], noise_sd: FloatArray, dt: float = 0.01
+) -> RunData:
+    """Read a run for the filter.
+
+    Args:
+        run: measured run.
+        channels: channels to use.
+        noise_sd: (C,) white noise of each channel, for the spread of the initial state.
+        dt: longest RK4 step (s).
+
+    Raises:
+        DatasetError: the run has none of the channels.
+    """
+    if not channels:
+        raise DatasetError(f"run {run.id}: none of {', '.join(CHANNEL_CODES)} is measured")
+    clock = run.time_s - run.time_s[0]
+    spans = np.diff(clock, prepend=0.0)
+    substeps = np.maximum(1, np.ceil(spans / dt - 1e-9)).astype(np.int64)
+    measured = np.column_stack([run.channels[name] for name in channels])
+    state0, covariance0 = _initial(run, channels, measured, clock, noise_sd)
+    return RunData(
+        run.id,
+        run.condition,
+        clock,
+        substeps,
+        run.commands.times_s - run.time_s[0],
+        np.ascontiguousarray(run.commands.values),
+        np.ascontiguousarray(measured),
+        state0,
+        covariance0,
+        run.tail_phase is not None,
+    )
+
+
+def _initial(
+    run: Run,
+    channels: Sequence[str],
+    measured: FloatArray,
+    clock: FloatArray,
+    noise_sd: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Initial state and its spread: level and at rest, or a local line through the first samples.
+
+    At rest the first measured pose is off by the sensor noise only. An unknown start takes value
+    and slope of each channel over the first 0.6 s; a channel that is not measured starts at zero
+    with a spread that covers a swimming fish.
+    """
+    rest = run.start == "rest"
+    first = {name: _start_of(measured[:, i], clock) for i, name in enumerate(channels)}
+    noise = dict(zip(channels, noise_sd, strict=True))
+    pose = {n: first.get(n, (0.0, 0.0))[0] for n in ("x", "y", "z", "roll", "pitch", "yaw")}
+    if rest:
+        pose["roll"] = pose["pitch"] = 0.0
+    state = np.zeros(len(BASE_STATES))
+    state[0:3] = pose["x"], pose["y"], pose["z"]
+    euler = np.array([pose["roll"], pose["pitch"], pose["yaw"]])
+    state[3:7] = quaternion_from_euler(euler)
+    state[13] = run.tail_phase or 0.0
+    spread = np.zeros(N_ERROR)
+    wide = {"x": 1e-3, "y": 1e-3, "z": 1e-3, "roll": 0.05, "pitch": 0.1, "yaw": 1e-3}
+    for i, name in enumerate(("x", "y", "z", "roll", "pitch", "yaw")):
+        spread[i] = 2.0 * noise.get(name, wide[name])
+    if rest:
+        spread[3:5] = np.minimum(spread[3:5], 0.02)
+        spread[VELOCITY], spread[RATE] = 0.003, 0.01
+    else:
+        ground = np.array([first.get(n, (0.0, 0.0))[1] for n in ("x", "y", "z")])
+        state[7:10] = _into_body(euler, ground)
+        spread[VELOCITY], spread[RATE] = 0.05, 0.6
+    spread[PHASE] = 0.0 if run.tail_phase is not None else 0.4
+    return state, np.diag(spread**2)
+
+
+def _start_of(values: FloatArray, clock: FloatArray) -> tuple[float, float]:
+    """Value at the first sample and slope of a line through the first 0.6 s."""
+    chosen = (clock <= 0.6) & np.isfinite(values)
+    if chosen.sum() < 3:
+        chosen = np.isfinite(values)
+        chosen &= np.cumsum(chosen) <= 3
+    if chosen.sum() < 2:
+        return float(np.nanmean(values)), 0.0
+    slope, level = np.polyfit(clock[chosen], np.unwrap(values[chosen]), 1)
+    return float(level), float(slope)
+
+
+def _into_body(euler: FloatArray, inertial: FloatArray) -> FloatArray:
+    from scipy.spatial.transform import Rotation
+
+    result: FloatArray = Rotation.from_euler("ZYX", euler[::-1]).inv().apply(inertial)
+    return result

@@ -90,6 +90,7 @@ def env_options(
     whole = _names_effects(randomization, loaded)
     model = build_model(loaded, _water(effects, current, wave), whole_catalogue=whole)
     model.check_step(settings.dt)
+    _check_effects(effects or {}, model)
     _check_reach(settings, loaded)
     random = build_randomization(randomization, loaded, model)
     if random is not None:
@@ -132,6 +133,15 @@ def _names_effects(spec: str | Mapping[str, Any] | None, fish: FishParams) -> bo
     if spec == "posterior" and fish.posterior is not None:
         names = fish.posterior.names
     return any(str(name).startswith(PREFIX) for name in names)
+
+
+def _check_effects(wanted: EffectValues, model: ExtendedModel) -> None:
+    idle = [e.name for e in model.measurement if e.name in wanted and not e.acts_on_motion]
+    if idle:
+        raise ConfigError(
+            f"effects {idle} change recordings, not the motion: for what the agent sees there are "
+            "observation_noise and observation_delay_s"
+        )
 
 
 def _check_reach(settings: EnvConfig, fish: FishParams) -> None:

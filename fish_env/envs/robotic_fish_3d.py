@@ -136,7 +136,8 @@ class RoboticFish3DEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]
     Args:
         task: ``"hold"`` (constant references) or ``"track"`` (steps, ramps, sines).
         fish: name of a shipped fish, path of a parameter file (extended models included), or
-            parameters.
+            parameters. What a file says of measurements (sensor delays, biases) belongs to the
+            recordings it was fitted to and does not act here.
         render_mode: None; there is no rendering yet.
         config: YAML file or mapping that changes configs/env/robotic-fish-3d.yaml.
         control_hz: actions a second.

@@ -12,13 +12,17 @@ RICH: dict[str, Any] = {
     "task": "track",
     "config": {"tank": {"depth": 1.2, "walls": [-0.9, 0.9, -0.9, 0.9]}},
     "cruise_speed": (0.05, 0.15),
-    "effects": {"servo_lag": {"time_constant": 0.06}},
+    "effects": {"servo_lag": {"time_constant": 0.06}, "servo_delay": {"delay": 0.03}},
     "current": (0.05, -0.08, 0.02),
     "wave": {"amplitude": 0.03, "frequency": 0.8, "phase": 0.5, "decay": 1.2},
     "observation_noise": {"depth": 0.01, "heading": 0.02, "velocity": 0.01, "rates": 0.02},
     "observation_delay_s": 0.13,
     "action_delay_s": 0.07,
-    "randomization": {"tail.area": {"relative": 0.05}, "effects.current.north": [-0.1, 0.1]},
+    "randomization": {
+        "tail.area": {"relative": 0.05},
+        "effects.current.north": [-0.1, 0.1],
+        "effects.servo_delay.delay": [0.0, 0.15],
+    },
 }
 """Every option at once."""
 

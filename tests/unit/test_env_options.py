@@ -35,6 +35,11 @@ REFUSED = [
     ({"action_delay_s": -0.1}, ConfigError, "between 0 and 2 s"),
     ({"action_delay_s": np.nan}, ConfigError, "between 0 and 2 s"),
     (
+        {"effects": {"depth_bias": {"offset": 0.1}}},
+        ConfigError,
+        "change recordings, not the motion",
+    ),
+    (
         {"config": {"actuators": {"block_displacement": {"high": 0.05}}}},
         ConfigError,
         "beyond the crank's reach",

@@ -1,9 +1,14 @@
-"""`robofish demo`: what the package does, in a minute or two. Each part is one function."""
+"""`robofish demo`: what the package does, in a minute or two. Each part is one function.
+
+Parts that build on this package add themselves as entry points of the group ``robofish.demo``:
+functions like those of :data:`PARTS`, whose docstring begins with their title.
+"""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from importlib.metadata import entry_points
 from pathlib import Path
 
 from rich.console import Console
@@ -38,8 +43,15 @@ def compare_with_a_real_fish(console: Console, out: Path) -> list[Path]:
         return draw_steady(comparison, out)
 
 
+GROUP = "robofish.demo"
 PARTS: dict[str, Part] = {"A real fish and its simulation": compare_with_a_real_fish}
 """Title -> what is done, in this order."""
+
+
+def all_parts() -> dict[str, Part]:
+    """The parts of this package, then those that installed packages add."""
+    added = [entry.load() for entry in sorted(entry_points(group=GROUP), key=lambda e: e.name)]
+    return PARTS | {part.__doc__.partition("\n")[0].rstrip("."): part for part in added}
 
 
 def run_demo(console: Console, out: Path) -> None:
@@ -49,9 +61,9 @@ def run_demo(console: Console, out: Path) -> None:
         console: Where words and progress go.
         out: Folder for pictures.
     """
-    begun, pictures = time.monotonic(), list[Path]()
-    for number, (title, part) in enumerate(PARTS.items(), 1):
-        console.print(Rule(f"{number} of {len(PARTS)}: {title}", align="left"))
+    begun, pictures, parts = time.monotonic(), list[Path](), all_parts()
+    for number, (title, part) in enumerate(parts.items(), 1):
+        console.print(Rule(f"{number} of {len(parts)}: {title}", align="left"))
         pictures += part(console, out)
     console.print(Rule("Pictures", align="left"))
     for picture in pictures:

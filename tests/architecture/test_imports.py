@@ -10,7 +10,8 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 LINTER = Path(sys.executable).with_name("lint-imports")
-OPEN_TO_AGENTS = {"errors", "params", "trajectory", "simulator", "envs"}
+# What agents act on; and the one style of pictures, so that theirs look alike.
+OPEN_TO_AGENTS = {"errors", "params", "trajectory", "simulator", "envs", "plotting"}
 NOT_ON_IMPORT = ("torch", "matplotlib", "pandas", "stable_baselines3", "pyarrow", "pygame")
 
 

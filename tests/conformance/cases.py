@@ -100,3 +100,10 @@ def run(env: RoboticFish3DEnv, actions: np.ndarray, seed: int | None = 0, **opti
         rewards.append(reward)
         infos.append(info)
     return np.array(seen), np.array(rewards), infos
+
+
+def table(heading: str) -> list[list[str]]:
+    """Rows of the table under a heading of the class docstring."""
+    section = RoboticFish3DEnv.__doc__.split(f"## {heading}")[1].split("##")[0]
+    rows = [line.strip(" |").split(" | ") for line in section.splitlines() if "|" in line]
+    return [row for row in rows if row[0][0].isdigit()]

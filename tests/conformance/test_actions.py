@@ -7,8 +7,7 @@ from fish_env.envs.config import load_env_config
 from fish_env.envs.robotic_fish_3d import RoboticFish3DEnv
 from fish_env.model.state import INPUTS
 from tests.conformance import checkers
-from tests.conformance.cases import IDEAL, START, random_actions, run
-from tests.conformance.test_observation import table
+from tests.conformance.cases import IDEAL, START, random_actions, run, table
 
 UNITS = {"rad": 1.0, "Hz": 1.0, "mm": 0.001, "rad/s": 1.0, "Hz/s": 1.0, "mm/s": 0.001}
 

@@ -16,17 +16,11 @@ from tests.conformance.cases import (
     random_actions,
     run,
     swim_action,
+    table,
 )
 from tests.conformance.reference_observation import declared_scales, rotation, wrapped
 
 FINE = {"control_hz": 100.0, "physics_hz": 100.0}
-
-
-def table(heading: str) -> list[list[str]]:
-    """Rows of the table under a heading of the class docstring."""
-    section = RoboticFish3DEnv.__doc__.split(f"## {heading}")[1].split("##")[0]
-    rows = [line.strip(" |").split(" | ") for line in section.splitlines() if "|" in line]
-    return [row for row in rows if row[0][0].isdigit()]
 
 
 def test_the_docstring_and_the_layout_say_the_same():

@@ -27,7 +27,7 @@ def foreign_wrench(t, y, velocity, spin, beat, e, drive, wrench):
         wrench[4] += e.pump_moment
     wrench[3] -= e.roll_yaw_damping_coefficient * spin[2]
     wrench[5] -= e.roll_yaw_damping_coefficient * spin[0]
-    # A fin that flips over in a fast turn and stays there.
+    # A fin that flips over in the fastest strokes and stays there.
     wrench[5] += drive[FIN] * e.sticking_fin_moment * u * abs(u)
     # Lift of one flank only.
     wrench[1] -= e.one_sided_lift_coefficient * max(v, 0.0) * abs(u)
@@ -35,8 +35,9 @@ def foreign_wrench(t, y, velocity, spin, beat, e, drive, wrench):
     wrench[3] += e.swirl_coefficient * stroke
     wrench[2] += e.downwash_coefficient * stroke
     wrench[4] += 0.15 * e.downwash_coefficient * stroke
+    # Heave pitches the fish and pitching lifts it; the two exchange energy and lose none.
     wrench[4] -= e.pitch_heave_coefficient * w * abs(w)
-    wrench[2] -= e.pitch_heave_coefficient * spin[1] * abs(w)
+    wrench[2] += e.pitch_heave_coefficient * spin[1] * abs(w)
     if e.compass_torque_moment != 0.0:
         yaw = math.atan2(y[6], y[3])
         wrench[5] -= e.compass_torque_moment * math.sin(yaw - e.compass_torque_heading)

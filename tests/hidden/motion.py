@@ -2,7 +2,8 @@
 
 State: 0-2 position, 3-11 rotation matrix body to inertial by rows, 12-14 velocity and 15-17
 angular velocity in the body frame, 18 lagged tail, 19-20 flexible tail, 21 lagged block,
-22-24 remembered tail force, 25-26 sloshing water, 27-32 remembered wrench of the hull.
+22-24 remembered tail force, 25-26 sloshing water, 27-32 remembered wrench of the hull,
+33-36 displacement and angle of the block that reacts, each with its rate.
 """
 
 from __future__ import annotations
@@ -25,7 +26,9 @@ from tests.hidden.servo import AMPLITUDE, FREQUENCY, OFFSET, TWO_PI, block_motio
 from tests.hidden.tail import centre_of_pressure, reactive, steady_tail_force
 from tests.hidden.vectors import add, cross, scale, solve6, to_body, to_inertial
 
-STATES = 33
+STATES = 37
+DRIVE_TIME = 0.02
+"""s. How fast the block follows where nothing slower holds it back."""
 
 
 @helper
@@ -71,19 +74,27 @@ def disturbance(t, y, e, push, wrench):
 
 
 @helper
-def block_momentum(place, shift_rate, shift_bend, spin, fish, e, wrench):
-    """Adds what the block's own motion along the hull does to it (Newton for the whole fish)."""
-    s, m = e.block_reaction_scale, fish.block_mass
-    go = (-shift_rate, 0.0, 0.0)
-    run = scale(m, go)
-    run_rate = scale(m, (-shift_bend, 0.0, 0.0))
-    turning = cross(place, run)
-    turning_rate = cross(place, run_rate)
-    # dJ/dt of a point mass moving along x: only the y and z axes feel it.
-    spread = 2.0 * m * place[0] * go[0]
-    force = add(run_rate, scale(2.0, cross(spin, run)))
-    moment = add(add((0.0, spread * spin[1], spread * spin[2]), turning_rate), cross(spin, turning))
-    put(wrench, scale(-s, force), scale(-s, moment))
+def block_reaction(y, dy, shift, shift_rate, turn, spin, fish, e, wrench):
+    """Adds what moving the block does to the hull: minus its mass times a + 2 w x v within it.
+
+    A command that jumps would be an infinite force forth and back; the block that reacts follows
+    the commanded place as fast as a good drive does, critically damped.
+    """
+    if e.block_reaction_scale == 0.0:
+        return
+    k = 1.0 / DRIVE_TIME
+    run, swing = y[34], y[36]
+    run_rate = 2.0 * k * (shift_rate - run) + k * k * (shift - y[33])
+    swing_rate = -2.0 * k * swing + k * k * (turn - y[35])
+    dy[33], dy[34], dy[35], dy[36] = run, run_rate, swing, swing_rate
+    # The block circles the bracket's axis: tangent and radius of its place.
+    tangent = (0.0, fish.d2 * math.cos(y[35]), -fish.d2 * math.sin(y[35]))
+    radius = (0.0, fish.d2 * math.sin(y[35]), fish.d2 * math.cos(y[35]))
+    v = add((-run, 0.0, 0.0), scale(swing, tangent))
+    a = add((-run_rate, 0.0, 0.0), add(scale(swing_rate, tangent), scale(-swing * swing, radius)))
+    push = -e.block_reaction_scale * fish.block_mass
+    force = scale(push, add(a, scale(2.0, cross(spin, v))))
+    put(wrench, force, cross(block_place(y[33], y[35], fish), force))
 
 
 @helper
@@ -133,7 +144,7 @@ def derivative(t, y, dy, row, late, fish, e, table, push, drive, matrix, wrench)
     spin = (y[15], y[16], y[17])
     path = to_inertial(y, ground)
     angle, rate, bend = tail_motion(t, y, dy, late, e, table, drive)
-    shift, shift_rate, shift_bend, turn = block_motion(y, dy, row, e, table, drive)
+    shift, shift_rate, turn = block_motion(y, dy, row, e, table, drive)
     place = block_place(shift, turn, fish)
     centre = centre_of_mass(place, fish, e)
     inertia = inertia_about_origin(place, fish)
@@ -156,8 +167,7 @@ def derivative(t, y, dy, row, late, fish, e, table, push, drive, matrix, wrench)
     added_mass(velocity, spin, drift, e, matrix, wrench)
     if e.tail_reactive_scale != 0.0:
         reactive(velocity, spin, drift, angle, rate, bend, fish, e, matrix, wrench)
-    if e.block_reaction_scale != 0.0:
-        block_momentum(place, shift_rate, shift_bend, spin, fish, e, wrench)
+    block_reaction(y, dy, shift, shift_rate, turn, spin, fish, e, wrench)
     foreign_wrench(t, y, velocity, spin, table[row, AMPLITUDE] * table[row, FREQUENCY], e, drive,
                    wrench)  # fmt: skip
     slosh(y, dy, ground, spin, down, e, matrix, wrench)

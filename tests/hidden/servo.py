@@ -8,7 +8,7 @@ step each either follows its input exactly or moves evenly. `drive` holds that m
 
 0-3 rate limit, 4-7 play of the tail, each: angle at the step's start, 1 when it moves evenly,
 its rate then, the step's start time; 8 place of the block behind its play; 9 side of the
-sticking fin; 10 row of the commands in force.
+sticking fin; 10 row of the commands in force; 11 half stroke (+1 or -1) of the step.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from tests.hidden.jit import helper
 
 TWO_PI = 2.0 * math.pi
 TIME, OFFSET, AMPLITUDE, FREQUENCY, SHIFT, TURN, PHASE = range(7)
-LIMIT, PLAY, BLOCK, FIN, ROW = 0, 4, 8, 9, 10
-DRIVE_SIZE = 11
+LIMIT, PLAY, BLOCK, FIN, ROW, SIDE = 0, 4, 8, 9, 10, 11
+DRIVE_SIZE = 12
 
 
 @helper
@@ -34,7 +34,7 @@ def tail_phase(t, row, e, table):
 
 
 @helper
-def sent(t, late, e, table):
+def sent(t, late, e, table, drive):
     """Angle, rate and acceleration that reach the servo at time t, after the delay.
 
     `late` is the row that reaches it now; before the first one (-1) the tail stands where that
@@ -44,8 +44,7 @@ def sent(t, late, e, table):
     then = t - e.servo_delay_delay if late >= 0 else table[0, TIME]
     phase, rate, bend = tail_phase(then, row, e, table)
     swing, slope = math.sin(phase), math.cos(phase)
-    side = 1.0 if swing > 0.0 or (swing == 0.0 and slope > 0.0) else -1.0
-    reach = table[row, AMPLITUDE] * e.tail_gain_gain * (1.0 + side * e.tail_asymmetry_ratio)
+    reach = table[row, AMPLITUDE] * e.tail_gain_gain * (1.0 + drive[SIDE] * e.tail_asymmetry_ratio)
     angle = table[row, OFFSET] + e.tail_bias_offset + reach * swing
     if late < 0:
         return angle, 0.0, 0.0
@@ -57,7 +56,7 @@ def limited(t, late, e, table, drive):
     """The angle behind the rate limit."""
     if drive[LIMIT + 1] == 1.0:
         return drive[LIMIT] + drive[LIMIT + 2] * (t - drive[LIMIT + 3]), drive[LIMIT + 2], 0.0
-    return sent(t, late, e, table)
+    return sent(t, late, e, table, drive)
 
 
 @helper
@@ -70,11 +69,18 @@ def driven(t, late, e, table, drive):
 
 
 @helper
+def plan_side(middle, late, e, table, drive):
+    """Which half stroke the step with this middle lies in."""
+    phase = tail_phase(middle - e.servo_delay_delay, max(late, 0), e, table)[0]
+    drive[SIDE] = 1.0 if late >= 0 and math.sin(phase) > 0.0 else -1.0
+
+
+@helper
 def plan_limit(t, h, late, e, table, drive):
     """Whether the servo keeps up during the step from t to t + h."""
     if math.isinf(e.servo_rate_limit_rate):
         return
-    here, goal = sent(t, late, e, table)[0], sent(t + h, late, e, table)[0]
+    here, goal = sent(t, late, e, table, drive)[0], sent(t + h, late, e, table, drive)[0]
     now = drive[LIMIT]
     needed = (goal - now) / h
     most = e.servo_rate_limit_rate
@@ -92,10 +98,12 @@ def plan_play(t, h, late, e, table, drive):
         return
     here = limited(t, late, e, table, drive)[0]
     goal = limited(t + h, late, e, table, drive)[0]
-    now = drive[PLAY]
+    # A command that jumps takes the tail along at once, as it does without play.
+    now = min(max(drive[PLAY], here - half), here + half)
     after = min(max(now, goal - half), goal + half)
     side = 0.0 if after == now else math.copysign(1.0, after - now)
     touching = side != 0.0 and abs(here - side * half - now) < 1e-9
+    drive[PLAY] = now
     drive[PLAY + 1] = 0.0 if touching else 1.0
     drive[PLAY + 2] = -side * half if touching else (after - now) / h
     drive[PLAY + 3] = t
@@ -143,12 +151,12 @@ def block_goal(row, e, table, drive):
 
 @helper
 def block_motion(y, dy, row, e, table, drive):
-    """Displacement, its rate and acceleration, and the bracket's angle."""
+    """Displacement of the block, its rate, and the bracket's angle."""
     shift, turn = block_goal(row, e, table, drive)
     dy[21] = 0.0
     lag = e.block_lag_time_constant
     if lag == 0.0:
-        return shift, 0.0, 0.0, turn
+        return shift, 0.0, turn
     rate = (shift - y[21]) / lag
     dy[21] = rate
-    return y[21], rate, -rate / lag, turn
+    return y[21], rate, turn

@@ -70,7 +70,9 @@ class Swim:
         self.push = push or Push()
         self.extra["push_start"], self.extra["push_step"] = self.push.start, self.push.step
         self.extra["push_inertial"] = float(self.push.inertial)
-        self.longest = longest
+        # Limits and plays decide once a step what they do, so their steps are shorter.
+        decides = self.effects.keys() & {"servo_rate_limit", "servo_backlash"}
+        self.longest = 0.25 * longest if decides else longest
         start = start or Start()
         self.phase = start.phase
         self.state = np.zeros(STATES)
@@ -94,7 +96,8 @@ class Swim:
         """States at the sample times, (T, STATES), all within the present time and `until`."""
         switches = self.table[:, TIME]
         delay = float(self.extra["servo_delay_delay"])
-        events = np.concatenate([switches, switches + delay, sample_times, [until]])
+        strokes = self._strokes(until) + delay
+        events = np.concatenate([switches, switches + delay, strokes, sample_times, [until]])
         inside = events[(events > self.time) & (events <= until)]
         edges = np.union1d(self.time, inside)
         edges = edges[np.concatenate([[True], np.diff(edges) > 1e-9])]
@@ -110,6 +113,27 @@ class Swim:
         )  # fmt: skip
         self.time = until
         return out
+
+    def _strokes(self, until: float) -> np.ndarray:
+        """Times at which the commanded tail passes its middle, where that bends its motion, s."""
+        if self.extra["tail_asymmetry_ratio"] == 0.0:
+            return np.zeros(0)
+        ends = np.append(self.table[1:, TIME], until)
+        pieces = [self._strokes_of(row, end) for row, end in zip(self.table, ends, strict=True)]
+        return np.concatenate(pieces)
+
+    def _strokes_of(self, row: np.ndarray, end: float) -> np.ndarray:
+        speed = 2.0 * np.pi * float(self.extra["frequency_scale_scale"]) * row[FREQUENCY]
+        sag, begin = float(self.extra["battery_sag_rate"]), row[TIME]
+        if speed <= 0.0 or end <= begin:
+            return np.zeros(0)
+        last = row[PHASE] + speed * (end - begin)
+        turns = np.arange(row[PHASE] // np.pi, last // np.pi + 1) * np.pi
+        t = np.full(len(turns), begin)
+        for _ in range(6):  # Newton: the phase bends a little where the battery sags
+            run = (t - begin) - 0.5 * sag * (t**2 - begin**2)
+            t = t + ((turns - row[PHASE]) / speed - run) / (1.0 - sag * t)
+        return t[(t > begin) & (t < end)]
 
     def _phases(self) -> np.ndarray:
         """Tail phase at each row: the integral of the frequency, which may be scaled and sag."""

@@ -61,7 +61,7 @@ def middle(values: Iterable[float | None]) -> float | None:
 
 def tier_summary(rows: Sequence[Row]) -> dict[str, Any]:
     """Rates and medians of one tier."""
-    detectable = [row for row in rows if row.above_detectable is None or row.above_detectable >= 1]
+    detectable = [row for row in rows if row.above_detectable and row.above_detectable >= 1]
     covered = [flag for row in rows for flag in row.covered.values()]
     return {
         "cases": len(rows),

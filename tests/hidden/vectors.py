@@ -65,22 +65,6 @@ def orthonormalise(y):
 
 
 @helper
-def rotate(y, axis_angle):
-    """R <- R exp([axis_angle]x), a finite turn in the body frame (Rodrigues)."""
-    angle = math.sqrt(dot(axis_angle, axis_angle))
-    if angle == 0.0:
-        return
-    k = scale(1.0 / angle, axis_angle)
-    c, s = math.cos(angle), math.sin(angle)
-    for row in range(3):
-        # A row of R turns by the opposite rotation of its components.
-        a = (y[3 + 3 * row], y[4 + 3 * row], y[5 + 3 * row])
-        b = add(scale(c, a), add(scale(-s, cross(k, a)), scale((1.0 - c) * dot(k, a), k)))
-        for i in range(3):
-            y[3 + 3 * row + i] = b[i]
-
-
-@helper
 def add_element(matrix, mass, force_part, moment_part):
     """matrix += mass g g^T with g = (force_part, moment_part)."""
     g = (

@@ -51,14 +51,15 @@ def causes_of(problem: Problem) -> tuple[Cause, ...]:
 def probes_of(effect: Effect) -> tuple[tuple[Probe, ...], ...]:
     """Small settings that show what an effect does.
 
-    Parameters that switch the effect on (their neutral value is in the interior or at the end of
-    their plausible range, and the others matter only then) are probed one at a time; parameters
-    that only shape it (a frequency, a phase, an anchor) take a few values of their range.
+    Parameters that switch the effect on are probed one at a time; those that only shape it (a
+    frequency, a phase, an anchor) take a few values of their plausible range.
     """
-    switches = [p for p in effect.parameters if _switches(effect, p)]
-    shapes = [p for p in effect.parameters if p not in switches]
-    settings = [dict(zip([s.name for s in shapes], values, strict=True)) for values in
-                product(*(_shape_values(s) for s in shapes))]
+    switches = [p for p in effect.parameters if not p.shapes]
+    shapes = [p for p in effect.parameters if p.shapes]
+    settings = [
+        dict(zip([s.name for s in shapes], values, strict=True))
+        for values in product(*(_shape_values(s) for s in shapes))
+    ]
     alternatives = []
     for setting in settings:
         for size in _sizes(switches):
@@ -66,13 +67,6 @@ def probes_of(effect: Effect) -> tuple[tuple[Probe, ...], ...]:
                 tuple({**_off(effect, switches), **setting, p.name: size(p)} for p in switches)
             )
     return tuple(alternatives)
-
-
-def _switches(effect: Effect, parameter: EffectParameter) -> bool:
-    """Whether the parameter's neutral value alone switches the effect off."""
-    if len(effect.parameters) == 1:
-        return True
-    return parameter.name in effect.switches
 
 
 def _off(effect: Effect, switches: list[EffectParameter]) -> Probe:

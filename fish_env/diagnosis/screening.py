@@ -114,9 +114,7 @@ class Projector:
     def coefficients(self, columns: FloatArray) -> FloatArray:
         """How a refit follows the columns: (n, m)."""
         right = self.lin.slopes.T @ columns
-        return np.asarray(
-            np.linalg.solve(self.factor.T, np.linalg.solve(self.factor, right))
-        )
+        return np.asarray(np.linalg.solve(self.factor.T, np.linalg.solve(self.factor, right)))
 
     def signal(self, cause: Cause, probe: int, columns: FloatArray) -> Signal | None:
         """Project a cause; None where nothing of it is left."""
@@ -156,7 +154,10 @@ def screen(
     projector = Projector(fit)
     taken = {*fit.effects, *fit.released}
     tested = [c for c in causes if c.name not in taken and c.path not in taken]
-    signals = [*_effect_signals(fit, projector, tested), *_coefficient_signals(projector, tested, fit)]
+    signals = [
+        *_effect_signals(fit, projector, tested),
+        *_coefficient_signals(projector, tested, fit),
+    ]
     return Screen(tuple(signals), null_threshold(signals, rng, level), level)
 
 
@@ -178,9 +179,7 @@ def _effect_signals(fit: Fit, projector: Projector, causes: Sequence[Cause]) -> 
     chunk = 64
     for first in range(0, len(jobs), chunk):
         part = values[first : first + chunk]
-        lanes = {
-            path: np.array([own.get(path, base[path]) for own in part]) for path in base
-        }
+        lanes = {path: np.array([own.get(path, base[path]) for own in part]) for path in base}
         z = np.repeat(fit.point.z[:, None], len(part), axis=1)
         out = problem.innovations(z, lanes, fit.noise, fit.filtered)
         columns[:, first : first + len(part)] = (out - fit.linearised.residuals).T
@@ -194,9 +193,7 @@ def _effect_signals(fit: Fit, projector: Projector, causes: Sequence[Cause]) -> 
     return signals
 
 
-def _coefficient_signals(
-    projector: Projector, causes: Sequence[Cause], fit: Fit
-) -> list[Signal]:
+def _coefficient_signals(projector: Projector, causes: Sequence[Cause], fit: Fit) -> list[Signal]:
     """Lifting the prior of one baseline coefficient.
 
     Under the prior the posterior mean of z has variance 1 - s^2 (s^2: its posterior variance), so
@@ -244,7 +241,7 @@ def null_threshold(signals: Sequence[Signal], rng: np.random.Generator, level: f
     coefficients = sum(s.probe < 0 for s in signals)
     if coefficients:
         uniform = rng.random(DRAWS)
-        smallest = np.minimum(smallest, np.log1p(-((1 - uniform) ** (1.0 / coefficients))) )
+        smallest = np.minimum(smallest, np.log1p(-((1 - uniform) ** (1.0 / coefficients))))
     return float(np.quantile(smallest, level))
 
 

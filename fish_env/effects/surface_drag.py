@@ -21,7 +21,9 @@ EFFECT = Effect(
     source="Hertel (1966), Structure, Form, Movement: drag of a body against its submergence",
     parameters=(
         EffectParameter("gain", "-", 0.0, 0.0, 20.0, (0.1, 3.0), "extra drag at the surface"),
-        EffectParameter("depth", "m", 0.1, 0.005, 5.0, (0.03, 0.3), "depth at which it fades"),
+        EffectParameter(
+            "depth", "m", 0.1, 0.005, 5.0, (0.03, 0.3), "depth at which it fades", shapes=True
+        ),
     ),
     hooks={"body_drag": raise_drag},
     confusable_with=("hull_compression", "linear_drag", "offset_drag"),

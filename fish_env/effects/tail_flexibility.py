@@ -47,7 +47,9 @@ EFFECT = Effect(
     source="Pseudo-rigid-body model, Howell, Compliant Mechanisms, chapter 5",
     parameters=(
         EffectParameter("natural_frequency", "Hz", inf, 0.1, inf, (2.0, 8.0), "in water, undamped"),
-        EffectParameter("damping_ratio", "-", 1.0, 0.05, 5.0, (0.2, 1.2), "1 is critical"),
+        EffectParameter(
+            "damping_ratio", "-", 1.0, 0.05, 5.0, (0.2, 1.2), "1 is critical", shapes=True
+        ),
     ),
     hooks={"tail": bend},
     states={"tail": ("angle", "rate")},

@@ -21,7 +21,9 @@ def pull(motion, tail, inputs, centre, fish, e):
 
 
 def _anchor(axis: str, way: str) -> EffectParameter:
-    return EffectParameter(axis, "m", 0.0, -100.0, 100.0, (-2.0, 2.0), f"anchor, {way}")
+    return EffectParameter(
+        axis, "m", 0.0, -100.0, 100.0, (-2.0, 2.0), f"anchor, {way}", shapes=True
+    )
 
 
 EFFECT = Effect(

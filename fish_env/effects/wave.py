@@ -25,9 +25,15 @@ EFFECT = Effect(
     source="Airy wave theory, vertical orbital velocity; decay is the wave number",
     parameters=(
         EffectParameter("amplitude", "m/s", 0.0, 0.0, 2.0, (0.005, 0.1), "flow at the surface"),
-        EffectParameter("frequency", "Hz", 0.5, 0.0, 10.0, (0.2, 2.0), "wave frequency"),
-        EffectParameter("phase", "rad", 0.0, -7.0, 7.0, (-3.14, 3.14), "phase at the run's start"),
-        EffectParameter("decay", "1/m", 1.0, 0.0, 50.0, (0.2, 5.0), "decay with depth"),
+        EffectParameter(
+            "frequency", "Hz", 0.5, 0.0, 10.0, (0.2, 2.0), "wave frequency", shapes=True
+        ),
+        EffectParameter(
+            "phase", "rad", 0.0, -7.0, 7.0, (-3.14, 3.14), "phase at the run's start", shapes=True
+        ),
+        EffectParameter(
+            "decay", "1/m", 1.0, 0.0, 50.0, (0.2, 5.0), "decay with depth", shapes=True
+        ),
     ),
     hooks={"water": add_wave},
     confusable_with=("current", "buoyancy_offset"),

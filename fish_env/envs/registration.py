@@ -17,5 +17,5 @@ def register_envs() -> None:
         entry_point="fish_env.envs.robotic_fish_3d:RoboticFish3DEnv",
         vector_entry_point="fish_env.envs.vector:RoboticFish3DVectorEnv",
         max_episode_steps=MAX_EPISODE_STEPS,
-        reward_threshold=340.0,
+        reward_threshold=370.0,
     )

@@ -15,7 +15,7 @@ from fish_env.effects import catalogue
 from fish_env.effects.extended import PREFIX, ExtendedModel, build_model
 from fish_env.errors import EffectError
 from fish_env.identification.applied_wrench import EFFECT as APPLIED_WRENCH
-from fish_env.identification.filtering import Filtered, NoiseModel, RunFilter
+from fish_env.identification.filtering import Filtered, NoiseModel, Pushes, RunFilter
 from fish_env.identification.noise import white_noise_sd
 from fish_env.identification.parameters import Baseline, EffectFreedom, freedoms, measurement_of
 from fish_env.identification.runs import prepare_run, usable_channels
@@ -60,7 +60,7 @@ class Problem:
         paths: Sequence[str] | None = None,
         effects: Iterable[str] = (),
         user_effects: Iterable[Effect] = (),
-        dt: float = 0.01,
+        dt: float = 0.02,
     ) -> None:
         self.dataset = dataset
         self.fish = fish or load_fish(dataset.fish)
@@ -126,6 +126,7 @@ class Problem:
         effects: Mapping[str, FloatArray],
         noise: NoiseModel,
         filtered: Sequence[Filtered],
+        pushes: Pushes | None = None,
     ) -> FloatArray:
         """Whitened innovations of many points, shape (N, residuals), runs one after another.
 
@@ -134,10 +135,11 @@ class Problem:
             effects: effect parameter -> (N,).
             noise: noise model.
             filtered: gains to use.
+            pushes: a prescribed wrench for each point.
         """
         count = z.shape[1]
         records, measurement = self._lanes(z, effects, count)
-        parts = self.filter.innovations(records, measurement, noise, filtered)
+        parts = self.filter.innovations(records, measurement, noise, filtered, pushes)
         return np.concatenate([part.reshape(count, -1) for part in parts], axis=1)
 
     def filtered(self, point: Point, noise: NoiseModel) -> list[Filtered]:

@@ -96,7 +96,14 @@ def load(composition: Composition) -> ModuleType:
     for template in composition.templates:
         if template != TEMPLATE:
             files += sorted(template.parent.glob("*.py"))
-    folder = jit.cache_root() / jit.source_hash(tuple(files))
+    # An effect made in Python has no file to tell one version from the next: its code does.
+    codes = [
+        jit.fingerprint(hook)
+        for effect in composition.effects
+        if effect.file is None
+        for hook in (*effect.hooks.values(), effect.initial_states)
+    ]
+    folder = jit.cache_root() / jit.source_hash(files, codes)
     name = f"robofish_composed_{composition.label}_{folder.name}"
     if name in sys.modules:
         return sys.modules[name]

@@ -75,6 +75,7 @@ class EffectParameter:
         upper: largest physically meaningful value.
         plausible: range (low, high) that a real robot of this size may show.
         description: what it is.
+        shapes: it only says where, when or how the effect acts; other parameters switch it on.
     """
 
     name: str
@@ -84,6 +85,7 @@ class EffectParameter:
     upper: float = inf
     plausible: tuple[float, float] = (-1.0, 1.0)
     description: str = ""
+    shapes: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -161,6 +163,11 @@ class Effect:
     def neutral(self) -> dict[str, float]:
         """Parameter values that switch the effect off."""
         return {p.name: p.neutral for p in self.parameters}
+
+    @property
+    def switching(self) -> tuple[str, ...]:
+        """Names of the parameters that switch it on; the others only shape it."""
+        return tuple(p.name for p in self.parameters if not p.shapes)
 
     @property
     def acts_on_motion(self) -> bool:

@@ -191,7 +191,8 @@ class Emitter:
         for i in range(5):
             lines.append(f"u{i}_rate = work[(U_RATE + {i}) * width + k]")
             lines.append(f"u{i} = work[(U + {i}) * width + k] + shift * u{i}_rate")
-        lines.append("inputs = Inputs(u0, u1, u2, u3, u4, u0_rate, u1_rate, u3_rate, u4_rate)")
+        rates = ", ".join(f"u{i}_rate" for i in range(5))
+        lines.append(f"inputs = Inputs(u0, u1, u2, u3, u4, {rates})")
         return lines
 
     def apply(self, stage: str, value: str, arguments: str, tail: str = "") -> list[str]:

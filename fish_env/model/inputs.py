@@ -8,7 +8,7 @@ from fish_env.model.records import Inputs
 
 @kernel
 def with_tail_command(inputs, offset, amplitude, frequency, offset_rate, amplitude_rate):
-    """The same inputs with another command of the tail."""
+    """The same inputs with another command of the tail; the frequency slews as it did."""
     return Inputs(
         offset,
         amplitude,
@@ -17,6 +17,7 @@ def with_tail_command(inputs, offset, amplitude, frequency, offset_rate, amplitu
         inputs.block_angle,
         offset_rate,
         amplitude_rate,
+        inputs.tail_frequency_rate,
         inputs.block_displacement_rate,
         inputs.block_angle_rate,
     )
@@ -46,6 +47,7 @@ def with_block_displacement(inputs, displacement, rate):
         inputs.block_angle,
         inputs.tail_offset_rate,
         inputs.tail_amplitude_rate,
+        inputs.tail_frequency_rate,
         rate,
         inputs.block_angle_rate,
     )

@@ -65,17 +65,31 @@ def _writable(folder: Path) -> bool:
     return os.access(folder, os.W_OK)
 
 
-def source_hash(extra_sources: Iterable[Path] = ()) -> str:
-    """Hash of every kernel source of the physics (``model/``, ``effects/``) and the extra files."""
+def fingerprint(value: Any) -> str:
+    """What a kernel's machine code depends on, as text: its code and all that this refers to."""
+    function = py_function(value)
+    code = getattr(function, "__code__", None)
+    if code is None:
+        return repr(value)
+    names = [name for name in code.co_names if name in function.__globals__]
+    used = [fingerprint(function.__globals__[name]) for name in names]
+    enclosed = [fingerprint(cell.cell_contents) for cell in function.__closure__ or ()]
+    return repr((code.co_code, code.co_consts, code.co_names, used, enclosed))
+
+
+def source_hash(extra_sources: Iterable[Path] = (), texts: Iterable[str] = ()) -> str:
+    """Hash of every kernel source of the physics (``model/``, ``effects/``), files and texts."""
     package = Path(__file__).resolve().parent.parent
     folders = ("model", "effects")
     files = [path for name in folders for path in sorted((package / name).glob("*.py"))]
-    return _hash_files((*files, *extra_sources))
+    return _hash((*files, *extra_sources), texts)
 
 
-def _hash_files(files: tuple[Path, ...]) -> str:
+def _hash(files: Iterable[Path], texts: Iterable[str]) -> str:
     digest = hashlib.sha256(numba.__version__.encode())
     for path in files:
         digest.update(path.name.encode())
         digest.update(path.read_bytes())
+    for text in texts:
+        digest.update(text.encode())
     return digest.hexdigest()[:16]

@@ -23,6 +23,7 @@ class Inputs(NamedTuple):
     block_angle: float
     tail_offset_rate: float
     tail_amplitude_rate: float
+    tail_frequency_rate: float
     block_displacement_rate: float
     block_angle_rate: float
 

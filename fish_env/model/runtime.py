@@ -30,6 +30,11 @@ def _pool(threads: int) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(threads, thread_name_prefix="fish")
 
 
+if hasattr(os, "register_at_fork"):
+    # Threads do not survive a fork: a child that kept the pool would wait for them forever.
+    os.register_at_fork(after_in_child=_pool.cache_clear)
+
+
 def default_threads() -> int:
     """Threads for batches: ``$ROBOFISH_THREADS``, else the cores this process may use."""
     named = os.environ.get("ROBOFISH_THREADS")

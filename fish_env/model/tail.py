@@ -15,7 +15,7 @@ SETTLING_TIME = 0.02
 def commanded_tail(inputs, phase):
     """xi1 = xi1_bar + A1 sin(phi_t) and its two derivatives, d(phi_t)/dt = 2 pi f1.
 
-    The rates of offset and amplitude enter while an actuator slews; f1 is constant in a step.
+    The rates of offset, amplitude and frequency enter while an actuator slews.
     """
     sine, cosine = sincos(phase)
     omega = TWO_PI * inputs.tail_frequency
@@ -25,6 +25,7 @@ def commanded_tail(inputs, phase):
         + inputs.tail_offset_rate
         + inputs.tail_amplitude_rate * sine,
         2.0 * omega * inputs.tail_amplitude_rate * cosine
+        + TWO_PI * inputs.tail_frequency_rate * inputs.tail_amplitude * cosine
         - omega * omega * inputs.tail_amplitude * sine,
     )
 

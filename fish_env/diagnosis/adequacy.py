@@ -1,0 +1,136 @@
+"""Does an explanation reach the noise floor? A test against forces of no particular origin.
+
+A wrench that depends on motion, attitude, depth, time, tail phase or commands in any of some forty
+simple ways is added, one function and one direction at a time. If the data still ask for one of
+them after everything that is free has been refitted, something remains that the model lacks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fish_env.diagnosis.causes import Cause
+from fish_env.diagnosis.screening import Projector, Signal, null_threshold
+from fish_env.identification.estimator import Fit
+from fish_env.identification.filtering import Filtered, Pushes
+from fish_env.identification.runs import RunData
+from fish_env.sensing.channels import channels_from_states
+
+FloatArray = npt.NDArray[np.float64]
+DIRECTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+LEVEL = 0.01
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """One function and direction that the data ask for.
+
+    Attributes:
+        function: what the missing wrench depends on.
+        direction: which force or moment.
+        log_p: of this one test, in logarithm.
+        size: root mean square of the wrench asked for (N or N m).
+    """
+
+    function: str
+    direction: str
+    log_p: float
+    size: float
+
+
+@dataclass(frozen=True)
+class Adequacy:
+    """Result of the test.
+
+    Attributes:
+        reached: nothing is asked for beyond chance.
+        threshold: log p-value for that.
+        misfits: what is asked for most, strongest first.
+    """
+
+    reached: bool
+    threshold: float
+    misfits: tuple[Misfit, ...]
+
+
+def adequacy(fit: Fit, rng: np.random.Generator) -> Adequacy:
+    """Test a fit against forces of no particular origin."""
+    tables = [
+        regressors(run, filtered)
+        for run, filtered in zip(fit.problem.runs, fit.filtered, strict=True)
+    ]
+    names = list(tables[0])
+    bases = [np.column_stack([table[name] for name in names]) for table in tables]
+    stacked = np.concatenate(bases)
+    spread = np.sqrt(np.mean(stacked**2, axis=0))
+    kept = [i for i in range(len(names)) if spread[i] > 1e-9]
+    bases = [np.ascontiguousarray(basis[:, kept] / spread[kept]) for basis in bases]
+    names = [names[i] for i in kept]
+    signals = _signals(fit, bases, len(names))
+    threshold = null_threshold([s for _, s in signals], rng, LEVEL)
+    unit = np.repeat([1e-3, 1e-5], 3)
+    found = []
+    for column, signal in signals:
+        function, direction = divmod(column, 6)
+        amount = float(abs(signal.score[0] / signal.projected[0, 0])) * unit[direction]
+        found.append(Misfit(names[function], DIRECTIONS[direction], signal.p_value, amount))
+    found.sort(key=lambda m: m.log_p)
+    reached = not found or found[0].log_p >= threshold
+    return Adequacy(reached, threshold, tuple(found[:8]))
+
+
+def _signals(fit: Fit, bases: list[FloatArray], functions: int) -> list[tuple[int, Signal]]:
+    problem, projector = fit.problem, Projector(fit)
+    columns = np.arange(6 * functions)
+    unit = np.tile(np.repeat([1e-3, 1e-5], 3), functions)
+    residuals = fit.linearised.residuals
+    nothing = Cause("generic")
+    result = []
+    chunk = 96
+    for first in range(0, len(columns), chunk):
+        part = columns[first : first + chunk]
+        z = np.repeat(fit.point.z[:, None], len(part), axis=1)
+        effects = {path: np.full(len(part), value) for path, value in fit.point.effects.items()}
+        pushes = Pushes(bases, part, unit[part])
+        out = problem.innovations(z, effects, fit.noise, fit.filtered, pushes)
+        for i, column in enumerate(part):
+            signal = projector.signal(nothing, 0, (out[i] - residuals)[:, None])
+            if signal is not None:
+                result.append((int(column), signal))
+    return result
+
+
+def regressors(run: RunData, filtered: Filtered) -> dict[str, FloatArray]:
+    """Functions of the filtered motion that a missing force may depend on, each (T,)."""
+    c = channels_from_states(filtered.states.T[:18])
+    row = np.searchsorted(run.command_times, run.clock, side="right") - 1
+    command = run.command_values[np.maximum(row, 0)]
+    offset, amplitude, frequency, stroke, bracket = command.T
+    phase = filtered.states[:, 13]
+    beat = amplitude * frequency
+    u, v, w, p, q, r = (c[name] for name in ("u", "v", "w", "p", "q", "r"))
+    plain: dict[str, FloatArray] = {"constant": np.ones_like(u), "time": run.clock / 30.0}
+    plain |= {"u": u, "v": v, "w": w, "p": p, "q": q, "r": r}
+    plain |= {f"{n}|{n}|": x * np.abs(x) for n, x in zip("uvwpqr", (u, v, w, p, q, r), strict=True)}
+    plain |= {"u v": u * v, "u w": u * w, "u q": u * q, "u r": u * r, "v r": v * r, "w q": w * q}
+    plain |= {"p r": p * r, "u^3": u**3, "v^3": v**3}
+    plain |= {"sin pitch": np.sin(c["pitch"]), "sin roll": np.sin(c["roll"])}
+    plain |= {"cos yaw": np.cos(c["yaw"]), "sin yaw": np.sin(c["yaw"])}
+    depth = c["z"] - np.mean(c["z"])
+    plain |= {"depth": depth, "depth^2": depth**2, "depth^3": depth**3}
+    plain |= {"north": c["x"] - c["x"].mean(), "east": c["y"] - c["y"].mean()}
+    plain |= {"beat speed^2": beat**2, "offset beat^2": offset * beat**2, "u beat": u * beat}
+    plain |= {"frequency": frequency - frequency.mean(), "amplitude": amplitude - amplitude.mean()}
+    plain |= {"block": stroke, "bracket": bracket, "offset": offset}
+    waves: tuple[tuple[str, Callable[[FloatArray], FloatArray]], ...] = (
+        ("sin", np.sin),
+        ("cos", np.cos),
+    )
+    for harmonic in (1, 2, 3):
+        for name, function in waves:
+            plain[f"{name} {harmonic} phase"] = beat**2 * function(harmonic * phase)
+    return plain

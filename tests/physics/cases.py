@@ -122,9 +122,13 @@ def rotation(state: np.ndarray) -> np.ndarray:
 
 
 def end_state(simulator: Simulator, commands: list, duration: float, start: InitialState):
-    """Pose, velocities and tail phase, then effect states, after a run; without the integrals."""
+    """Pose, velocities and tail phase, then effect states, after a run.
+
+    Without the running integrals, and without what effects remember, which is not integrated.
+    """
     states = run_between(simulator, commands, 0.0, duration, start).states[-1]
-    return np.delete(states, np.arange(14, 18))
+    remembered = len(simulator.model.kernels.composition.memory_names)
+    return np.delete(states[: len(states) - remembered], np.arange(14, 18))
 
 
 def run_between(

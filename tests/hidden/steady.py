@@ -15,9 +15,9 @@ from tests.hidden.plans import Plan
 from tests.hidden.simulate import Start, Swim
 from tests.hidden.truth import Truth
 
-SETTLE, WINDOW = 20.0, 10.0
+SETTLE, WINDOW = 90.0, 10.0
 """s. Time to forget the start, and longest time to average over."""
-STEP = 0.004
+STEP = 0.005
 SAMPLES_PER_BEAT = 40
 
 

@@ -16,6 +16,7 @@ from fish_env.effects import catalogue
 from fish_env.params import load_fish
 from fish_env.sensing import channels_from_states, measured_channels, true_times
 from fish_env.simulator import InitialState, Simulator
+from fish_env.steady import steady_motion
 from tests import reference_model
 from tests.hidden import suite
 from tests.hidden.cases import draw_truth, make_case
@@ -25,6 +26,7 @@ from tests.hidden.plans import PLANS, plan_of
 from tests.hidden.scoring import score
 from tests.hidden.simulate import Start, simulate
 from tests.hidden.sizes import FOREIGN_SIZES, SIZES, draw_effect
+from tests.hidden.steady import steady_row
 from tests.hidden.stubs import perfect, silent
 from tests.hidden.summary import rate, summarise
 from tests.hidden.truth import Truth
@@ -174,6 +176,17 @@ def test_cases_of_other_tiers_can_be_read(tier, tmp_path):
     dataset = load_dataset(tmp_path / "case")
     assert dataset.notes == ()
     assert set(dataset.channels) == set(plan_of(tier, 1).noise)
+
+
+def test_steady_rows_mean_what_the_package_means_by_steady():
+    command = np.array([-0.4, 0.3, 1.5, 0.003, 0.0])
+    calm = {"colour": "ou", "force": 1e-12, "time_constant": 1.0, "inertial": True}
+    truth = Truth("steady", 0, "zheng-2021-a", disturbance=calm)
+    fish = load_fish("zheng-2021-a")
+    row = steady_row(truth, fish, command, np.random.default_rng(0))
+    steady = steady_motion(fish, command[None])
+    for name, value in row.items():
+        assert value == pytest.approx(steady[name][0], abs=1e-4)
 
 
 def drawn(tier, seed=0):

@@ -8,15 +8,19 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help setup test lint demo bench clean
+.PHONY: help setup demo test lint docs bench benchmark-diagnosis clean
 
 help:  ## list the targets
-	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /  make \1\t/' | expand -t 16
+	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 28
 
 setup: $(VENV)/.with-dev  ## create .venv and install everything that tests and training need
 
+demo: $(VENV)/.with-base  ## compare a real fish with its simulation and swim the environment
+	$(BIN)/robofish demo
+
 test: setup lint  ## check style, types and layering, then run the tests
-	$(BIN)/python -m pytest -n $(JOBS)
+	$(BIN)/python -m scripts.warm_kernels --processes $(JOBS)
+	$(BIN)/python -m pytest -n $(JOBS) --dist loadfile
 
 lint: setup  ## style, types and import direction
 	$(BIN)/ruff check .
@@ -24,11 +28,20 @@ lint: setup  ## style, types and import direction
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-demo: $(VENV)/.with-base  ## compare a measured fish with its simulation and swim the environment
-	$(BIN)/robofish demo
+docs: $(VENV)/.with-base  ## write the generated pages and the generated parts of the README
+	$(BIN)/python -m scripts.make_effects_page
+	$(BIN)/python -m scripts.make_environment_page
+	$(BIN)/python -m scripts.update_readme
 
-bench: $(VENV)/.with-bench  ## measure speed beside other environments
-	$(BIN)/python scripts/bench/run.py
+bench: $(VENV)/.with-bench  ## measure speed beside other environments, and put it into the README
+	$(BIN)/python -m scripts.bench.startup
+	$(BIN)/python -m scripts.bench.random_actions
+	$(BIN)/python -m scripts.bench.c_loop
+	$(BIN)/python -m scripts.bench.speed
+	$(BIN)/python -m scripts.update_readme
+
+benchmark-diagnosis: setup  ## hide effects in made-up measurements, and count what is found
+	$(BIN)/python scripts/benchmark_diagnosis.py
 
 clean:  ## remove .venv and everything that builds and tests leave behind
 	rm -rf $(VENV) build dist out .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

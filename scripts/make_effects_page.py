@@ -1,0 +1,99 @@
+"""Writes docs/effects.md from the effects' declarations.
+
+Run it as ``python -m scripts.make_effects_page``.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from pathlib import Path
+
+from fish_env.effects import catalogue
+from fish_env.model.effect import SECTIONS, Effect, EffectParameter
+
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "effects.md"
+
+INTRODUCTION = """\
+# Catalogue of effects
+
+What a real fish may do that the [baseline model](model.md) leaves out. Written by
+`make docs` from the effects themselves; `robofish effects` prints the
+same.
+
+Every effect is off at its neutral values and then changes nothing, to the last bit. Switch effects
+on in a fish file, in Python, or for the environment:
+
+```yaml
+effects: {servo_lag: {time_constant: 0.05}, current: {north: 0.02}}
+```
+
+```python
+import gymnasium as gym
+
+from fish_env import Simulator
+
+Simulator("zheng-2021-a", effects={"servo_lag": {"time_constant": 0.05}})
+gym.make("fish_env:RoboticFish3D-v0", effects={"added_mass": {"surge": 0.2, "sway": 1.0}})
+```
+
+*xi* is the angle of the tail, *cmd* the angle commanded, *V_rel* the velocity through the water,
+*omega* the angular velocity, both in the body frame. "Plausible" is the range that a robotic fish
+of 29 cm and 2 kg may show, "possible" what is accepted. Where effects of one section act on the
+same quantity, they act in the order of this page. [Your own effect](your-own.md) is a file of
+yours.
+"""
+
+
+def page() -> str:
+    """The page as Markdown."""
+    effects = list(catalogue().values())
+    parts = [INTRODUCTION, _overview(effects)]
+    for section in SECTIONS:
+        members = [effect for effect in effects if effect.section == section]
+        parts += [f"## {section.capitalize()}\n"] * bool(members)
+        parts += [_entry(effect) for effect in members]
+    return "\n".join(parts)
+
+
+def _overview(effects: list[Effect]) -> str:
+    rows = [f"| [`{e.name}`](#{e.name}) | {e.section} | {_cell(e.summary)} |" for e in effects]
+    return "\n".join(["| effect | section | what one sees |", "| --- | --- | --- |", *rows, ""])
+
+
+def _entry(effect: Effect) -> str:
+    lines = [
+        f"### {effect.name}\n",
+        f"{effect.summary}\n",
+        f"    {effect.equation}\n",
+        "| parameter | unit | neutral | plausible | possible | meaning |",
+        "| --- | --- | --- | --- | --- | --- |",
+        *(_row(parameter) for parameter in effect.parameters),
+        "",
+    ]
+    if effect.confusable_with:
+        others = ", ".join(f"[`{name}`](#{name})" for name in effect.confusable_with)
+        lines.append(f"Easily confused with {others}.\n")
+    return "\n".join([*lines, f"Source: {effect.source.rstrip('.')}.\n"])
+
+
+def _row(parameter: EffectParameter) -> str:
+    low, high = parameter.plausible
+    return (
+        f"| `{parameter.name}` | {parameter.unit} | {parameter.neutral:g} | {low:g} to {high:g} "
+        f"| {_possible(parameter)} | {_cell(parameter.description)} |"
+    )
+
+
+def _possible(parameter: EffectParameter) -> str:
+    if (parameter.lower, parameter.upper) == (-inf, inf):
+        return "any"
+    return f"{parameter.lower:g} to {parameter.upper:g}"
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
+    print(f"written: {PAGE}")

@@ -1,0 +1,122 @@
+"""Generated pages are up to date, links lead somewhere, and the tables say what the code does."""
+
+import inspect
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from fish_env.effects import catalogue
+from fish_env.envs.robotic_fish_3d import RoboticFish3DEnv
+from scripts import make_effects_page, make_environment_page, update_readme
+from tests.docs.pages import PAGES, ROOT
+
+REMEDY = "run `make docs`"
+EXAMPLES = ("examples/my-fish.yaml", "examples/cable_drag.py")
+
+
+@pytest.mark.parametrize("module", [make_effects_page, make_environment_page])
+def test_a_generated_page_is_up_to_date(module):
+    assert module.PAGE.read_text(encoding="utf-8") == module.page(), REMEDY
+
+
+def test_the_generated_parts_of_the_readme_are_up_to_date():
+    text = update_readme.README.read_text(encoding="utf-8")
+    assert text == update_readme.updated(text, update_readme.BLOCKS), REMEDY
+
+
+def test_every_effect_has_an_entry_with_its_parameters():
+    page = make_effects_page.page()
+    for name, effect in catalogue().items():
+        entry = page.split(f"### {name}\n")[1].split("\n### ")[0]
+        for parameter in effect.parameters:
+            assert f"| `{parameter.name}` | {parameter.unit} |" in entry
+        assert effect.equation in entry
+
+
+def test_every_option_of_the_environment_is_on_its_page():
+    table = make_environment_page.page().split("## Options")[1].split("## Many fish")[0]
+    options = list(inspect.signature(RoboticFish3DEnv).parameters)
+    assert re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE) == options
+
+
+def test_a_formula_on_the_environments_page_is_no_list():
+    """A line that begins with a minus sign would start one."""
+    lines = make_environment_page.page().partition("## Settings")[0].splitlines()
+    assert [line for line in lines if line.startswith(("- ", "+ "))] == []
+
+
+@pytest.mark.parametrize("example", EXAMPLES)
+def test_the_examples_on_a_page_are_the_files(example):
+    page = (ROOT / "docs" / "your-own.md").read_text(encoding="utf-8")
+    shown = re.search(rf"<!-- {example} -->\n```\w+\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    assert shown is not None
+    assert shown[1] == (ROOT / example).read_text(encoding="utf-8"), "copy the file into the page"
+
+
+def links(page: Path) -> list[str]:
+    """Targets inside the project that a page points to."""
+    text = page.read_text(encoding="utf-8")
+    found = re.findall(r"\]\(([^)\s]+)\)|src=\"([^\"]+)\"", text)
+    targets = [first or second for first, second in found]
+    return [target for target in targets if not target.startswith("http")]
+
+
+def anchors(page: Path) -> set[str]:
+    """Names of the headings of a page, as in links."""
+    headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return {re.sub(r"[^\w -]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def is_broken(link: str, page: Path) -> bool:
+    """Whether a link leads nowhere."""
+    name, _, anchor = link.partition("#")
+    target = page.parent / name if name else page
+    return not target.exists() or bool(anchor and anchor not in anchors(target))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_links_lead_somewhere(page):
+    assert [link for link in links(page) if is_broken(link, page)] == []
+
+
+def test_the_link_check_notices_a_dead_one():
+    page = ROOT / "docs" / "model.md"
+    assert is_broken("nowhere.md", page)
+    assert is_broken("effects.md#no_such_effect", page)
+    assert not is_broken("effects.md#servo_lag", page)
+
+
+def test_a_block_is_written_anew_and_the_rest_is_kept():
+    text = "a\n<!-- x -->\nold\n<!-- end of x -->\nb\n"
+    assert update_readme.updated(text, {"x": lambda: r"new \1"}) == (
+        "a\n<!-- x -->\n\nnew \\1\n\n<!-- end of x -->\nb\n"
+    )
+    with pytest.raises(ValueError, match="no block 'y'"):
+        update_readme.updated(text, {"y": lambda: ""})
+
+
+def test_the_speed_table_takes_the_latest_measurement(tmp_path):
+    spread = {"median": 5.25, "low": 5.0, "high": 5.5}
+    row = {"name": "ours", "envs": 1, "threads": 1, "simulated_s_per_s": 12_000.0}
+    record = {
+        "date": "2026-01-02",
+        "machine": {"cpu": "a CPU", "cores": 2, "python": "3.11.2"},
+        "versions": {"numpy": "2.1", "mujoco": "not installed"},
+        "measured": [row | {"env_steps_per_s": spread | {"median": 120_000.0}}],
+        "missing": [{"name": "theirs", "reason": "no module"}],
+        "verdicts": [
+            {"claim": "one", "against": "p", "target": 4.0, "ratio": spread, "verdict": "met"},
+            {"claim": "two", "against": "p", "target": 6.0, "ratio": None, "verdict": "-"},
+        ],
+    }
+    (tmp_path / "speed-2026-01-01.json").write_text("{}")
+    (tmp_path / "speed-2026-01-02.json").write_text(json.dumps(record))
+    table = update_readme.speed(tmp_path)
+    assert "| ours | 1 | 1 | 120k | 12k |" in table
+    assert "| theirs | | | not measured | |" in table
+    assert "* One: at least 4 times as fast is the aim; it is 5.2 times: met." in table
+    assert "* Two: at least 6 times as fast is the aim; not measured." in table
+    assert "mujoco" not in table
+    assert "Not measured" in update_readme.speed(tmp_path / "none")

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from fish_env.diagnosis.causes import Cause, effect_values
 from fish_env.diagnosis.screening import Screen, Signal, screen
-from fish_env.identification.estimator import Fit, fit, objective_at, refit_disturbance
+from fish_env.identification.estimator import Fit, fit, objective_at
 from fish_env.identification.problem import Point, Problem
 
 FloatArray = npt.NDArray[np.float64]
@@ -114,33 +114,44 @@ def _refit(problem: Problem, current: Explanation, signal: Signal) -> Explanatio
         return Explanation(names, result)
     effects = (*base.effects, cause.name)
     few = problem.subset(3)
-    starts = list(_starts(problem, base, signal))
-    values = [objective_at(few, effects, start, base.noise, base.released) for start in starts]
-    start = starts[int(np.argmin(values))]
+    tried = []
+    for group in _starts(problem, base, signal):
+        values = [objective_at(few, effects, p, base.noise, base.released) for p in group]
+        first = group[int(np.argmin(values))]
+        tried.append(
+            fit(few, effects, first, base.noise, base.released, refit_noise=False, iterations=4)
+        )
+    start = min(tried, key=lambda f: f.objective).point
     result = fit(
         problem, effects, start, base.noise, base.released, refit_noise=False, iterations=4
     )
     return Explanation(names, result)
 
 
-def _starts(problem: Problem, base: Fit, signal: Signal):  # type: ignore[no-untyped-def]
-    """Where to begin: the linear estimate, and every probe, from refitted and nominal baseline."""
+def _starts(problem: Problem, base: Fit, signal: Signal) -> list[list[Point]]:
+    """Where to begin: the linear estimate and every probe, with baselines near and far.
+
+    A baseline refitted without the cause may have gone far to make up for it, so the nominal one
+    is a start of its own.
+    """
     cause = signal.cause
     neutral = problem.neutral([cause.name])
-    alternative = cause.probes[signal.probe]
     size = np.linalg.solve(signal.projected, signal.score)
     linear = dict(neutral)
-    for factor, probe in zip(size, alternative, strict=True):
-        values = effect_values(problem, cause.name, probe)
-        for path, value in values.items():
+    for factor, probe in zip(size, cause.probes[signal.probe], strict=True):
+        for path, value in effect_values(problem, cause.name, probe).items():
             finite = np.isfinite(neutral[path])
             linear[path] = linear[path] + factor * (value - neutral[path]) if finite else value
-    probes = [effect_values(problem, cause.name, p) for alt in cause.probes for p in alt]
+    probes = [effect_values(problem, cause.name, p) for p in cause.probes[signal.probe]]
     bounds = {f.path: (f.lower, f.upper) for f in problem.freedoms([cause.name])}
-    for values in (linear, *probes):
-        clipped = {p: float(np.clip(v, *bounds[p])) for p, v in values.items()}
-        for z in (base.point.z, 0.5 * base.point.z, np.zeros_like(base.point.z)):
-            yield Point(z, {**base.point.effects, **clipped})
+    clipped = [
+        {path: float(np.clip(value, *bounds[path])) for path, value in values.items()}
+        for values in (linear, *probes)
+    ]
+    return [
+        [Point(z, {**base.point.effects, **values}) for values in clipped]
+        for z in (base.point.z, np.zeros_like(base.point.z))
+    ]
 
 
 def _rank(
@@ -148,7 +159,8 @@ def _rank(
 ) -> tuple[list[Explanation], float]:
     """Order explanations by a common yardstick: the disturbance that the best of them leaves."""
     tried = sorted(tried, key=lambda e: e.fit.objective)
-    best = refit_disturbance(tried[0].fit)
+    leader = tried[0].fit
+    best = fit(problem, leader.effects, leader.point, None, leader.released, rounds=3)
     rest = [
         fit(
             problem, e.fit.effects, e.fit.point, best.noise, e.fit.released, refit_noise=False,

@@ -264,15 +264,6 @@ def objective_at(
     return _objective(problem, free, vector, noise)[0]
 
 
-def refit_disturbance(result: Fit) -> Fit:
-    """The same fit with its disturbance estimated again, then polished."""
-    noise = _noise_at(result.problem, result.point, result.noise, final=False)
-    return fit(
-        result.problem, result.effects, result.point, noise, result.released, refit_noise=False,
-        iterations=3,
-    )  # fmt: skip
-
-
 def default_noise(problem: Problem) -> NoiseModel:
     """Sensor noise from differences of the data, and a disturbance of a few millinewton."""
     return NoiseModel(problem.sensor_sd, 3e-3, 1e-4, 1.0)

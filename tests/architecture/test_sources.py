@@ -10,7 +10,11 @@ ROOT = Path(__file__).resolve().parents[2]
 MAX_LINES = 400
 CODE = ("agents", "configs", "examples", "fish_env", "scripts", "tests")
 SOURCES = sorted(file for folder in CODE for file in (ROOT / folder).rglob("*.py"))
-PUBLIC = [file for file in SOURCES if file.relative_to(ROOT).parts[0] in ("agents", "examples", "fish_env")]
+PUBLIC = [
+    file
+    for file in SOURCES
+    if file.relative_to(ROOT).parts[0] in ("agents", "examples", "fish_env")
+]
 
 
 def name(file: Path) -> str:

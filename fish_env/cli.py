@@ -72,6 +72,31 @@ def compare(
 
 
 @app.command()
+def diagnose(
+    dataset: Annotated[
+        str, typer.Argument(help="A folder with dataset.yaml, or a shipped dataset's name.")
+    ],
+    out: Annotated[Path, typer.Option(help="Folder for what is found.")] = Path("out/diagnosis"),
+    fish: Annotated[
+        str | None, typer.Option(help="Another fish than the dataset names: preset or file.")
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="A first look: try fewer causes.")] = False,
+    seed: Annotated[int, typer.Option(help="Of all that is random.")] = 0,
+) -> None:
+    """Find what the simulation gets wrong: a cause with numbers, or an honest "none I know".
+
+    Refits the coefficients first, then tries every effect of the catalogue, and measures on runs
+    kept apart what the best one gains. Writes `diagnosis.json`, and `extended.yaml`, a fish file,
+    where there is something to extend.
+
+    **Example:** `robofish diagnose pool-trials --out out/pool`
+    """
+    from fish_env.commands.diagnose import diagnose_dataset
+
+    diagnose_dataset(Console(), dataset, out, fish, quick, seed)
+
+
+@app.command()
 def info(
     fish: Annotated[str, typer.Option(help="A preset's name, or a parameter file.")] = (
         "zheng-2021-a"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import product
 
@@ -14,6 +14,7 @@ from fish_env.model.effect import Effect, EffectParameter
 
 Probe = Mapping[str, float]
 PARAMETER = "parameter:"
+Size = Callable[[EffectParameter], float]
 
 
 @dataclass(frozen=True)
@@ -82,11 +83,19 @@ def _shape_values(parameter: EffectParameter) -> tuple[float, ...]:
     return tuple(np.linspace(low, high, 3).tolist())
 
 
-def _sizes(switches: list[EffectParameter]):  # type: ignore[no-untyped-def]
-    """Sizes to probe: one small step for smooth effects, several where the neutral is infinite."""
+def _sizes(switches: list[EffectParameter]) -> tuple[Size, Size]:
+    """Sizes to probe, a small and a large one; where the neutral is infinite, low is strong."""
     if any(np.isinf(p.neutral) for p in switches):
-        return (lambda p: p.plausible[1], lambda p: float(np.sqrt(p.plausible[0] * p.plausible[1])))
+        return (_weak_limit, _middling_limit)
     return (_small, _large)
+
+
+def _weak_limit(p: EffectParameter) -> float:
+    return p.plausible[1]
+
+
+def _middling_limit(p: EffectParameter) -> float:
+    return float(np.sqrt(p.plausible[0] * p.plausible[1]))
 
 
 def _small(p: EffectParameter) -> float:

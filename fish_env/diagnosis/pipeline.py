@@ -2,25 +2,35 @@
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from fish_env.data import Dataset, load_dataset, split_runs
 from fish_env.diagnosis.adequacy import Adequacy, adequacy
+from fish_env.diagnosis.answer import as_dict
 from fish_env.diagnosis.attribution import Attribution, attribute
 from fish_env.diagnosis.causes import causes_of
+from fish_env.diagnosis.extended_file import extended_fish
+from fish_env.diagnosis.gain import Gain, Pair, measure_gain, misfit_of
+from fish_env.diagnosis.next_experiment import Proposal, propose
 from fish_env.diagnosis.preconditions import Precondition, preconditions
+from fish_env.diagnosis.suitability import check_runs
 from fish_env.diagnosis.verdict import Verdict, decide
 from fish_env.errors import DatasetError
 from fish_env.identification.estimator import Fit, fit
 from fish_env.identification.problem import Problem
+from fish_env.params.io import load_fish, save_fish
 from fish_env.params.schema import FishParams
 
 Progress = Callable[[str], None]
+EXTENDING = ("cause", "parameters", "ambiguous")
+"""Verdicts that come with an extended model."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +45,11 @@ class Diagnosis:
         adequacy: whether the accepted explanation reaches the floor.
         preconditions: what the runs could show.
         verdict: the answer.
+        misfit: whitened one-step errors by channel, baseline and accepted.
+        gain: on the final runs; None without an extension, or without final runs.
+        next_experiment: manoeuvre that separates what is still open; None where nothing is.
         seed: seed of splits and null distributions.
+        quick: whether fewer causes were refitted.
         runtime_s: wall time.
     """
 
@@ -46,13 +60,65 @@ class Diagnosis:
     adequacy: Adequacy
     preconditions: tuple[Precondition, ...]
     verdict: Verdict
+    misfit: dict[str, Pair]
+    gain: Gain | None
+    next_experiment: Proposal | None
     seed: int
+    quick: bool
     runtime_s: float
 
     @property
     def accepted(self) -> Fit:
         """The accepted fit: extended, or the refitted baseline."""
         return self.attribution.accepted.fit
+
+
+def diagnose(
+    folder: str | Path,
+    out: str | Path | None = None,
+    seed: int = 0,
+    quick: bool = False,
+    fish: FishParams | str | Path | None = None,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Diagnose a folder of measured runs.
+
+    Args:
+        folder: folder with a dataset.yaml, or the name of a shipped dataset.
+        out: folder for ``diagnosis.json`` and, where there is something to extend,
+            ``extended.yaml``; nothing is written without it.
+        seed: of the split and of the null distributions.
+        quick: refit fewer causes.
+        fish: another fish than the dataset names: parameters, preset or file.
+        progress: told the name of each step.
+
+    Returns:
+        The content of ``diagnosis.json``.
+
+    Raises:
+        DatasetError: the data cannot be read, or no diagnosis should be built on them.
+        ParameterError: the fish cannot be used.
+    """
+    chosen = fish if isinstance(fish, FishParams) or fish is None else load_fish(fish)
+    tell = progress or (lambda step: None)
+    diagnosis = diagnose_runs(load_runs(folder), chosen, seed, quick, tell)
+    answer = as_dict(diagnosis)
+    if out is not None:
+        write(diagnosis, answer, Path(out))
+    return answer
+
+
+def write(diagnosis: Diagnosis, answer: dict[str, Any], folder: Path) -> None:
+    """Writes ``diagnosis.json`` and, where there is something to extend, ``extended.yaml``."""
+    folder.mkdir(parents=True, exist_ok=True)
+    text = json.dumps(answer, indent=1, allow_nan=False)
+    (folder / "diagnosis.json").write_text(text + "\n", encoding="utf-8")
+    extended = folder / "extended.yaml"
+    if diagnosis.verdict.name in EXTENDING:
+        save_fish(extended_fish(diagnosis.accepted, diagnosis.dataset), extended)
+    else:
+        # One of an earlier diagnosis would contradict this one.
+        extended.unlink(missing_ok=True)
 
 
 def diagnose_runs(
@@ -70,9 +136,14 @@ def diagnose_runs(
         seed: of the split and of the null distributions.
         quick: refit fewer causes.
         progress: told the name of each step.
+
+    Raises:
+        DatasetError: no diagnosis should be built on these runs.
     """
     begin = time.perf_counter()
     rng = np.random.default_rng(seed)
+    progress("checking the runs")
+    check_runs(dataset)
     fitted, final = _split(dataset, seed)
     progress("refitting the baseline")
     problem = Problem(dataset, fish, fitted)
@@ -83,11 +154,19 @@ def diagnose_runs(
     progress("what the runs could show")
     shown = preconditions(problem, attribution.screens[0], causes)
     progress("testing what is left")
-    left = adequacy(attribution.accepted.fit, rng)
+    accepted = attribution.accepted.fit
+    left = adequacy(accepted, rng)
     verdict = decide(attribution, left, shown)
+    gain = None
+    if verdict.name in EXTENDING and final:
+        progress("measuring the gain on final runs")
+        gain = measure_gain(Problem(dataset, fish, final), baseline, accepted, rng)
+    progress("choosing the next experiment")
+    proposal = propose(attribution, verdict, shown)
+    misfit = misfit_of(problem, baseline, accepted)
     return Diagnosis(
-        dataset, final, problem, attribution, left, shown, verdict, seed,
-        time.perf_counter() - begin,
+        dataset, final, problem, attribution, left, shown, verdict, misfit, gain, proposal, seed,
+        quick, time.perf_counter() - begin,
     )  # fmt: skip
 
 
@@ -107,5 +186,8 @@ def load_runs(folder: str | Path) -> Dataset:
     """
     dataset = load_dataset(folder)
     if not isinstance(dataset, Dataset):
-        raise DatasetError(f"{folder}: a table of steady motion; runs over time are needed here")
+        raise DatasetError(
+            f"{folder}: a table of steady motion; a diagnosis needs runs over time, "
+            "compare it with `robofish compare` instead"
+        )
     return dataset

@@ -1,0 +1,97 @@
+"""`robofish diagnose`: what the simulation of a fish gets wrong."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from fish_env.diagnosis.answer import words
+from fish_env.diagnosis.pipeline import diagnose
+
+
+def diagnose_dataset(
+    console: Console, dataset: str, out: Path, fish: str | None, quick: bool, seed: int
+) -> dict[str, Any]:
+    """Diagnoses a dataset, prints the verdict and writes the files.
+
+    Args:
+        console: Where the verdict goes.
+        dataset: Folder, or name of a shipped dataset.
+        out: Folder for `diagnosis.json` and `extended.yaml`.
+        fish: Another fish than the dataset names: preset or file.
+        quick: Refit fewer causes.
+        seed: Of the split into runs and of the null distributions.
+
+    Raises:
+        RoboticFishError: The data or the fish cannot be used.
+    """
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as progress:
+        task = progress.add_task("reading", total=None)
+        answer = diagnose(
+            dataset, out, seed, quick, fish, lambda step: progress.update(task, description=step)
+        )
+    print_answer(console, answer)
+    console.print(f"numbers: {out / 'diagnosis.json'}", soft_wrap=True)
+    if (out / "extended.yaml").exists():
+        console.print(f"extended model: {out / 'extended.yaml'}", soft_wrap=True)
+    return answer
+
+
+def print_answer(console: Console, answer: dict[str, Any]) -> None:
+    """Prints the verdict in words, then what supports it."""
+    console.print(f"[bold]{answer['verdict']}[/bold]  {escape(words(answer))}", highlight=False)
+    if answer["quick"]:
+        console.print("a first look: only the three likeliest causes were refitted", style="dim")
+    if answer["causes"]:
+        console.print(_causes(answer))
+    console.print(_misfit(answer))
+    if answer["unexplained"]:
+        console.print(_unexplained(answer))
+    experiment = answer["next_experiment"]
+    if experiment["separates"]:
+        aim = ", ".join(experiment["separates"])
+        console.print(f"next experiment: {experiment['manoeuvre']}, to see {aim}", highlight=False)
+    for note in answer["notes"]:
+        console.print(f"note: {note}", style="dim", highlight=False)
+
+
+def _table(title: str, *columns: str) -> Table:
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+    for i, column in enumerate(columns):
+        table.add_column(column, justify="left" if i == 0 else "right")
+    return table
+
+
+def _causes(answer: dict[str, Any]) -> Table:
+    table = _table("Causes", "cause", "parameter", "estimate", "95 % interval", "unit")
+    for explanation in (answer["causes"], *answer["alternatives"]):
+        for cause in explanation:
+            for name, p in cause["parameters"].items():
+                low, high = p["ci95"]
+                interval = f"{low:.4g} to {high:.4g}"
+                table.add_row(cause["name"], name, f"{p['estimate']:.4g}", interval, p["unit"])
+        table.add_section()
+    return table
+
+
+def _misfit(answer: dict[str, Any]) -> Table:
+    title = "One-step prediction errors in units of the noise (1: nothing left)"
+    table = _table(title, "channel", "refitted baseline", "with the causes")
+    for name, pair in answer["misfit"].items():
+        table.add_row(name, f"{pair['baseline']:.2f}", f"{pair['extended']:.2f}")
+    return table
+
+
+def _unexplained(answer: dict[str, Any]) -> Table:
+    table = _table("Asked for beyond every known cause", "direction", "depends on", "rms")
+    for item in answer["unexplained"][:5]:
+        unit = "N" if item["direction"] in ("surge", "sway", "heave") else "N m"
+        table.add_row(item["direction"], item["depends_on"], f"{item['rms']:.2g} {unit}")
+    return table

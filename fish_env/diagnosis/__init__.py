@@ -1,0 +1,9 @@
+"""Diagnosis: what a simulation gets wrong, from measured runs to a named cause.
+
+:func:`diagnose` takes a folder and returns the answer as plain data; :func:`diagnose_runs` keeps
+the fits and screens for a closer look.
+"""
+
+from fish_env.diagnosis.pipeline import Diagnosis, diagnose, diagnose_runs
+
+__all__ = ["Diagnosis", "diagnose", "diagnose_runs"]

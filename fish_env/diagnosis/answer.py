@@ -1,0 +1,225 @@
+"""A diagnosis as plain data, in the form ``robofish-diagnosis/1`` of ``diagnosis.json``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fish_env.diagnosis.causes import PARAMETER
+from fish_env.diagnosis.gain import Gain, Pair
+from fish_env.diagnosis.preconditions import Precondition
+from fish_env.effects.extended import PREFIX
+from fish_env.identification.estimator import Fit
+
+if TYPE_CHECKING:
+    from fish_env.diagnosis.pipeline import Diagnosis
+
+FORMAT = "robofish-diagnosis/1"
+Plain = dict[str, Any]
+
+
+def as_dict(diagnosis: Diagnosis) -> Plain:
+    """Everything that ``diagnosis.json`` holds."""
+    verdict = diagnosis.verdict
+    alternatives = [
+        [_cause(rival.fit, name) for name in rival.causes]
+        for rival in diagnosis.attribution.rivals
+        if rival.causes in verdict.alternatives
+    ]
+    return {
+        "format": FORMAT,
+        "dataset": diagnosis.dataset.name,
+        "fish": diagnosis.problem.fish.name,
+        "seed": diagnosis.seed,
+        "quick": diagnosis.quick,
+        "runtime_s": diagnosis.runtime_s,
+        "verdict": verdict.name,
+        "causes": [_cause(diagnosis.accepted, name) for name in verdict.causes],
+        "alternatives": alternatives,
+        "parameters": coefficients(diagnosis.accepted),
+        "noise": _noise(diagnosis.accepted),
+        "misfit": {name: _pair(pair, "noise sd") for name, pair in diagnosis.misfit.items()},
+        "gain": _gain(diagnosis.gain),
+        "preconditions": [_precondition(p) for p in diagnosis.preconditions],
+        "ranking": [{"name": n, "score": s} for n, s in diagnosis.attribution.ranking],
+        "unexplained": [] if diagnosis.adequacy.reached else _unexplained(diagnosis),
+        "next_experiment": _experiment(diagnosis),
+        "notes": list(diagnosis.dataset.notes),
+    }
+
+
+def _cause(fit: Fit, name: str) -> Plain:
+    if name.startswith(PARAMETER):
+        path = name.removeprefix(PARAMETER)
+        unit = fit.problem.fish.info(path).unit
+        return {"name": name, "parameters": {"value": _estimate(fit, path, unit)}}
+    effect = fit.problem.known[name]
+    return {
+        "name": name,
+        "parameters": {
+            p.name: _estimate(fit, f"{PREFIX}{name}.{p.name}", p.unit) for p in effect.parameters
+        },
+    }
+
+
+def _estimate(fit: Fit, path: str, unit: str) -> Plain:
+    value = float(fit.estimates[fit.names.index(path)])
+    return {"estimate": value, "ci95": list(fit.interval(path)), "unit": unit}
+
+
+def coefficients(fit: Fit) -> list[Plain]:
+    """Every baseline coefficient: nominal, estimated, and how surprising under its prior."""
+    baseline = fit.problem.baseline
+    return [
+        {
+            "name": f"{PARAMETER}{path}",
+            "nominal": float(baseline.mean[i]),
+            "estimate": float(fit.estimates[i]),
+            "ci95": list(fit.interval(path)),
+            "prior_sd": float(baseline.sd[i]),
+            "prior_sds_off": float((fit.estimates[i] - baseline.mean[i]) / baseline.sd[i]),
+            "unit": fit.problem.fish.info(path).unit,
+        }
+        for i, path in enumerate(baseline.paths)
+    ]
+
+
+def _noise(fit: Fit) -> Plain:
+    sensors = zip(fit.problem.channels, fit.noise.sensor_sd.tolist(), strict=True)
+    return {
+        "sensor_sd": dict(sensors),
+        "disturbance": {
+            "force_sd": fit.noise.force_sd,
+            "moment_sd": fit.noise.moment_sd,
+            "correlation_s": fit.noise.correlation_s,
+        },
+    }
+
+
+def _pair(pair: Pair, unit: str) -> Plain:
+    return {**asdict(pair), "unit": unit}
+
+
+def _gain(gain: Gain | None) -> Plain | None:
+    if gain is None:
+        return None
+    share = None
+    if gain.share is not None and gain.share_ci95 is not None:
+        share = {"estimate": gain.share, "ci95": list(gain.share_ci95)}
+    return {
+        "final_runs": list(gain.runs),
+        "fit_percent": asdict(gain.fit_percent),
+        "rmse": {name: asdict(pair) for name, pair in gain.rmse.items()},
+        "misfit": {name: _pair(pair, "noise sd") for name, pair in gain.misfit.items()},
+        "share_of_reachable": share,
+    }
+
+
+def _precondition(p: Precondition) -> Plain:
+    sizes = {name: value for name, value in p.smallest_detectable.items() if isfinite(value)}
+    return {
+        "name": p.name,
+        "absorbed_share": float(np.clip(p.absorbed_share, 0.0, 1.0)),
+        "smallest_detectable": sizes,
+        "most_confusable": list(p.most_confusable) if p.most_confusable else None,
+        "excited": bool(p.excited),
+    }
+
+
+def _unexplained(diagnosis: Diagnosis) -> list[Plain]:
+    """Forces the data still ask for, over and above the best explanation."""
+    return [
+        {"depends_on": m.function, "direction": m.direction, "rms": m.size, "log_p": m.log_p}
+        for m in diagnosis.adequacy.misfits
+    ]
+
+
+def _experiment(diagnosis: Diagnosis) -> Plain:
+    proposal = diagnosis.next_experiment
+    if proposal is None:
+        return {"schedule": [], "separates": []}
+    return {
+        "manoeuvre": proposal.name,
+        "schedule": [dict(row) for row in proposal.schedule],
+        "separates": list(proposal.separates),
+        "separation": proposal.separation,
+    }
+
+
+def words(answer: Plain) -> str:
+    """The verdict in two sentences for somebody who builds robots."""
+    say: dict[str, Sequence[str]] = {
+        "no_misfit": (
+            "The simulation explains these runs down to the noise once its coefficients are "
+            "fitted within what was known of them.",
+            _blind(answer),
+        ),
+        "not_excited": (
+            "Nothing is seen to be wrong, but these runs could not show most causes.",
+            _blind(answer),
+        ),
+        "parameters": (
+            f"The structure of the model holds, but its numbers do not: {_named(answer)}.",
+            _gained(answer),
+        ),
+        "cause": (f"The simulation lacks {_named(answer)}.", _gained(answer)),
+        "ambiguous": (
+            f"Something is missing, and these runs cannot tell {_named(answer)} from "
+            f"{_others(answer)}.",
+            "Fly the next experiment to separate them.",
+        ),
+        "outside_library": (
+            "Something is missing that none of the known causes explains.",
+            _asked(answer),
+        ),
+    }
+    return " ".join(sentence for sentence in say[answer["verdict"]] if sentence)
+
+
+def _named(answer: Plain) -> str:
+    return " and ".join(_one(cause) for cause in answer["causes"])
+
+
+def _one(cause: Plain) -> str:
+    name = cause["name"].removeprefix(PARAMETER)
+    values = ", ".join(
+        f"{key} {p['estimate']:.3g} ({p['ci95'][0]:.3g} to {p['ci95'][1]:.3g}) {p['unit']}".rstrip()
+        for key, p in cause["parameters"].items()
+    )
+    return f"{name} [{values}]"
+
+
+def _others(answer: Plain) -> str:
+    return " or from ".join(" and ".join(map(_one, other)) for other in answer["alternatives"])
+
+
+def _gained(answer: Plain) -> str:
+    gain = answer["gain"]
+    if not gain:
+        return "There were too few runs to keep some for judging the gain."
+    fit = gain["fit_percent"]
+    return (
+        f"On runs kept for judging, predictions over 3 s fit {fit['extended']:.0f} % with it and "
+        f"{fit['baseline']:.0f} % without."
+    )
+
+
+def _blind(answer: Plain) -> str:
+    blind = [p["name"] for p in answer["preconditions"] if not p["excited"]]
+    if not blind:
+        return "Every known cause of a plausible size would have been found."
+    return f"They could not have shown: {', '.join(blind)}."
+
+
+def _asked(answer: Plain) -> str:
+    if not answer["unexplained"]:
+        return ""
+    first = answer["unexplained"][0]
+    return (
+        f"What is left looks most like a force or moment in {first['direction']} that depends on "
+        f"{first['depends_on']}."
+    )

@@ -1,0 +1,159 @@
+"""Which manoeuvre would separate what these runs leave open.
+
+For each manoeuvre of a menu the runs still to be flown are simulated by the present explanation.
+A rival is separated by the part of its difference that the coefficients, held by the data so far
+and their priors, cannot follow (T-optimality: Atkinson and Fedorov, 1975).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from fish_env.diagnosis import open_loop
+from fish_env.diagnosis.attribution import Attribution
+from fish_env.diagnosis.causes import effect_values
+from fish_env.diagnosis.manoeuvres import DURATION_S, MENU, Manoeuvre
+from fish_env.diagnosis.preconditions import Precondition
+from fish_env.diagnosis.verdict import Verdict
+from fish_env.identification.estimator import Z_STEP, Fit
+from fish_env.identification.problem import Point, Problem
+from fish_env.identification.runs import RunData
+
+FloatArray = npt.NDArray[np.float64]
+RATE_HZ = 25.0
+STEP_S = 0.02
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """A manoeuvre to fly.
+
+    Attributes:
+        name: what it does.
+        schedule: rows of ``t`` (s) and commands (SI), each held until the next.
+        separates: what it would tell apart.
+        separation: mean squared distance between rivals and the present explanation, in noise
+            units, that a refit cannot close.
+    """
+
+    name: str
+    schedule: tuple[Mapping[str, float], ...]
+    separates: tuple[str, ...]
+    separation: float
+
+
+def propose(
+    attribution: Attribution, verdict: Verdict, shown: Sequence[Precondition]
+) -> Proposal | None:
+    """The manoeuvre of the menu that separates rivals, or shows causes the runs could not."""
+    fit = attribution.accepted.fit
+    rivals = _rivals(attribution, verdict, shown)
+    if not rivals:
+        return None
+    names = tuple(rivals)
+    points = list(rivals.values())
+    found = [(separation(fit, points, m), m) for m in MENU]
+    best, manoeuvre = max(found, key=lambda pair: float(np.mean(np.log1p(pair[0]))))
+    return Proposal(manoeuvre.name, manoeuvre.schedule, names, float(np.mean(best)))
+
+
+def _rivals(
+    attribution: Attribution, verdict: Verdict, shown: Sequence[Precondition]
+) -> dict[str, Point]:
+    """What the present explanation is to be told from: other fits, or unseen causes."""
+    fit = attribution.accepted.fit
+    if verdict.name == "ambiguous":
+        return {" + ".join(rival.causes): rival.fit.point for rival in attribution.rivals}
+    if verdict.name not in ("no_misfit", "not_excited"):
+        return {}
+    blind = [p.name for p in shown if not p.excited]
+    return {name: _plausible(fit, name) for name in blind}
+
+
+def _plausible(fit: Fit, name: str) -> Point:
+    """The present explanation with a cause at a plausible size."""
+    effect = fit.problem.known[name]
+    sizes = {}
+    for p in effect.parameters:
+        low, high = p.plausible
+        far = high if abs(high - p.neutral) >= abs(low - p.neutral) else low
+        sizes[p.name] = low if np.isinf(p.neutral) else 0.5 * (low + high) if p.shapes else far
+    values = effect_values(fit.problem, name, sizes)
+    bounds = {f.path: (f.lower, f.upper) for f in fit.problem.freedoms([name])}
+    clipped = {path: float(np.clip(value, *bounds[path])) for path, value in values.items()}
+    return Point(fit.point.z, {**fit.point.effects, **clipped})
+
+
+def separation(fit: Fit, rivals: Sequence[Point], manoeuvre: Manoeuvre) -> FloatArray:
+    """Squared distance of each rival that a refit cannot close, shape (rivals,)."""
+    problem = flown(fit, manoeuvre)
+    filtered = problem.filtered(fit.point, fit.noise)
+    count = len(problem.baseline)
+    nudged = [replace(fit.point, z=fit.point.z + Z_STEP * np.eye(count)[i]) for i in range(count)]
+    z, effects = _lanes(problem, [fit.point, *nudged, *rivals])
+    out = problem.innovations(z, effects, fit.noise, filtered)
+    slopes = (out[1 : 1 + count] - out[0]).T / Z_STEP
+    differences = (out[1 + count :] - out[0]).T
+    return unfollowed(slopes, differences, _information(fit, count))
+
+
+def unfollowed(slopes: FloatArray, differences: FloatArray, information: FloatArray) -> FloatArray:
+    """Squared length of each difference after the best move along the slopes.
+
+    Args:
+        slopes: (D, n) what the coefficients can do on the new run.
+        differences: (D, m) rivals.
+        information: (n, n) what holds the coefficients already, priors included.
+    """
+    move = np.linalg.solve(slopes.T @ slopes + information, slopes.T @ differences)
+    left = differences - slopes @ move
+    held = np.einsum("im,ij,jm->m", move, information, move)
+    return np.asarray(np.einsum("dm,dm->m", left, left) + held)
+
+
+def _information(fit: Fit, count: int) -> FloatArray:
+    slopes = fit.linearised.slopes[:, :count]
+    return np.asarray(slopes.T @ slopes + np.eye(count))
+
+
+def _lanes(problem: Problem, points: Sequence[Point]) -> tuple[FloatArray, dict[str, FloatArray]]:
+    paths = list(dict.fromkeys(path for point in points for path in point.effects))
+    neutral = problem.neutral({path.split(".")[1] for path in paths})
+    effects = {
+        path: np.array([point.effects.get(path, neutral[path]) for point in points])
+        for path in paths
+    }
+    return np.column_stack([point.z for point in points]), effects
+
+
+def flown(fit: Fit, manoeuvre: Manoeuvre) -> Problem:
+    """The manoeuvre as the present explanation would swim it, without noise."""
+    blank = _blank(fit.problem, manoeuvre)
+    on_blank = open_loop.on_runs(fit.problem, [blank])
+    predicted = -open_loop.errors(on_blank, fit.point, fit.noise)[0]
+    return open_loop.on_runs(fit.problem, [replace(blank, measured=predicted)])
+
+
+def _blank(problem: Problem, manoeuvre: Manoeuvre) -> RunData:
+    """A run of zeros: prediction errors on it are the prediction, negative."""
+    clock = np.arange(0.0, DURATION_S, 1.0 / RATE_HZ)
+    substeps = np.full(len(clock), int(np.ceil(1.0 / RATE_HZ / STEP_S - 1e-9)), np.int64)
+    pattern = problem.runs[0]
+    state = np.zeros_like(pattern.state0)
+    state[3] = 1.0
+    state[2] = np.median([run.state0[2] for run in problem.runs])
+    return replace(
+        pattern,
+        id=manoeuvre.name,
+        clock=clock,
+        substeps=substeps,
+        command_times=manoeuvre.times_s,
+        command_values=manoeuvre.values,
+        measured=np.zeros((len(clock), len(problem.channels))),
+        state0=state,
+        phase_known=True,
+    )

@@ -1,0 +1,57 @@
+"""A linear problem that stands in for a fit: residuals are y + S z, with z standard normal."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from fish_env.diagnosis.causes import Cause
+from fish_env.identification.estimator import Linearised
+
+BLOCKS, PER_BLOCK, COEFFICIENTS = 60, 20, 4
+
+
+class LinearProblem:
+    """Slopes and signals drawn once; data drawn as often as wanted."""
+
+    def __init__(self, seed: int = 0, signals: int = 6, settings: int = 1) -> None:
+        rng = np.random.default_rng(seed)
+        self.size = BLOCKS * PER_BLOCK
+        self.slopes = rng.standard_normal((self.size, COEFFICIENTS))
+        shared = rng.standard_normal((self.size, 1))
+        self.columns = [
+            0.1 * (rng.standard_normal((self.size, settings)) + shared + self.slopes[:, [0]])
+            for _ in range(signals)
+        ]
+        self.causes = [Cause(f"cause_{i}", (({"a": 1.0},),)) for i in range(signals)]
+
+    def fit(self, rng: np.random.Generator, added: np.ndarray | float = 0.0, memory: float = 0.0):
+        """A refitted baseline on new data, with a signal and coloured residuals if wanted."""
+        noise = rng.standard_normal(self.size)
+        for i in range(1, self.size) if memory else ():
+            noise[i] = memory * noise[i - 1] + np.sqrt(1 - memory**2) * noise[i]
+        data = noise - self.slopes @ rng.standard_normal(COEFFICIENTS) + added
+        hessian = self.slopes.T @ self.slopes + np.eye(COEFFICIENTS)
+        z = -np.linalg.solve(hessian, self.slopes.T @ data)
+        times = np.repeat(3.0 * np.arange(BLOCKS) + 1.0, PER_BLOCK)
+        linearised = Linearised(
+            data + self.slopes @ z, self.slopes, np.zeros(self.size, np.int64), times
+        )
+        paths = tuple(f"c{i}" for i in range(COEFFICIENTS))
+        return SimpleNamespace(
+            linearised=linearised,
+            problem=SimpleNamespace(baseline=Sized(paths)),
+            released=(),
+            point=SimpleNamespace(z=z),
+        )
+
+
+class Sized:
+    """What is read of a baseline: its paths, and how many there are."""
+
+    def __init__(self, paths: tuple[str, ...]) -> None:
+        self.paths = paths
+
+    def __len__(self) -> int:
+        return len(self.paths)

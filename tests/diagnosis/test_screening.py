@@ -1,0 +1,123 @@
+"""Screening on a linear problem, where the right answers are known."""
+
+import numpy as np
+import pytest
+from scipy.stats import kstest
+
+from fish_env.diagnosis.screening import (
+    Projector,
+    confusability,
+    null_threshold,
+    smallest_detectable,
+)
+from tests.diagnosis.linear import COEFFICIENTS, LinearProblem
+
+PROBLEM = LinearProblem()
+
+
+def signals(fit, problem=PROBLEM):
+    projector = Projector(fit)
+    pairs = zip(problem.causes, problem.columns, strict=True)
+    return [projector.signal(cause, 0, columns) for cause, columns in pairs]
+
+
+def alarms(problem, threshold, repeats=400, corrected=True, **data):
+    """Share of data sets in which some p-value falls below the threshold."""
+    rng, found = np.random.default_rng(5), 0
+    for _ in range(repeats):
+        tested = signals(problem.fit(rng, **data), problem)
+        if not corrected:
+            for s in tested:
+                object.__setattr__(s, "inflation", 1.0)
+        found += min(s.p_value for s in tested) < threshold
+    return found / repeats
+
+
+def threshold_of(problem, level=0.05):
+    rng = np.random.default_rng(1)
+    return null_threshold(signals(problem.fit(rng), problem), rng, level)
+
+
+def test_a_signal_keeps_what_the_coefficients_cannot_follow():
+    """Its information is the Schur complement of the joint information, priors included."""
+    fit = PROBLEM.fit(np.random.default_rng(0))
+    slopes, column = PROBLEM.slopes, PROBLEM.columns[0]
+    inverse = np.linalg.inv(slopes.T @ slopes + np.eye(COEFFICIENTS))
+    expected = column.T @ column - column.T @ slopes @ inverse @ slopes.T @ column
+    signal = Projector(fit).signal(PROBLEM.causes[0], 0, column)
+    assert signal.projected == pytest.approx(expected, rel=1e-6)
+    assert 0.2 < signal.absorbed_share < 0.5
+
+
+def test_a_signal_that_the_coefficients_can_follow_is_absorbed():
+    fit = PROBLEM.fit(np.random.default_rng(0))
+    own = Projector(fit).signal(PROBLEM.causes[0], 0, PROBLEM.slopes[:, [1]])
+    other = Projector(fit).signal(PROBLEM.causes[0], 0, np.random.default_rng(9).normal(
+        size=(PROBLEM.size, 1)
+    ))  # fmt: skip
+    assert own.absorbed_share > 0.99
+    assert other.absorbed_share < 0.05
+    assert Projector(fit).signal(PROBLEM.causes[0], 0, np.zeros((PROBLEM.size, 1))) is None
+
+
+@pytest.mark.parametrize("settings", [1, 3])
+def test_p_values_are_uniform_where_nothing_is_wrong(settings):
+    """With prior draws of the coefficients and white noise; too narrow a spread would be seen."""
+    problem = LinearProblem(signals=1, settings=settings)
+    rng, values = np.random.default_rng(2), []
+    for _ in range(500):
+        signal = signals(problem.fit(rng), problem)[0]
+        object.__setattr__(signal, "inflation", 1.0)
+        values.append(np.exp(signal.p_value))
+    assert kstest(values, "uniform").pvalue > 0.01
+    assert kstest(np.array(values) ** 1.5, "uniform").pvalue < 0.01
+
+
+def test_false_alarms_keep_to_the_level_over_all_causes_together():
+    threshold = threshold_of(PROBLEM)
+    assert np.log(0.05 / len(PROBLEM.causes)) <= threshold < np.log(0.05)
+    assert 0.01 < alarms(PROBLEM, threshold) < 0.08
+    assert alarms(PROBLEM, np.log(0.05)) > 0.1  # each cause at the level by itself
+
+
+def test_causes_that_are_alike_cost_less_than_different_ones():
+    alike = LinearProblem(signals=1)
+    alike.columns, alike.causes = alike.columns * 6, alike.causes * 6
+    assert threshold_of(alike) == pytest.approx(np.log(0.05), abs=0.15)
+    assert threshold_of(alike) > threshold_of(PROBLEM) + 0.5
+
+
+def test_coloured_residuals_raise_fewer_alarms_than_an_uncorrected_test():
+    """Slow signals and slow residuals are what makes an uncorrected test see ghosts."""
+    problem = LinearProblem(signals=4)
+    problem.columns = [np.cumsum(c, axis=0) / 10 for c in problem.columns]
+    problem.columns = [c - c.mean() for c in problem.columns]
+    threshold = threshold_of(problem)
+    plain = alarms(problem, threshold, 150, corrected=False, memory=0.8)
+    corrected = alarms(problem, threshold, 150, memory=0.8)
+    assert plain > 0.4
+    assert corrected < 0.4 * plain
+
+
+def test_the_smallest_detectable_size_is_found_four_times_in_five():
+    problem = LinearProblem(signals=1)
+    threshold = threshold_of(problem)
+    rng = np.random.default_rng(3)
+    first = signals(problem.fit(rng), problem)[0]
+    object.__setattr__(first, "inflation", 1.0)
+    size = smallest_detectable(first, 0, threshold)
+    shift = -size * problem.columns[0][:, 0]
+    power = alarms(problem, threshold, 400, corrected=False, added=shift)
+    half = alarms(problem, threshold, 400, corrected=False, added=0.5 * shift)
+    assert power == pytest.approx(0.8, abs=0.06)
+    assert half < 0.5
+
+
+def test_confusability_of_equal_and_of_unlike_signals():
+    fit = PROBLEM.fit(np.random.default_rng(0))
+    a, b, *_ = signals(fit)
+    assert confusability(a, a) == pytest.approx(1.0)
+    assert 0.3 < confusability(a, b) < 0.7  # half of each is shared
+    rng = np.random.default_rng(8)
+    white = Projector(fit).signal(a.cause, 0, rng.standard_normal((PROBLEM.size, 1)))
+    assert confusability(a, white) < 0.15

@@ -150,14 +150,26 @@ def cpu_model() -> str:
     return names[0] if names else platform.processor() or "unknown"
 
 
+def cores() -> int:
+    """Cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def load_average() -> list[float]:
+    """Over 1, 5 and 15 minutes; empty where the system does not say (Windows)."""
+    return [round(load, 2) for load in os.getloadavg()] if hasattr(os, "getloadavg") else []
+
+
 def machine() -> dict[str, object]:
     """Where this ran: processor, cores this process may use, Python, load average now."""
     return {
         "cpu": cpu_model(),
-        "cores": len(os.sched_getaffinity(0)),
+        "cores": cores(),
         "system": platform.system(),
         "python": platform.python_version(),
-        "load_average": [round(load, 2) for load in os.getloadavg()],
+        "load_average": load_average(),
     }
 
 

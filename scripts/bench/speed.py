@@ -13,7 +13,6 @@ from __future__ import annotations
 import argparse
 import datetime
 import json
-import os
 import sys
 from pathlib import Path
 
@@ -39,7 +38,7 @@ def main(argv: list[str] | None = None) -> None:
     """Measure, print, judge, write."""
     options = arguments(argv)
     started = datetime.datetime.now()
-    before = os.getloadavg()
+    before = harness.load_average()
     chosen = [b for b in (*ours.BUILDERS, *peers.BUILDERS) if options.only.lower() in b[0].lower()]
     if not chosen:
         sys.exit(f"no contender has '{options.only}' in its name")
@@ -54,7 +53,7 @@ def main(argv: list[str] | None = None) -> None:
     print(file=sys.stderr)
     facts: dict[str, object] = {
         "date": started.date().isoformat(),
-        "machine": {**harness.machine(), "load_average_before": [round(x, 2) for x in before]},
+        "machine": {**harness.machine(), "load_average_before": before},
         "versions": harness.versions(),
         "rounds": rounds,
     }

@@ -37,24 +37,15 @@ static inline void sincos_of(double angle, double *sine_out, double *cosine_out)
     double x = ((angle - turns * 1.5707963267341256) - turns * 6.077100506303966e-11)
                - turns * 2.0222662487959506e-21;
     double y = x * x;
-    double sine = 1.0 / 355687428096000.0;
-    sine = sine * y - 1.0 / 1307674368000.0;
-    sine = sine * y + 1.0 / 6227020800.0;
-    sine = sine * y - 1.0 / 39916800.0;
-    sine = sine * y + 1.0 / 362880.0;
-    sine = sine * y - 1.0 / 5040.0;
-    sine = sine * y + 1.0 / 120.0;
-    sine = sine * y - 1.0 / 6.0;
-    sine = x + x * (y * sine);
-    double cosine = 1.0 / 20922789888000.0;
-    cosine = cosine * y - 1.0 / 87178291200.0;
-    cosine = cosine * y + 1.0 / 479001600.0;
-    cosine = cosine * y - 1.0 / 3628800.0;
-    cosine = cosine * y + 1.0 / 40320.0;
-    cosine = cosine * y - 1.0 / 720.0;
-    cosine = cosine * y + 1.0 / 24.0;
-    cosine = cosine * y - 0.5;
-    cosine = 1.0 + y * cosine;
+    double y2 = y * y, y4 = y2 * y2;
+    double low = (y * (1.0 / 120.0) - 1.0 / 6.0) + y2 * (y * (1.0 / 362880.0) - 1.0 / 5040.0);
+    double high = (y * (1.0 / 6227020800.0) - 1.0 / 39916800.0)
+                  + y2 * (y * (1.0 / 355687428096000.0) - 1.0 / 1307674368000.0);
+    double sine = x + (x * y) * (low + y4 * high);
+    low = (y * (1.0 / 24.0) - 0.5) + y2 * (y * (1.0 / 40320.0) - 1.0 / 720.0);
+    high = (y * (1.0 / 479001600.0) - 1.0 / 3628800.0)
+           + y2 * (y * (1.0 / 20922789888000.0) - 1.0 / 87178291200.0);
+    double cosine = 1.0 + y * (low + y4 * high);
     double quarter = turns - 4.0 * rint((turns - 1.5) * 0.25);
     int odd = (quarter == 1.0) | (quarter == 3.0);
     double first = odd ? cosine : sine;
@@ -155,25 +146,22 @@ static inline void derivative(Block *restrict b, int k)
     double mz = cx * gy - cy * gx + P(DAMPING_Z) * r + mz_impact + (tx * tail_y - ty * tail_x)
                 + (jx - jy) * (p * q) - m * (cx * ay - cy * ax);
 
-    /* LDL^T of the mass matrix [[m I, -m S(c)], [m S(c), J]] */
+    /* the mass matrix [[m I, -m S(c)], [m S(c), J]] */
     double i0 = 1.0 / m;
     double a31 = -m * cz, a32 = m * cy, a40 = m * cz, a42 = -m * cx, a50 = -m * cy, a51 = m * cx;
     double l31 = a31 * i0, l32 = a32 * i0, l40 = a40 * i0, l42 = a42 * i0, l50 = a50 * i0;
     double l51 = a51 * i0;
-    double i3 = 1.0 / (jx - l31 * a31 - l32 * a32);
-    double c43 = -l42 * a32, c53 = -l51 * a31;
-    double l43 = c43 * i3, l53 = c53 * i3;
-    double i4 = 1.0 / (jy - l40 * a40 - l42 * a42 - l43 * c43);
-    double c54 = -l50 * a40 - l53 * c43;
-    double l54 = c54 * i4;
-    double i5 = 1.0 / (jz - l50 * a50 - l51 * a51 - l53 * c53 - l54 * c54);
+    double s33 = jx - l31 * a31 - l32 * a32, s43 = -l42 * a32, s53 = -l51 * a31;
+    double s44 = jy - l40 * a40 - l42 * a42, s54 = -l50 * a40, s55 = jz - l50 * a50 - l51 * a51;
     double y3 = mx - l31 * fy - l32 * fz;
-    double y4 = my - l40 * fx - l42 * fz - l43 * y3;
-    double y5 = mz - l50 * fx - l51 * fy - l53 * y3 - l54 * y4;
-    double r5 = y5 * i5;
-    double r4 = y4 * i4 - l54 * r5;
-    double r3 = y3 * i3 - l43 * r4 - l53 * r5;
-
+    double y4 = my - l40 * fx - l42 * fz;
+    double y5 = mz - l50 * fx - l51 * fy;
+    double k33 = s44 * s55 - s54 * s54, k43 = s53 * s54 - s43 * s55, k53 = s43 * s54 - s53 * s44;
+    double k44 = s33 * s55 - s53 * s53, k54 = s43 * s53 - s33 * s54, k55 = s33 * s44 - s43 * s43;
+    double per = 1.0 / (s33 * k33 + s43 * k43 + s53 * k53);
+    double r3 = per * (k33 * y3 + k43 * y4 + k53 * y5);
+    double r4 = per * (k43 * y3 + k44 * y4 + k54 * y5);
+    double r5 = per * (k53 * y3 + k54 * y4 + k55 * y5);
     double level = inverse_of(sqrt(xx * xx + yx * yx));
     b->slope[0][k] = xx * u + xy * v + xz * w;
     b->slope[1][k] = yx * u + yy * v + yz * w;

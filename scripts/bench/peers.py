@@ -64,7 +64,7 @@ def envpool_fish(envs: int, batch: int, threads: int) -> Contender:
     import envpool
 
     needed, free = envs * ENVPOOL_BYTES, os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    if needed > free:
+    if 1.25 * needed > free:
         raise MemoryError(f"needs {needed / 1e9:.0f} GB of memory, {free / 1e9:.0f} GB are free")
 
     env = envpool.make(

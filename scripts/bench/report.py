@@ -14,7 +14,7 @@ class Claim:
 
     Attributes:
         text: what is compared.
-        ours: start of our contender's name, with its number of threads.
+        ours: name of our contender, with its number of threads.
         theirs: start of the peer's name, with its number of threads; the fastest match counts.
         target: least ratio.
     """
@@ -57,8 +57,14 @@ class Verdict:
         return "met" if self.spread.median >= self.claim.target else "missed"
 
 
+def named(measured: Sequence[Measured], name: str, threads: int) -> Measured | None:
+    """The contender of exactly this name and number of threads."""
+    found = (m for m in measured if (m.contender.name, m.contender.threads) == (name, threads))
+    return next(found, None)
+
+
 def best(measured: Sequence[Measured], start: str, threads: int) -> Measured | None:
-    """The fastest contender of this name and number of threads."""
+    """The fastest contender whose name begins so, with this number of threads."""
     found = [
         m for m in measured
         if m.contender.name.startswith(start) and m.contender.threads == threads
@@ -70,7 +76,7 @@ def judge(measured: Sequence[Measured], claims: Sequence[Claim] = CLAIMS) -> lis
     """Compare our contender with the best of the peers in each claim."""
     verdicts = []
     for claim in claims:
-        ours, theirs = best(measured, *claim.ours), best(measured, *claim.theirs)
+        ours, theirs = named(measured, *claim.ours), best(measured, *claim.theirs)
         complete = ours is not None and theirs is not None
         spread = ratio(ours, theirs) if complete else None
         against = theirs.contender.name if theirs is not None else claim.theirs[0]

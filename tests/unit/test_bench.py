@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from scripts.bench import c_loop, harness, random_actions, report, startup
+from scripts.bench import c_loop, harness, ours, random_actions, report, startup
 from scripts.bench.harness import Contender, Measured, Missing
 
 
@@ -56,6 +56,7 @@ def test_missing_peer_is_reported():
 RACE = [
     measured("RoboticFish3D-v0, gym.make", [100.0, 100.0]),
     measured("Gymnasium Swimmer-v5, gym.make", [20.0, 20.0]),
+    measured("RoboticFish3D-v0, gym.make_vec 1024", [800.0, 800.0]),
     measured("RoboticFish3D-v0, gym.make_vec 1024", [900.0, 900.0], threads=2),
     measured("EnvPool FishSwim-v1, 64", [100.0, 100.0], threads=2),
     measured("EnvPool FishSwim-v1, 128", [200.0, 200.0], threads=2),
@@ -68,6 +69,12 @@ def test_claims_are_judged_against_the_best_peer_on_as_many_threads():
     assert (single.word, single.spread.median) == ("met", 5.0)
     assert (batch.word, batch.spread.median) == ("missed", 4.5)
     assert batch.against == "EnvPool FishSwim-v1, 128"
+
+
+def test_names_in_claims_are_those_of_contenders():
+    """A claim about a contender that is called otherwise would never be measured."""
+    made = {(c.name, c.threads) for c in (ours.single(), ours.vector(1024, 2))}
+    assert made == {claim.ours for claim in report.CLAIMS}
 
 
 def test_a_claim_without_its_peer_is_not_measured():
@@ -92,11 +99,11 @@ def test_numbers_are_short(number, text):
 @pytest.mark.parametrize("count", [1, 20])
 def test_c_loop_swims_our_trajectories(count, tmp_path):
     case = c_loop.Case.of(count)
-    ours = c_loop.our_advance(case)
+    own = c_loop.our_advance(case)
     library = c_loop.compile_loop(c_loop.PLAIN, 1 if count == 1 else 16, tmp_path)
-    assert c_loop.disagreement(ours, c_loop.c_advance(library, case), case) < c_loop.TOLERANCE
+    assert c_loop.disagreement(own, c_loop.c_advance(library, case), case) < c_loop.TOLERANCE
     other = c_loop.Case(case.state, case.commands, case.record * 1.0001)
-    assert c_loop.disagreement(ours, c_loop.c_advance(library, other), case) > c_loop.TOLERANCE
+    assert c_loop.disagreement(own, c_loop.c_advance(library, other), case) > c_loop.TOLERANCE
 
 
 def test_what_is_not_finite_is_named():

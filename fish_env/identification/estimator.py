@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -94,7 +95,7 @@ class _Free:
         self.steps = np.r_[np.full(self.count, Z_STEP), [f.step for f in self.freedoms]]
 
     def pack(self, point: Point) -> FloatArray:
-        return np.r_[point.z, [point.effects[f.path] for f in self.freedoms]]
+        return np.asarray(np.r_[point.z, [point.effects[f.path] for f in self.freedoms]], float)
 
     def unpack(self, vector: FloatArray) -> Point:
         values = vector[self.count :].tolist()
@@ -115,7 +116,7 @@ class _Free:
         low, high = baseline.bounds
         values = baseline.values(z[:, None])[:, 0]
         inside = np.clip(values, low + 1e-3 * baseline.sd, high - 1e-3 * baseline.sd)
-        return np.linalg.solve(baseline.factor, inside - baseline.mean)
+        return np.asarray(np.linalg.solve(baseline.factor, inside - baseline.mean))
 
     def lanes(self, vector: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Perturbed vectors (n, 1 + n), the centre first, and the signed steps (n,)."""
@@ -240,14 +241,14 @@ def _hessian(lin: Linearised, free: _Free) -> FloatArray:
     return np.asarray(information + np.diag(free.prior + floor))
 
 
-def _settled(before: NoiseModel, after: NoiseModel) -> bool:
-    """Whether the disturbance changed by less than a tenth."""
+def _settled(before: NoiseModel, after: NoiseModel, share: float = 0.1) -> bool:
+    """Whether the disturbance changed by less than a share of itself."""
     pairs = [
         (before.force_sd, after.force_sd),
         (before.moment_sd, after.moment_sd),
         (before.correlation_s, after.correlation_s),
     ]
-    return all(abs(np.log(b / a)) < 0.1 for a, b in pairs)
+    return all(abs(np.log(b / a)) < share for a, b in pairs)
 
 
 def objective_at(
@@ -276,13 +277,17 @@ def _noise_at(problem: Problem, point: Point, noise: NoiseModel, final: bool) ->
     which once stood in for a misfit does not stay.
     """
     few = problem.subset(4)
-
-    def log_likelihood(trial: NoiseModel) -> float:
-        return sum(r.log_likelihood for r in few.filtered(point, trial))
-
-    small = NoiseModel(noise.sensor_sd, 3e-3, 1e-4, 1.0)
-    start = max((noise, small), key=log_likelihood)
-    return fit_noise(log_likelihood, start, 30, problem.sensor_sd if final else None)
+    found = noise
+    for _ in range(3):
+        filtered, made_with = few.filtered(point, found, keep_slopes=True), found
+        replay = partial(few.filter_for(point.effects).replay, filtered, made_with)
+        small = NoiseModel(found.sensor_sd, 3e-3, 1e-4, 1.0)
+        found = fit_noise(
+            replay, max((found, small), key=replay), 30, problem.sensor_sd if final else None
+        )
+        if _settled(made_with, found, 0.4):
+            break
+    return found
 
 
 def _finish(
@@ -297,7 +302,7 @@ def _finish(
 ) -> Fit:
     lin = linearise(problem, free, vector, noise, filtered)
     hessian = _hessian(lin, free)
-    inverse = np.linalg.inv(hessian)
+    inverse = np.asarray(np.linalg.inv(hessian), float)
     covariance = sandwich(lin, inverse, free.prior)
     scale = free.scale()
     physical = scale @ covariance @ scale.T

@@ -14,13 +14,16 @@ import numpy.typing as npt
 
 from fish_env.effects.extended import ExtendedModel
 from fish_env.identification.applied_wrench import EFFECT as APPLIED_WRENCH
-from fish_env.identification.runs import CHANNEL_CODES, N_ERROR, RunData
+from fish_env.identification.filter_algebra import N_ERROR, N_MOVING
+from fish_env.identification.runs import CHANNEL_CODES, RunData
 from fish_env.model.history import history_rows
 from fish_env.model.runtime import Kernels, default_threads, kernels
 from fish_env.model.state import BASE_STATES
 
 FloatArray = npt.NDArray[np.float64]
-FILTER_TEMPLATE = Path(__file__).with_name("filter_template.py")
+TEMPLATES = tuple(
+    Path(__file__).with_name(f"{name}_template.py") for name in ("error_state", "filter", "replay")
+)
 
 
 @dataclass(frozen=True)
@@ -47,7 +50,17 @@ class NoiseModel:
 
 @dataclass(frozen=True, eq=False)
 class Filtered:
-    """Result of the filter on one run (arrays as in ``filter_template.ekf_run``)."""
+    """Result of the filter on one run.
+
+    Attributes:
+        gains: (T, 19, C) Kalman gains.
+        whitening: (T, C, C) inverse Cholesky factors of the innovations' covariances.
+        innovations: (T, C) whitened.
+        states: (T, states) filtered states.
+        wrench: (T, 6) filtered disturbance, body frame (N, N m).
+        log_likelihood: without its constant.
+        slopes: what another noise model's likelihood is computed from, if it was asked for.
+    """
 
     gains: FloatArray
     whitening: FloatArray
@@ -55,6 +68,22 @@ class Filtered:
     states: FloatArray
     wrench: FloatArray
     log_likelihood: float
+    slopes: Slopes | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Slopes:
+    """A run linearised along its filtered states.
+
+    Attributes:
+        motion: (T, 12, 19) over the interval before each sample.
+        channels: (T, C, 19).
+        raw: (T, C) innovations in the channels' units.
+    """
+
+    motion: FloatArray
+    channels: FloatArray
+    raw: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +127,11 @@ class RunFilter:
         return history_rows(self.kernels.longest_delay(records), step)
 
     def run(
-        self, record: FloatArray, measurement: Measurement, noise: NoiseModel
+        self,
+        record: FloatArray,
+        measurement: Measurement,
+        noise: NoiseModel,
+        keep_slopes: bool = False,
     ) -> list[Filtered]:
         """Filter every run with one parameter set.
 
@@ -106,6 +139,7 @@ class RunFilter:
             record: (parameters, 1).
             measurement: for one lane.
             noise: noise model.
+            keep_slopes: keep what :meth:`replay` needs.
         """
         entry = self.kernels.entry("ekf_run")
 
@@ -117,6 +151,12 @@ class RunFilter:
             e = np.zeros((samples, channels))
             x = np.zeros((samples, states))
             d = np.zeros((samples, 6))
+            rows = samples if keep_slopes else 0
+            slopes = Slopes(
+                np.zeros((rows, N_MOVING, N_ERROR)),
+                np.zeros((rows, channels, N_ERROR)),
+                np.zeros((rows, channels)),
+            )
             state0 = np.zeros(states)
             state0[: len(BASE_STATES)] = data.state0
             value = entry(
@@ -125,10 +165,36 @@ class RunFilter:
                 data.command_values, data.measured, self.codes, noise.sensor_sd**2,
                 data.covariance0, noise.wrench_variance, noise.correlation_s,
                 self._history_rows(record, data), self.model.tables, k, w, e, x, d,
+                slopes.motion, slopes.channels, slopes.raw,
             )  # fmt: skip
-            return Filtered(k, w, e, x, d, float(value))
+            return Filtered(k, w, e, x, d, float(value), slopes if keep_slopes else None)
 
         return list(_threads().map(one, self.runs))
+
+    def replay(
+        self, filtered: Sequence[Filtered], made_with: NoiseModel, noise: NoiseModel
+    ) -> float:
+        """Log likelihood of all runs under another noise model, linearised.
+
+        Args:
+            filtered: results that kept their slopes.
+            made_with: noise model they were made with.
+            noise: the other noise model.
+        """
+        entry = self.kernels.entry("replay_run")
+
+        def one(job: tuple[RunData, Filtered]) -> float:
+            data, result = job
+            assert result.slopes is not None
+            slopes = result.slopes
+            value = entry(
+                data.clock, data.measured, slopes.motion, slopes.channels, slopes.raw, result.gains,
+                result.wrench, made_with.correlation_s, noise.sensor_sd**2, data.covariance0,
+                noise.wrench_variance, noise.correlation_s,
+            )  # fmt: skip
+            return float(value)
+
+        return sum(_threads().map(one, zip(self.runs, filtered, strict=True)))
 
     def innovations(
         self,
@@ -203,4 +269,4 @@ def filter_kernels(model: ExtendedModel) -> Kernels:
     """Compiled filter for a model whose last effect is the applied wrench."""
     composition = model.kernels.composition
     assert composition.effects[-1].name == APPLIED_WRENCH.name
-    return kernels(replace(composition, templates=(*composition.templates, FILTER_TEMPLATE)))
+    return kernels(replace(composition, templates=(*composition.templates, *TEMPLATES)))

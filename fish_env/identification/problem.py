@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from copy import copy
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -15,7 +15,13 @@ from fish_env.effects import catalogue
 from fish_env.effects.extended import PREFIX, ExtendedModel, build_model
 from fish_env.errors import EffectError
 from fish_env.identification.applied_wrench import EFFECT as APPLIED_WRENCH
-from fish_env.identification.filtering import Filtered, NoiseModel, Pushes, RunFilter
+from fish_env.identification.filtering import (
+    Filtered,
+    Measurement,
+    NoiseModel,
+    Pushes,
+    RunFilter,
+)
 from fish_env.identification.noise import white_noise_sd
 from fish_env.identification.parameters import Baseline, EffectFreedom, freedoms, measurement_of
 from fish_env.identification.runs import prepare_run, usable_channels
@@ -85,8 +91,20 @@ class Problem:
 
     @cached_property
     def filter(self) -> RunFilter:
-        """Compiled filter on these runs."""
+        """Compiled filter on these runs, with every effect."""
         return RunFilter(self.model, self.runs, self.channels)
+
+    @cached_property
+    def lean_filter(self) -> RunFilter:
+        """The same without effects on the motion: several times quicker, the same numbers."""
+        model = replace(self.model, declared=(APPLIED_WRENCH,))
+        return RunFilter(model, self.runs, self.channels)
+
+    def filter_for(self, effects: Iterable[str]) -> RunFilter:
+        """The quickest filter that computes with these effect parameters."""
+        names = {path.removeprefix(PREFIX).split(".")[0] for path in effects}
+        moving = {n for n in (*names, *self.model.effects) if self.known[n].acts_on_motion}
+        return self.filter if moving else self.lean_filter
 
     def subset(self, count: int) -> Problem:
         """The same problem on at most ``count`` runs, spread over all of them."""
@@ -95,7 +113,8 @@ class Problem:
         chosen = np.linspace(0, len(self.runs) - 1, count).round().astype(int)
         smaller = copy(self)
         smaller.runs = tuple(self.runs[i] for i in chosen)
-        smaller.__dict__.pop("filter", None)
+        for name in ("filter", "lean_filter"):
+            smaller.__dict__.pop(name, None)
         return smaller
 
     @property
@@ -110,7 +129,7 @@ class Problem:
 
     def neutral(self, names: Iterable[str]) -> dict[str, float]:
         """Values of effects as the fish's file has them, neutral where it says nothing."""
-        values = {}
+        values: dict[str, float] = {}
         for name in names:
             own = self.model.effects.get(name, self.known[name].neutral)
             values |= {f"{PREFIX}{name}.{p}": v for p, v in own.items()}
@@ -139,21 +158,26 @@ class Problem:
         """
         count = z.shape[1]
         records, measurement = self._lanes(z, effects, count)
-        parts = self.filter.innovations(records, measurement, noise, filtered, pushes)
+        parts = self.filter_for(effects).innovations(records, measurement, noise, filtered, pushes)
         return np.concatenate([part.reshape(count, -1) for part in parts], axis=1)
 
-    def filtered(self, point: Point, noise: NoiseModel) -> list[Filtered]:
+    def filtered(
+        self, point: Point, noise: NoiseModel, keep_slopes: bool = False
+    ) -> list[Filtered]:
         """Extended Kalman filter of every run at one point."""
         effects = {path: np.array([value]) for path, value in point.effects.items()}
         record, measurement = self._lanes(point.z[:, None], effects, 1)
-        return self.filter.run(record, measurement, noise)
+        return self.filter_for(point.effects).run(record, measurement, noise, keep_slopes)
 
-    def _lanes(self, z: FloatArray, effects: Mapping[str, FloatArray], count: int):  # type: ignore[no-untyped-def]
+    def _lanes(
+        self, z: FloatArray, effects: Mapping[str, FloatArray], count: int
+    ) -> tuple[FloatArray, Measurement]:
+        """Parameter records (parameters, N) and what the sensors do, for N points."""
         changes: dict[str, FloatArray] = dict(
             zip(self.baseline.paths, self.baseline.values(z), strict=True)
         )
         names = {path.removeprefix(PREFIX).split(".")[0] for path in effects}
-        moving = {n for n in names if self.known[n].hooks}
+        moving = {n for n in names if self.known[n].acts_on_motion}
         changes |= {
             path: values
             for path, values in effects.items()
@@ -162,4 +186,5 @@ class Problem:
         sensing = [self.known[n] for n in sorted(names - moving)]
         own = [e for e in self.model.measurement if e.name not in names]
         measurement = measurement_of(self.model, [*own, *sensing], effects, self.channels, count)
-        return np.ascontiguousarray(self.model.records(changes)), measurement
+        model = self.filter_for(effects).model
+        return np.ascontiguousarray(model.records(changes)), measurement

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from fish_env.data.schema import Run
 from fish_env.errors import DatasetError
+from fish_env.identification.filter_algebra import N_ERROR
 from fish_env.model.frames import quaternion_from_euler
 from fish_env.model.state import BASE_STATES
 
@@ -21,7 +22,6 @@ CHANNEL_CODES = {
     )
 }
 """Channels the filter uses, with the code its kernel knows them by."""
-N_ERROR = 19
 POSITION, ROTATION, VELOCITY, RATE, PHASE = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), 18
 
 

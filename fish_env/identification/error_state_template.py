@@ -1,0 +1,218 @@
+"""Lanes of fish as the filter moves them: commands, steps, channels, small changes of the state.
+
+Completed by :mod:`fish_env.model.compose` behind the rollout template; :mod:`filter_template`
+builds on it. Error state, 19 numbers: position (3, inertial), small rotation (3, body), velocity
+(3, body), angular velocity (3), wrench (6, body), tail phase. Loops over lanes are innermost, so
+that the compiler takes them all at once.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fish_env.identification.filter_algebra import N_ERROR, angle, innovation
+
+# --- completed by compose ---
+from fish_env.model.composed import (
+    N_PARAMETERS,
+    N_STATES,
+    PAR,
+    TIME,
+    U_RATE,
+    X0,
+    U,
+    X,
+    kernel,
+    lane_initialise,
+    rk4_step,
+)
+
+# --- end ---
+
+WRENCH = PAR + N_PARAMETERS - 6
+DIVERGED = 1e4
+
+
+@kernel
+def set_commands(work, width, times, values, at, start, length, pace, delay, shared):
+    """Mean command over each lane's own (true) time interval, so that switches act smoothly."""
+    for k in range(1 if shared else width):
+        begin = pace[k] * start - delay[k]
+        end = begin + pace[k] * length
+        row = at[k]
+        while (row + 1 < times.shape[0]) and (times[row + 1] <= begin + 1e-9):
+            row += 1
+        at[k] = row
+        last = row
+        while (last + 1 < times.shape[0]) and (times[last + 1] < end - 1e-9):
+            last += 1
+        for j in range(5):
+            total = values[row, j]
+            if last > row:
+                total = 0.0
+                left = begin
+                for i in range(row, last + 1):
+                    right = times[i + 1] if i < last else end
+                    total += (right - left) / (end - begin) * values[i, j]
+                    left = right
+            work[(U + j) * width + k] = total
+    if shared:
+        for j in range(5):
+            for k in range(1, width):
+                work[(U + j) * width + k] = work[(U + j) * width]
+
+
+@kernel
+def step_lanes_once(work, width, elapsed, h, pace, late, history, tables):
+    """One RK4 step of every lane, kept where it stays finite."""
+    rk4_step(work, width, elapsed, h, tables, late, history, 0, width, pace)
+    for k in range(width):
+        qw, qx = work[(X + 3) * width + k], work[(X + 4) * width + k]
+        qy, qz = work[(X + 5) * width + k], work[(X + 6) * width + k]
+        scale = 1.0 / np.sqrt(qw * qw + qx * qx + qy * qy + qz * qz)
+        work[(X + 3) * width + k] = qw * scale
+        work[(X + 4) * width + k] = qx * scale
+        work[(X + 5) * width + k] = qy * scale
+        work[(X + 6) * width + k] = qz * scale
+    for n in range(N_STATES * width):
+        value = work[X * width + n]
+        work[X0 * width + n] = value if abs(value) < DIVERGED else work[X0 * width + n]
+
+
+@kernel
+def innovations_of(work, width, measured, codes, gain, bias, e):
+    """Measured minus predicted channels of every lane, e (C, width).
+
+    Codes: 0-2 x y z, 3-5 roll pitch yaw, 6-8 u v w, 9-11 p q r.
+    """
+    for i in range(codes.shape[0]):
+        code = codes[i]
+        if (code < 3) | (code > 5):
+            row = X0 + code + (1 if code > 5 else 0)
+            for k in range(width):
+                predicted = gain[i, k] * work[row * width + k] + bias[i, k]
+                e[i, k] = innovation(measured[i], predicted, False)
+        else:
+            for k in range(width):
+                qw = work[(X0 + 3) * width + k]
+                qx = work[(X0 + 4) * width + k]
+                qy = work[(X0 + 5) * width + k]
+                qz = work[(X0 + 6) * width + k]
+                if code == 3:
+                    sine = 2.0 * (qy * qz + qw * qx)
+                    cosine = 1.0 - 2.0 * (qx * qx + qy * qy)
+                elif code == 4:
+                    sine = min(max(2.0 * (qw * qy - qx * qz), -1.0), 1.0)
+                    cosine = np.sqrt(1.0 - sine * sine)
+                else:
+                    sine = 2.0 * (qx * qy + qw * qz)
+                    cosine = 1.0 - 2.0 * (qy * qy + qz * qz)
+                predicted = gain[i, k] * angle(sine, cosine) + bias[i, k]
+                e[i, k] = innovation(measured[i], predicted, code != 4)
+
+
+@kernel
+def move(work, width, error):
+    """Apply error states (19, width) to all lanes."""
+    for j in range(3):
+        for k in range(width):
+            work[(X0 + j) * width + k] += error[j, k]
+    for k in range(width):
+        ax, ay, az = 0.5 * error[3, k], 0.5 * error[4, k], 0.5 * error[5, k]
+        qw = work[(X0 + 3) * width + k]
+        qx = work[(X0 + 4) * width + k]
+        qy = work[(X0 + 5) * width + k]
+        qz = work[(X0 + 6) * width + k]
+        nw = qw - qx * ax - qy * ay - qz * az
+        nx = qx + qw * ax + qy * az - qz * ay
+        ny = qy + qw * ay + qz * ax - qx * az
+        nz = qz + qw * az + qx * ay - qy * ax
+        scale = 1.0 / np.sqrt(nw * nw + nx * nx + ny * ny + nz * nz)
+        work[(X0 + 3) * width + k] = nw * scale
+        work[(X0 + 4) * width + k] = nx * scale
+        work[(X0 + 5) * width + k] = ny * scale
+        work[(X0 + 6) * width + k] = nz * scale
+    for j in range(6):
+        for k in range(width):
+            work[(X0 + 7 + j) * width + k] += error[6 + j, k]
+            work[(WRENCH + j) * width + k] += error[12 + j, k]
+    for k in range(width):
+        work[(X0 + 13) * width + k] += error[18, k]
+
+
+@kernel
+def difference(work, width, into):
+    """Moving part of the error state of every lane relative to lane 0, (12, width)."""
+    for j in range(3):
+        for k in range(width):
+            into[j, k] = work[(X0 + j) * width + k] - work[(X0 + j) * width]
+            into[6 + j, k] = work[(X0 + 7 + j) * width + k] - work[(X0 + 7 + j) * width]
+            into[9 + j, k] = work[(X0 + 10 + j) * width + k] - work[(X0 + 10 + j) * width]
+    aw = work[(X0 + 3) * width]
+    ax = -work[(X0 + 4) * width]
+    ay = -work[(X0 + 5) * width]
+    az = -work[(X0 + 6) * width]
+    for k in range(width):
+        bw = work[(X0 + 3) * width + k]
+        bx = work[(X0 + 4) * width + k]
+        by = work[(X0 + 5) * width + k]
+        bz = work[(X0 + 6) * width + k]
+        sign = 2.0 if aw * bw - ax * bx - ay * by - az * bz > 0.0 else -2.0
+        into[3, k] = sign * (aw * bx + ax * bw + ay * bz - az * by)
+        into[4, k] = sign * (aw * by + ay * bw + az * bx - ax * bz)
+        into[5, k] = sign * (aw * bz + az * bw + ax * by - ay * bx)
+
+
+@kernel
+def observation_rows(work, width, codes, gain, measured, rows):
+    """d(channel)/d(error state) of lane 0, (C, 19); zero for a missing sample."""
+    qw = work[(X0 + 3) * width]
+    qx = work[(X0 + 4) * width]
+    qy = work[(X0 + 5) * width]
+    qz = work[(X0 + 6) * width]
+    zx = 2.0 * (qx * qz - qw * qy)
+    zy = 2.0 * (qy * qz + qw * qx)
+    zz = 1.0 - 2.0 * (qx * qx + qy * qy)
+    cosine = np.sqrt(max(1.0 - zx * zx, 1e-6))
+    sin_roll, cos_roll, tan_pitch = zy / cosine, zz / cosine, -zx / cosine
+    for i in range(codes.shape[0]):
+        for j in range(N_ERROR):
+            rows[i, j] = 0.0
+        code = codes[i]
+        size = gain[i] if measured[i] == measured[i] else 0.0
+        if code == 3:
+            rows[i, 3] = size
+            rows[i, 4] = size * sin_roll * tan_pitch
+            rows[i, 5] = size * cos_roll * tan_pitch
+        elif code == 4:
+            rows[i, 4] = size * cos_roll
+            rows[i, 5] = -size * sin_roll
+        elif code == 5:
+            rows[i, 4] = size * sin_roll / cosine
+            rows[i, 5] = size * cos_roll / cosine
+        else:
+            rows[i, code] = size
+
+
+@kernel
+def load_lane(work, width, k, state, par, row, first_command):
+    """Put a state and a parameter record into a lane."""
+    for j in range(N_STATES):
+        work[(X0 + j) * width + k] = state[j]
+    for j in range(N_PARAMETERS):
+        work[(PAR + j) * width + k] = par[j, row]
+    for j in range(5):
+        work[(U + j) * width + k] = first_command[j]
+        work[(U_RATE + j) * width + k] = 0.0
+    work[TIME * width + k] = 0.0
+
+
+@kernel
+def start_effects(work, width):
+    """Effect states where the start of a run leaves them (they live in the X rows)."""
+    for n in range(N_STATES * width):
+        work[X * width + n] = work[X0 * width + n]
+    for k in range(width):
+        lane_initialise(k, width, work)
+    for n in range(N_STATES * width):
+        work[X0 * width + n] = work[X * width + n]

@@ -1,0 +1,94 @@
+"""Likelihood of a noise model from a linearised run, without moving the fish again.
+
+The slopes of motion and channels along a filtered run do not depend on the noise to first order.
+So the covariances of another noise model, and how far its estimate strays from the stored one,
+follow by linear algebra alone. Completed by :mod:`fish_env.model.compose`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fish_env.identification.filter_algebra import (
+    N_ERROR,
+    N_MOVING,
+    predict_covariance,
+    update_covariance,
+)
+
+# --- completed by compose ---
+from fish_env.model.composed import entry_point
+
+# --- end ---
+
+
+@entry_point
+def replay_run(
+    clock, measured, f_in, h_in, raw_in, k_in, d_in, decay_in_s, noise_variance, covariance0,
+    wrench_variance, wrench_decay_s,
+):  # fmt: skip
+    """Log likelihood (without its constant) of a run under another noise model.
+
+    Args:
+        clock: (T,) sample times (s).
+        measured: (T, C), NaN where missing.
+        f_in: (T, 12, 19) slopes of the motion as ``ekf_run`` stored them.
+        h_in: (T, C, 19) slopes of the channels.
+        raw_in: (T, C) innovations.
+        k_in: (T, 19, C) gains they were made with.
+        d_in: (T, 6) filtered wrench.
+        decay_in_s: correlation time of the wrench they were made with (s).
+        noise_variance: (C,).
+        covariance0: (19, 19) of the initial error state.
+        wrench_variance: (6,) stationary variance of the wrench.
+        wrench_decay_s: its correlation time (s).
+    """
+    channels = measured.shape[1]
+    p = covariance0.copy()
+    scratch = np.zeros((N_ERROR, N_ERROR))
+    s = np.zeros((channels, channels))
+    w = np.zeros((channels, channels))
+    ph = np.zeros((N_ERROR, channels))
+    gain = np.zeros((N_ERROR, channels))
+    e = np.zeros(channels)
+    stray = np.zeros(N_ERROR)
+    moved = np.zeros(N_ERROR)
+    log_likelihood = 0.0
+    for sample in range(clock.shape[0]):
+        if sample > 0:
+            span = clock[sample] - clock[sample - 1]
+            keep = math.exp(-span / wrench_decay_s)
+            kept = math.exp(-span / decay_in_s)
+            predict_covariance(p, f_in[sample], keep, wrench_variance, scratch)
+            for i in range(N_MOVING):
+                total = 0.0
+                for j in range(N_ERROR):
+                    total += f_in[sample, i, j] * stray[j]
+                moved[i] = total
+            for j in range(6):
+                i = N_MOVING + j
+                moved[i] = keep * stray[i] + (keep - kept) * d_in[sample - 1, j]
+            moved[N_ERROR - 1] = stray[N_ERROR - 1]
+            stray[:] = moved
+        log_det = update_covariance(
+            p, h_in[sample], measured[sample], noise_variance, s, w, ph, gain
+        )  # fmt: skip
+        log_likelihood -= 0.5 * log_det
+        for i in range(channels):
+            total = raw_in[sample, i]
+            for j in range(N_MOVING):
+                total -= h_in[sample, i, j] * stray[j]
+            e[i] = total
+        for i in range(channels):
+            total = 0.0
+            for j in range(i + 1):
+                total += w[i, j] * e[j]
+            log_likelihood -= 0.5 * total * total
+        for i in range(N_ERROR):
+            total = stray[i]
+            for j in range(channels):
+                total += gain[i, j] * e[j] - k_in[sample, i, j] * raw_in[sample, j]
+            stray[i] = total
+    return log_likelihood

@@ -1,6 +1,7 @@
 """Files stay short and public things are documented."""
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,6 +16,15 @@ PUBLIC = [
     for file in SOURCES
     if file.relative_to(ROOT).parts[0] in ("agents", "examples", "fish_env")
 ]
+TEXTS = [
+    file
+    for folder in (*CODE, ".ci", "docs")
+    for file in sorted((ROOT / folder).rglob("*"))
+    if file.suffix in (".py", ".md", ".yaml", ".json", ".csv", ".c", "")
+    if file.is_file()
+] + [file for file in sorted(ROOT.glob("*.*")) if file.suffix in (".md", ".toml", ".txt")]
+ONE_MACHINE = re.compile(r"(?<![\w.}])/(home|root|tmp|work|opt|mnt|Users)/|[A-Z]:\\\\Users")
+"""Paths that exist on one person's machine only."""
 
 
 def name(file: Path) -> str:
@@ -53,3 +63,13 @@ def test_every_public_thing_has_a_docstring(file):
 def test_the_docstring_check_notices_what_is_missing():
     source = "class A:\n    'doc'\n    def f(self): ...\n    def _g(self): ...\ndef h(): ...\n"
     assert undocumented(source) == ["", "A.f", "h"]
+
+
+def test_no_file_names_a_path_of_one_machine():
+    named = [f for f in TEXTS if ONE_MACHINE.search(f.read_text(encoding="utf-8"))]
+    assert [name(file) for file in named] == []
+
+
+def test_the_path_check_notices_one():
+    assert ONE_MACHINE.search('open("/' + 'home/ada/fish.yaml")')
+    assert not ONE_MACHINE.search("../shared/data and https://example.org/home/page")

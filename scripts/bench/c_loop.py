@@ -25,7 +25,7 @@ from fish_env import load_fish
 from fish_env.effects.extended import build_model
 from scripts.bench import harness
 from scripts.bench.harness import Contender
-from scripts.bench.ours import control_step, drawn_commands, start_state
+from scripts.bench.ours import drawn_commands, schedule_grid, start_state
 from scripts.bench.report import short
 
 SOURCE = Path(__file__).with_name("c_loop") / "fish_loop.c"
@@ -100,7 +100,7 @@ def our_advance(case: Case) -> Loop:
 
     def advance(state: np.ndarray, steps: int) -> None:
         kernels.advance(
-            state, inputs, case.record, slew, clock, commands, control_step(steps, DT),
+            state, inputs, case.record, slew, clock, commands, schedule_grid(0, 1, steps, DT),
             tables=model.tables, failed_at=failed_at, threads=1,
         )  # fmt: skip
 

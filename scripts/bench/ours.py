@@ -76,28 +76,30 @@ def drawn_commands(shape: tuple[int, ...], seed: int = 1) -> np.ndarray:
     return np.ascontiguousarray(np.moveaxis(drawn, -1, 1))
 
 
-def control_step(substeps: int, dt: float = 0.01, slot: int = 0) -> Grid:
-    """A grid of one segment: ``substeps`` physics steps under held commands."""
-    never = np.array([np.iinfo(np.int64).max])
-    return Grid(np.array([slot]), np.zeros(1), np.array([substeps]), np.array([dt]), never)
+def schedule_grid(first: int, count: int, substeps: int = 10, dt: float = 0.01) -> Grid:
+    """Commands ``first`` and on, ``count`` of them, each held for ``substeps`` physics steps."""
+    ones = np.ones(count, np.int64)
+    slots = np.arange(first, first + count)
+    starts = np.arange(count) * (substeps * dt)
+    return Grid(slots, starts, substeps * ones, dt * ones, np.iinfo(np.int64).max * ones)
 
 
 def kernel(envs: int, threads: int) -> Contender:
-    """The bare simulator: commands in, states out; no goals, observations or rewards."""
+    """The bare simulator on a schedule: commands in, states out; no goals or observations."""
     model = build_model(load_fish("zheng-2021-a"))
     kernels = model.kernels
     start = start_state(envs)
     commands = drawn_commands((DRAWN, envs))
-    grids = [control_step(10, slot=slot) for slot in range(DRAWN)]
     record = np.repeat(model.record, envs, axis=1)
     slew, clock = np.full((5, envs), np.inf), np.zeros(envs)
 
     def run(steps: int) -> None:
         state, inputs = start.copy(), commands[0].copy()
         failed_at = np.full(envs, np.inf)
-        for i in range(steps):
+        for done in range(0, steps, DRAWN):
             kernels.advance(
-                state, inputs, record, slew, clock, commands, grids[i % DRAWN],
+                state, inputs, record, slew, clock, commands,
+                schedule_grid(0, min(DRAWN, steps - done)),
                 tables=model.tables, failed_at=failed_at, threads=threads,
             )  # fmt: skip
 

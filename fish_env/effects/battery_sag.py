@@ -21,9 +21,12 @@ EFFECT = Effect(
     source="Speed of a d.c. motor under load follows its voltage, which falls with the charge used",
     parameters=(
         EffectParameter(
-            "rate", "1/s", 0.0, -0.01, 0.1, (0.0002, 0.005), "share of f1 lost a second"
+            "rate", "1/s", 0.0, -0.01, 0.1, (0.0002, 0.01), "share of f1 lost a second"
         ),
     ),
     hooks={"inputs": slow_down},
-    confusable_with=("clock_scale", "frequency_scale"),
+    confusable_with=(
+        "clock_scale",
+        "frequency_scale",
+    ),
 )

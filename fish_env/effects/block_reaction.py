@@ -84,5 +84,8 @@ EFFECT = Effect(
     states={"wrench": ("stroke", "stroke_rate", "turn", "turn_rate")},
     initial_states=start_at_rest,
     time_scale=fastest,
-    confusable_with=("added_mass", "block_lag"),
+    confusable_with=(
+        "added_mass",
+        "block_lag",
+    ),
 )

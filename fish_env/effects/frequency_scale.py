@@ -23,5 +23,9 @@ EFFECT = Effect(
         EffectParameter("scale", "-", 1.0, 0.2, 3.0, (0.9, 1.05), "beat over commanded beat"),
     ),
     hooks={"inputs": scale_frequency},
-    confusable_with=("battery_sag", "clock_scale", "tail_gain"),
+    confusable_with=(
+        "battery_sag",
+        "clock_scale",
+        "tail_gain",
+    ),
 )

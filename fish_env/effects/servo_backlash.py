@@ -2,6 +2,10 @@
 
 The tail stays where it is until the servo has taken up the play, and then moves with it: the
 "play" operator, which is exact from step to step and needs no stiff contact force.
+
+The tail's rate jumps where the servo takes it along, and a fixed step that such a jump falls into
+loses its order: the angles stay exact, forces that depend on the rate are off by up to a third of
+the effect's own share of them at a step of 10 ms, less at shorter ones.
 """
 
 from __future__ import annotations
@@ -69,7 +73,7 @@ EFFECT = Effect(
     equation="xi = min(max(xi before, servo - gap/2), servo + gap/2)",
     source="Visintin, Differential Models of Hysteresis: the play operator",
     parameters=(
-        EffectParameter("gap", "rad", 0.0, 0.0, 0.5, (0.01, 0.1), "whole play, end to end"),
+        EffectParameter("gap", "rad", 0.0, 0.0, 0.5, (0.01, 0.15), "whole play, end to end"),
     ),
     hooks={"tail": take_up_play},
     states={"tail": ("settled_rate",)},
@@ -77,5 +81,9 @@ EFFECT = Effect(
     initial_states=start_in_contact,
     time_scale=fastest,
     order=6,
-    confusable_with=("servo_delay", "servo_rate_limit", "tail_gain"),
+    confusable_with=(
+        "servo_delay",
+        "servo_rate_limit",
+        "tail_gain",
+    ),
 )

@@ -55,5 +55,8 @@ EFFECT = Effect(
     ),
     hooks={"tail": stretch_half_strokes},
     order=1,
-    confusable_with=("com_offset", "tail_bias"),
+    confusable_with=(
+        "com_offset",
+        "tail_bias",
+    ),
 )

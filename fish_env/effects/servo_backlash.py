@@ -30,15 +30,19 @@ def turning_point(tail, since):
 
 
 @kernel
+def within(angle, servo, half):
+    """The angle, moved no further than into [servo - half, servo + half]."""
+    return min(max(angle, servo - half), servo + half)
+
+
+@kernel
 def take_up_play(tail, inputs, phase, time, fish, e, states, memory, since):
     """xi = the old xi, moved no further than into [servo - gap/2, servo + gap/2]."""
     (settled_rate,), (angle,) = states, memory
     on = e.gap > 0.0
     half = 0.5 * e.gap
     turned_at = turning_point(tail, since)
-    highest = max(tail.angle, turned_at)
-    lowest = min(tail.angle, turned_at)
-    held = min(max(angle, highest - half), lowest + half)
+    held = within(within(angle, turned_at, half), tail.angle, half)
     pushed = (held - ROUNDING < tail.angle - half) & (tail.rate > 0.0)
     pulled = (held + ROUNDING > tail.angle + half) & (tail.rate < 0.0)
     moves = pushed | pulled

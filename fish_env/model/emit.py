@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from fish_env.model.history import COMMAND_FIELDS
+from fish_env.model.history import HEARD, TOLD
 from fish_env.params.packing import CURVES, RECORD_FIELDS
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ from fish_env.model.coefficients import (
 )
 from fish_env.model.frames import quaternion_rate, rotation, to_body, to_inertial
 from fish_env.model.history import (
-    COMMAND_FIELDS, TOLD_ROWS, assume_running, late_command, recall, remember, running_command,
+    HEARD, RECORD, assume_running, late_command, recall, remember, running_command,
 )
 from fish_env.model.hydrostatics import buoyancy_force, gravity_wrench
 from fish_env.model.jit import entry_point, kernel
@@ -138,11 +138,14 @@ class Emitter:
         ]
 
     def command(self) -> str:
-        """What the tail's servo is told at the start of a step, for a command that comes late."""
-        lines = ["shift = 0.0", *self.unpack(), *self.apply("inputs", "inputs", "time, fish")]
-        told = (*(f"inputs.tail_{name}" for name in COMMAND_FIELDS[:-1]), "phase", self.delay())
+        """What the tail's servo is told in a step that begins now, for commands that come late."""
+        chain = [*self.unpack(), *self.apply("inputs", "inputs", "time, fish")]
+        told = [f"inputs.tail_{name}" for name in TOLD[:3]]
+        told += ["phase", "inputs.tail_offset_rate", "inputs.tail_amplitude_rate"]
+        told += ["(ahead.tail_frequency - inputs.tail_frequency) / h", self.delay()]
+        lines = ["shift = h", *chain, "ahead = inputs", "shift = 0.0", *chain]
         lines += [f"work[(TOLD + {i}) * width + k] = {value}" for i, value in enumerate(told)]
-        return self.function("lane_command", "k, width, elapsed, work", lines)
+        return self.function("lane_command", "k, width, elapsed, h, work", lines)
 
     def delay(self) -> str:
         """How late the tail's command is (s)."""
@@ -236,7 +239,7 @@ class Emitter:
 
     def evaluation(self) -> list[str]:
         """Everything up to the wrench terms."""
-        past = ", ".join(f"work[(PAST + {i}) * width + k]" for i in range(len(COMMAND_FIELDS)))
+        past = ", ".join(f"work[(PAST + {i}) * width + k]" for i in range(len(HEARD)))
         lines = [
             *self.unpack(),
             *self.apply("inputs", "inputs", "time, fish"),

@@ -1,8 +1,7 @@
 """What the tail's servo was told a while ago, for commands that reach it late.
 
-A *told* command is (offset, amplitude, frequency, rate of the offset, rate of the amplitude,
-phase). It is constant in a physics step but for its rates, so that remembering it at the start
-of every step recalls any instant between exactly.
+A *told* command is constant in a physics step but for the rates of offset, amplitude and frequency,
+so that remembering it at the start of every step recalls any instant between exactly.
 
 A history is an array of shape (1 + slots * RECORD, N): row 0 counts the steps remembered, then
 come the slots, used in turn, each with the time (s) at which its step began and what was told.
@@ -22,10 +21,21 @@ from fish_env.model.jit import kernel
 if TYPE_CHECKING:
     from fish_env.model.runtime import Grid
 
-COMMAND_FIELDS = ("offset", "amplitude", "frequency", "offset_rate", "amplitude_rate", "phase")
-TOLD_ROWS = len(COMMAND_FIELDS) + 1
-"""Rows of the work array for what is told now, the last one being how late it arrives (s)."""
-RECORD = len(COMMAND_FIELDS) + 1
+TOLD = (
+    "offset",
+    "amplitude",
+    "frequency",
+    "phase",
+    "offset_rate",
+    "amplitude_rate",
+    "frequency_rate",
+    "delay",
+)
+"""Rows of what is told when a step begins (rad, rad, Hz, rad, their rates), and its delay (s)."""
+HEARD = ("offset", "amplitude", "frequency", "phase", "offset_rate", "amplitude_rate")
+"""Rows of what is heard at an instant: what was told a delay ago."""
+RECORD = len(TOLD)
+"""Numbers of a slot: the time at which a step began (s), then what was told."""
 
 FloatArray = npt.NDArray[np.float64]
 _TWO_PI = 6.283185307179586
@@ -40,8 +50,8 @@ def remember(work, width, told, start, history, first, count):
         steps = history[0, first + k]
         row = 1 + RECORD * (int(steps) % slots)
         history[row, first + k] = work[start * width + k]
-        for i in range(RECORD - 1):
-            history[row + 1 + i, first + k] = work[(told + i) * width + k]
+        for i in range(1, RECORD):
+            history[row + i, first + k] = work[(told + i - 1) * width + k]
         history[0, first + k] = steps + 1.0
 
 
@@ -68,15 +78,17 @@ def recall(work, width, told, past, start, shift, h, history, first, count):
         row = 1 + RECORD * (step % slots)
         since = time - history[row, lane]
         moving = 0.0 if since < -_ROUNDING else 1.0
-        offset_rate = moving * history[row + 4, lane]
-        amplitude_rate = moving * history[row + 5, lane]
+        offset_rate = moving * history[row + 5, lane]
+        amplitude_rate = moving * history[row + 6, lane]
+        bend = moving * history[row + 7, lane] * since
         frequency = history[row + 3, lane]
         work[past * width + k] = history[row + 1, lane] + since * offset_rate
         work[(past + 1) * width + k] = history[row + 2, lane] + since * amplitude_rate
-        work[(past + 2) * width + k] = frequency
-        work[(past + 3) * width + k] = offset_rate
-        work[(past + 4) * width + k] = amplitude_rate
-        work[(past + 5) * width + k] = history[row + 6, lane] + _TWO_PI * frequency * since
+        work[(past + 2) * width + k] = frequency + bend
+        turned = _TWO_PI * (frequency + 0.5 * bend) * since
+        work[(past + 3) * width + k] = history[row + 4, lane] + turned
+        work[(past + 4) * width + k] = offset_rate
+        work[(past + 5) * width + k] = amplitude_rate
 
 
 @kernel
@@ -84,17 +96,17 @@ def assume_running(work, width, told, past):
     """Set the ``past`` rows as if every fish had always been told what it is told now."""
     for k in range(width):
         late = work[(told + RECORD - 1) * width + k]
-        frequency = work[(told + 2) * width + k]
+        turned = _TWO_PI * work[(told + 2) * width + k] * late
         for i in range(3):
             work[(past + i) * width + k] = work[(told + i) * width + k]
-        work[(past + 3) * width + k] = 0.0
+        work[(past + 3) * width + k] = work[(told + 3) * width + k] - turned
         work[(past + 4) * width + k] = 0.0
-        work[(past + 5) * width + k] = work[(told + 5) * width + k] - _TWO_PI * frequency * late
+        work[(past + 5) * width + k] = 0.0
 
 
 @kernel
 def late_command(
-    late, inputs, phase, offset, amplitude, frequency, offset_rate, amplitude_rate, past_phase
+    late, inputs, phase, offset, amplitude, frequency, past_phase, offset_rate, amplitude_rate
 ):  # fmt: skip
     """Inputs and phase that reach the tail: those recalled if they come late, else those of now."""
     on = late > 0.0

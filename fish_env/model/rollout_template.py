@@ -21,7 +21,7 @@ from fish_env.model.composed import (
     lane_initialise,
     lane_terms,
 )
-from fish_env.model.history import COMMAND_FIELDS, TOLD_ROWS, assume_running, recall, remember
+from fish_env.model.history import HEARD, RECORD, assume_running, recall, remember
 from fish_env.model.jit import entry_point, kernel
 
 # --- end ---
@@ -39,8 +39,8 @@ SLEW = U_END + 5
 TIME = SLEW + 5
 BEGIN = TIME + 1  # time at which a step begins (s), then the tail's command (see model.history)
 TOLD = BEGIN + LATE_TAIL
-PAST = TOLD + LATE_TAIL * TOLD_ROWS
-PAR = PAST + LATE_TAIL * len(COMMAND_FIELDS)
+PAST = TOLD + LATE_TAIL * RECORD
+PAR = PAST + LATE_TAIL * len(HEARD)
 WORK_ROWS = PAR + N_PARAMETERS
 LARGEST = 1e4  # a state beyond this many SI units has diverged
 
@@ -84,11 +84,11 @@ def plan_actuators(work, width, commands, slot, first, count, h):
 
 
 @kernel
-def tell_tail(work, width, elapsed, history, first, count):
+def tell_tail(work, width, elapsed, h, history, first, count):
     """Remember what each tail is told in the step that begins now."""
     for k in range(width):
         work[BEGIN * width + k] = work[TIME * width + k] + elapsed
-        lane_command(k, width, elapsed, work)
+        lane_command(k, width, elapsed, h, work)
     remember(work, width, TOLD, BEGIN, history, first, count)
 
 
@@ -103,7 +103,7 @@ def rk4_step(work, width, elapsed, h, tables, late, history, first, count, pace)
     for n in range(N_SLOPES * width):
         work[SUM * width + n] = 0.0
     if late:
-        tell_tail(work, width, elapsed, history, first, count)
+        tell_tail(work, width, elapsed, h, history, first, count)
     for stage in range(4):
         fraction = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
         weight = 1.0 if (stage == 0) | (stage == 3) else 2.0
@@ -243,7 +243,7 @@ def presume_told(work, width):
     """Presume that tails whose command is late were always told what they are told now."""
     if LATE_TAIL:
         for k in range(width):
-            lane_command(k, width, 0.0, work)
+            lane_command(k, width, 0.0, 1.0, work)
         assume_running(work, width, TOLD, PAST)
 
 

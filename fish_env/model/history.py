@@ -4,7 +4,8 @@ A *told* command is constant in a physics step but for the rates of offset, ampl
 so that remembering it at the start of every step recalls any instant between exactly.
 
 A history is an array of shape (1 + slots * RECORD, N): row 0 counts the steps remembered, then
-come the slots, used in turn, each with the time (s) at which its step began and what was told.
+come the slots, a power of two, used in turn, each with the time (s) at which its step began and
+what was told.
 Before its first step a fish is taken to have been told the same all along.
 """
 
@@ -48,7 +49,7 @@ def remember(work, width, told, start, history, first, count):
     slots = (history.shape[0] - 1) // RECORD
     for k in range(count):
         steps = history[0, first + k]
-        row = 1 + RECORD * (int(steps) % slots)
+        row = 1 + RECORD * (int(steps) & (slots - 1))
         history[row, first + k] = work[start * width + k]
         for i in range(1, RECORD):
             history[row + i, first + k] = work[(told + i - 1) * width + k]
@@ -71,11 +72,13 @@ def recall(work, width, told, past, start, shift, h, history, first, count):
         newest = int(history[0, lane]) - 1
         oldest = max(0, newest + 1 - slots)
         step = max(oldest, newest - int(min(late / h, float(slots))))
-        while (step > oldest) & (history[1 + RECORD * (step % slots), lane] > time + edge):
+        while (step > oldest) & (history[1 + RECORD * (step & (slots - 1)), lane] > time + edge):
             step -= 1
-        while step < newest and history[1 + RECORD * ((step + 1) % slots), lane] <= time + edge:
+        while (
+            step < newest and history[1 + RECORD * ((step + 1) & (slots - 1)), lane] <= time + edge
+        ):
             step += 1
-        row = 1 + RECORD * (step % slots)
+        row = 1 + RECORD * (step & (slots - 1))
         since = time - history[row, lane]
         moving = 0.0 if since < -_ROUNDING else 1.0
         offset_rate = moving * history[row + 5, lane]
@@ -134,18 +137,22 @@ def history_rows(longest_delay: float, shortest_step: float) -> int:
     """Rows of a history that reaches back far enough for steps of this size or longer (s)."""
     if longest_delay <= 0.0:
         return 0
-    return 1 + RECORD * (int(np.ceil(longest_delay / shortest_step)) + 2)
+    return _rows(int(np.ceil(longest_delay / shortest_step)) + 2)
 
 
 def history_rows_on(grid: Grid, longest_delay: float) -> int:
-    """Rows of a history that reaches back far enough on this grid, with room for no more."""
+    """Rows of a history that reaches back far enough on this grid."""
     if longest_delay <= 0.0:
         return 0
     counts: npt.NDArray[np.int64] = grid.steps
     index = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
     begins = np.repeat(grid.starts, counts) + index * np.repeat(grid.sizes, counts)
     reached = np.searchsorted(begins, begins - longest_delay - 2 * _ROUNDING)
-    return 1 + RECORD * (int(np.max(np.arange(begins.size) - reached)) + 3)
+    return _rows(int(np.max(np.arange(begins.size) - reached)) + 3)
+
+
+def _rows(slots: int) -> int:
+    return 1 + RECORD * (1 << (slots - 1).bit_length())
 
 
 def forget(history: FloatArray, lanes: npt.NDArray[np.int64], rows: int) -> FloatArray:

@@ -87,8 +87,8 @@ class Emitter:
             f"N_TERMS = {len(self.composition.term_names)}\n"
             f"LATE_TAIL = {bool(self.composition.delays)}\n"
         )
-        functions = (self.derivative(), self.terms(), self.initialise(), self.command())
-        return "\n".join([sizes, *functions])
+        parts = (self.derivative, self.terms, self.initialise, self.command, self.memory)
+        return "\n".join([sizes, *(part() for part in parts)])
 
     def function(self, name: str, arguments: str, lines: Sequence[str]) -> str:
         """One kernel from its lines."""
@@ -146,6 +146,26 @@ class Emitter:
         lines = ["shift = h", *chain, "ahead = inputs", "shift = 0.0", *chain]
         lines += [f"work[(TOLD + {i}) * width + k] = {value}" for i, value in enumerate(told)]
         return self.function("lane_command", "k, width, elapsed, h, work", lines)
+
+    def memory(self) -> str:
+        """What effects remember of a step that ends in the present state."""
+        lines = [
+            "shift = h",
+            *self.unpack(),
+            *self.apply("inputs", "inputs", "time, fish"),
+            *self.command_lines(self.recalled()),
+            *self.apply("tail", "tail", "tail_inputs, tail_phase, time, fish"),
+        ]
+        for effect in self.effects:
+            for i, name in enumerate(effect.memory_names):
+                row = self.states.index(f"{effect.name}.{name}")
+                lines.append(f"work[(X + {row}) * width + k] = m_{effect.name}_{i}")
+        return self.function("lane_remember", "k, width, elapsed, h, work", lines)
+
+    def recalled(self) -> str:
+        """Inputs and phase that reach the tail in a rollout."""
+        past = ", ".join(f"work[(PAST + {i}) * width + k]" for i in range(len(HEARD)))
+        return f"late_command(late, inputs, phase, {past})"
 
     def delay(self) -> str:
         """How late the tail's command is (s)."""
@@ -239,11 +259,10 @@ class Emitter:
 
     def evaluation(self) -> list[str]:
         """Everything up to the wrench terms."""
-        past = ", ".join(f"work[(PAST + {i}) * width + k]" for i in range(len(HEARD)))
         lines = [
             *self.unpack(),
             *self.apply("inputs", "inputs", "time, fish"),
-            *self.command_lines(f"late_command(late, inputs, phase, {past})"),
+            *self.command_lines(self.recalled()),
             *self.apply("tail", "tail", "tail_inputs, tail_phase, time, fish"),
             "centre = barycentre(inputs, fish)",
             *self.apply("barycentre", "centre", "place, inputs, time, fish"),
@@ -354,7 +373,7 @@ class Emitter:
         ]
 
     def rates(self) -> list[str]:
-        """Store the derivative of every state, and what is remembered as it is at this instant."""
+        """Store the derivative of every state."""
         quaternion = ", ".join(f"work[(X + {i}) * width + k]" for i in range(3, 7))
         values = [
             "drift.x",
@@ -370,8 +389,6 @@ class Emitter:
         ]
         for effect in self.effects:
             values += [f"d_{effect.name}_{i}" for i in range(len(effect.state_names))]
-        for effect in self.effects:
-            values += [f"m_{effect.name}_{i}" for i in range(len(effect.memory_names))]
         return [
             "drift = to_inertial(attitude, velocity)",
             f"spin = quaternion_rate({quaternion}, omega.x, omega.y, omega.z)",

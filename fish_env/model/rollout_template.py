@@ -19,6 +19,7 @@ from fish_env.model.composed import (
     lane_command,
     lane_derivative,
     lane_initialise,
+    lane_remember,
     lane_terms,
 )
 from fish_env.model.history import HEARD, RECORD, assume_running, recall, remember
@@ -94,7 +95,7 @@ def tell_tail(work, width, elapsed, h, history, first, count):
 
 @kernel
 def rk4_step(work, width, elapsed, h, tables, late, history, first, count, pace):
-    """One classical Runge-Kutta step of every lane: X0 -> X. Memory takes its value at the end.
+    """One classical Runge-Kutta step of every lane: X0 -> X. Memory follows from where it ends.
 
     ``pace``, (width,), multiplies the rate of each lane's own time; without entries it is one.
     """
@@ -125,8 +126,9 @@ def rk4_step(work, width, elapsed, h, tables, late, history, first, count, pace)
             for n in range(N_SLOPES * width):
                 total = work[SUM * width + n] + work[DX * width + n]
                 work[X * width + n] = work[X0 * width + n] + (h / 6.0) * total
-    for n in range(N_SLOPES * width, N_STATES * width):
-        work[X * width + n] = work[DX * width + n]
+    if N_MEMORY > 0:
+        for k in range(width):
+            lane_remember(k, width, elapsed, h, work)
 
 
 @kernel

@@ -146,6 +146,14 @@ def test_states_start_behind_the_effects_before_theirs():
             },
             "one of its own hooks",
         ),
+        (
+            {
+                "hooks": {"wrench": both},
+                "memory": {"wrench": ("b",)},
+                "initial_states": start_both,
+            },
+            "inputs and tail alone",
+        ),
         ({"command_delay": "late"}, "no parameter 'late'"),
     ],
 )

@@ -69,11 +69,13 @@ def test_a_held_tail_may_stand_anywhere_within_the_play():
 
 
 def test_the_play_comes_after_the_servo():
-    """With a lag as well, the lagged angle has the play."""
+    """With a lag as well, the lagged angle has the play, and moves the tail without a break."""
     both = {**EFFECTS, "servo_lag": {"time_constant": 0.1}}
-    angle, _ = tail(both, run(both, SWING, 4.0, rate_hz=200))
+    angle, rate = tail(both, run(both, SWING, 4.0, rate_hz=100))
     lagged = 0.3 / np.hypot(1.0, 2 * np.pi * 0.1)
-    assert angle[-200:].max() == pytest.approx(lagged - GAP / 2, abs=1e-4)
+    assert angle[-100:].max() == pytest.approx(lagged - GAP / 2, abs=1e-4)
+    dead = 2 * np.arccos(1 - GAP / lagged) / (2 * np.pi)
+    assert np.mean(rate[-100:] == 0.0) == pytest.approx(dead, abs=0.03)
 
 
 def test_no_gap_is_off():

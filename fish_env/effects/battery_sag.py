@@ -10,7 +10,13 @@ from fish_env.model.jit import kernel
 @kernel
 def slow_down(inputs, time, fish, e):
     """f1 -> f1 (1 - rate t), t since the run's start (s); never below zero."""
-    return with_tail_frequency(inputs, max(1.0 - e.rate * time, 0.0) * inputs.tail_frequency)
+    left = max(1.0 - e.rate * time, 0.0)
+    loss = e.rate if left > 0.0 else 0.0
+    return with_tail_frequency(
+        inputs,
+        left * inputs.tail_frequency,
+        left * inputs.tail_frequency_rate - loss * inputs.tail_frequency,
+    )
 
 
 EFFECT = Effect(

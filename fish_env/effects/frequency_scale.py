@@ -10,7 +10,9 @@ from fish_env.model.jit import kernel
 @kernel
 def scale_frequency(inputs, time, fish, e):
     """f1 -> scale f1."""
-    return with_tail_frequency(inputs, e.scale * inputs.tail_frequency)
+    return with_tail_frequency(
+        inputs, e.scale * inputs.tail_frequency, e.scale * inputs.tail_frequency_rate
+    )
 
 
 EFFECT = Effect(

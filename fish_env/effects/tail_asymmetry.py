@@ -34,11 +34,11 @@ def stretch_half_strokes(tail, inputs, phase, time, fish, e):
     pulse = pulse * pulse
     bend = (2.0 / PULSE_AREA) * pulse - side * sine
     swing = omega * amplitude
+    slewing = 2.0 * omega * amplitude_rate + TWO_PI * inputs.tail_frequency_rate * amplitude
     return Tail(
         tail.angle + e.ratio * (amplitude * size),
         tail.rate + e.ratio * (swing * (sine * cosine / size) + amplitude_rate * size),
-        tail.acceleration
-        + e.ratio * (omega * swing * bend + side * (2.0 * omega * amplitude_rate * cosine)),
+        tail.acceleration + e.ratio * (omega * swing * bend + side * (slewing * cosine)),
     )
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from fish_env.model.history import HEARD, TOLD
+from fish_env.model.history import COMMAND, HEARD
 from fish_env.params.packing import CURVES, RECORD_FIELDS
 
 if TYPE_CHECKING:
@@ -139,13 +139,10 @@ class Emitter:
 
     def command(self) -> str:
         """What the tail's servo is told in a step that begins now, for commands that come late."""
-        chain = [*self.unpack(), *self.apply("inputs", "inputs", "time, fish")]
-        told = [f"inputs.tail_{name}" for name in TOLD[:3]]
-        told += ["phase", "inputs.tail_offset_rate", "inputs.tail_amplitude_rate"]
-        told += ["(ahead.tail_frequency - inputs.tail_frequency) / h", self.delay()]
-        lines = ["shift = h", *chain, "ahead = inputs", "shift = 0.0", *chain]
+        lines = ["shift = 0.0", *self.unpack(), *self.apply("inputs", "inputs", "time, fish")]
+        told = [f"inputs.tail_{name}" for name in COMMAND] + ["phase", self.delay()]
         lines += [f"work[(TOLD + {i}) * width + k] = {value}" for i, value in enumerate(told)]
-        return self.function("lane_command", "k, width, elapsed, h, work", lines)
+        return self.function("lane_command", "k, width, elapsed, work", lines)
 
     def memory(self) -> str:
         """What effects remember of a step that ends in the present state."""

@@ -22,19 +22,19 @@ from fish_env.model.jit import kernel
 if TYPE_CHECKING:
     from fish_env.model.runtime import Grid
 
-TOLD = (
+COMMAND = (
     "offset",
     "amplitude",
     "frequency",
-    "phase",
     "offset_rate",
     "amplitude_rate",
     "frequency_rate",
-    "delay",
 )
-"""Rows of what is told when a step begins (rad, rad, Hz, rad, their rates), and its delay (s)."""
-HEARD = ("offset", "amplitude", "frequency", "phase", "offset_rate", "amplitude_rate")
+"""What the tail is told, in rad, rad, Hz, and their rates."""
+HEARD = (*COMMAND, "phase")
 """Rows of what is heard at an instant: what was told a delay ago."""
+TOLD = (*HEARD, "delay")
+"""Rows of what is told when a step begins, and how late that is heard (s)."""
 RECORD = len(TOLD)
 """Numbers of a slot: the time at which a step began (s), then what was told."""
 
@@ -81,17 +81,12 @@ def recall(work, width, told, past, start, shift, h, history, first, count):
         row = 1 + RECORD * (step & (slots - 1))
         since = time - history[row, lane]
         moving = 0.0 if since < -_ROUNDING else 1.0
-        offset_rate = moving * history[row + 5, lane]
-        amplitude_rate = moving * history[row + 6, lane]
-        bend = moving * history[row + 7, lane] * since
-        frequency = history[row + 3, lane]
-        work[past * width + k] = history[row + 1, lane] + since * offset_rate
-        work[(past + 1) * width + k] = history[row + 2, lane] + since * amplitude_rate
-        work[(past + 2) * width + k] = frequency + bend
-        turned = _TWO_PI * (frequency + 0.5 * bend) * since
-        work[(past + 3) * width + k] = history[row + 4, lane] + turned
-        work[(past + 4) * width + k] = offset_rate
-        work[(past + 5) * width + k] = amplitude_rate
+        for i in range(3):
+            rate = moving * history[row + 4 + i, lane]
+            work[(past + i) * width + k] = history[row + 1 + i, lane] + since * rate
+            work[(past + 3 + i) * width + k] = rate
+        mean = 0.5 * (history[row + 3, lane] + work[(past + 2) * width + k])
+        work[(past + 6) * width + k] = history[row + 7, lane] + _TWO_PI * mean * since
 
 
 @kernel
@@ -99,17 +94,17 @@ def assume_running(work, width, told, past):
     """Set the ``past`` rows as if every fish had always been told what it is told now."""
     for k in range(width):
         late = work[(told + RECORD - 1) * width + k]
-        turned = _TWO_PI * work[(told + 2) * width + k] * late
         for i in range(3):
             work[(past + i) * width + k] = work[(told + i) * width + k]
-        work[(past + 3) * width + k] = work[(told + 3) * width + k] - turned
-        work[(past + 4) * width + k] = 0.0
-        work[(past + 5) * width + k] = 0.0
+            work[(past + 3 + i) * width + k] = 0.0
+        turned = _TWO_PI * work[(told + 2) * width + k] * late
+        work[(past + 6) * width + k] = work[(told + 6) * width + k] - turned
 
 
 @kernel
 def late_command(
-    late, inputs, phase, offset, amplitude, frequency, past_phase, offset_rate, amplitude_rate
+    late, inputs, phase, offset, amplitude, frequency, offset_rate, amplitude_rate,
+    frequency_rate, past_phase,
 ):  # fmt: skip
     """Inputs and phase that reach the tail: those recalled if they come late, else those of now."""
     on = late > 0.0
@@ -120,6 +115,7 @@ def late_command(
         frequency if on else inputs.tail_frequency,
         offset_rate if on else inputs.tail_offset_rate,
         amplitude_rate if on else inputs.tail_amplitude_rate,
+        frequency_rate if on else inputs.tail_frequency_rate,
     )
     return heard, past_phase if on else phase
 
@@ -128,7 +124,7 @@ def late_command(
 def running_command(inputs, phase, late):
     """Inputs and phase that reach the tail when the present command has been running all along."""
     heard = with_tail_command(
-        inputs, inputs.tail_offset, inputs.tail_amplitude, inputs.tail_frequency, 0.0, 0.0
+        inputs, inputs.tail_offset, inputs.tail_amplitude, inputs.tail_frequency, 0.0, 0.0, 0.0
     )
     return heard, phase - _TWO_PI * inputs.tail_frequency * late
 

@@ -85,11 +85,11 @@ def plan_actuators(work, width, commands, slot, first, count, h):
 
 
 @kernel
-def tell_tail(work, width, elapsed, h, history, first, count):
+def tell_tail(work, width, elapsed, history, first, count):
     """Remember what each tail is told in the step that begins now."""
     for k in range(width):
         work[BEGIN * width + k] = work[TIME * width + k] + elapsed
-        lane_command(k, width, elapsed, h, work)
+        lane_command(k, width, elapsed, work)
     remember(work, width, TOLD, BEGIN, history, first, count)
 
 
@@ -104,7 +104,7 @@ def rk4_step(work, width, elapsed, h, tables, late, history, first, count, pace)
     for n in range(N_SLOPES * width):
         work[SUM * width + n] = 0.0
     if late:
-        tell_tail(work, width, elapsed, h, history, first, count)
+        tell_tail(work, width, elapsed, history, first, count)
     for stage in range(4):
         fraction = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
         weight = 1.0 if (stage == 0) | (stage == 3) else 2.0
@@ -245,7 +245,7 @@ def presume_told(work, width):
     """Presume that tails whose command is late were always told what they are told now."""
     if LATE_TAIL:
         for k in range(width):
-            lane_command(k, width, 0.0, 1.0, work)
+            lane_command(k, width, 0.0, work)
         assume_running(work, width, TOLD, PAST)
 
 

@@ -23,6 +23,7 @@ def tail_at(phase, ratio=RATIO, **changes):
         "tail_frequency": 1.0,
         "tail_offset_rate": 0.0,
         "tail_amplitude_rate": 0.0,
+        "tail_frequency_rate": 0.0,
     }
     inputs = SimpleNamespace(**{**values, **changes})
     given = py_function(commanded_tail)(inputs, phase)

@@ -171,7 +171,7 @@ class Simulator:
         steps = commands if isinstance(commands, CommandSteps) else schedule(commands)
         self._warn_reach(steps)
         times = _sample_times(duration_s, rate_hz, sample_times_s)
-        arrivals = np.concatenate([steps.times_s, steps.times_s + self.model.command_delay])
+        arrivals = np.append(steps.times_s, steps.times_s[1:] + self.model.command_delay)
         grid, starts = time_grid(times, arrivals, self.dt)
         start = initial or InitialState()
         kernels = self.model.kernels

@@ -88,5 +88,11 @@ EFFECT = Effect(
         _inertia("yaw", (0.0005, 0.015)),
     ),
     hooks={"inertia": add_inertia, "wrench": coriolis_and_munk},
-    confusable_with=("tail_reactive", "wake_memory", "cross_flow_drag"),
+    confusable_with=(
+        "block_reaction",
+        "cross_flow_drag",
+        "quadratic_damping",
+        "tail_reactive",
+        "wake_memory",
+    ),
 )

@@ -22,5 +22,8 @@ EFFECT = Effect(
     source="Mounting error of a sensor, or a camera frame not turned to north",
     parameters=(_angle("roll"), _angle("pitch"), _angle("yaw")),
     measure=add_angles,
-    confusable_with=("com_offset", "gyro_bias"),
+    confusable_with=(
+        "com_offset",
+        "gyro_bias",
+    ),
 )

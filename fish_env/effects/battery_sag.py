@@ -10,7 +10,13 @@ from fish_env.model.jit import kernel
 @kernel
 def slow_down(inputs, time, fish, e):
     """f1 -> f1 (1 - rate t), t since the run's start (s); never below zero."""
-    return with_tail_frequency(inputs, max(1.0 - e.rate * time, 0.0) * inputs.tail_frequency)
+    left = max(1.0 - e.rate * time, 0.0)
+    loss = e.rate if left > 0.0 else 0.0
+    return with_tail_frequency(
+        inputs,
+        left * inputs.tail_frequency,
+        left * inputs.tail_frequency_rate - loss * inputs.tail_frequency,
+    )
 
 
 EFFECT = Effect(
@@ -21,9 +27,12 @@ EFFECT = Effect(
     source="Speed of a d.c. motor under load follows its voltage, which falls with the charge used",
     parameters=(
         EffectParameter(
-            "rate", "1/s", 0.0, -0.01, 0.1, (0.0002, 0.005), "share of f1 lost a second"
+            "rate", "1/s", 0.0, -0.01, 0.1, (0.0002, 0.01), "share of f1 lost a second"
         ),
     ),
     hooks={"inputs": slow_down},
-    confusable_with=("clock_scale", "frequency_scale"),
+    confusable_with=(
+        "clock_scale",
+        "frequency_scale",
+    ),
 )

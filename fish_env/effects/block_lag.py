@@ -48,5 +48,8 @@ EFFECT = Effect(
     initial_states=start_at_command,
     time_scale=fastest,
     order=1,
-    confusable_with=("block_reaction", "block_scale"),
+    confusable_with=(
+        "block_reaction",
+        "block_scale",
+    ),
 )

@@ -8,6 +8,8 @@ no time, but with a finite result: the hull is displaced by -m_w dd / m. So that
 there whatever drives the block, the reaction is that of a block which follows its commanded place
 x by a critically damped approach, s'' = 2 (x' - s')/T + (x - s)/T^2, within some 0.02 s.
 A block that moves no faster than its drive allows (slew limit, lag) is followed without delay.
+The barycentre is where the block is commanded, as ever, so after a jump the place of the fish is
+right to first order in dd.
 """
 
 from __future__ import annotations
@@ -82,5 +84,8 @@ EFFECT = Effect(
     states={"wrench": ("stroke", "stroke_rate", "turn", "turn_rate")},
     initial_states=start_at_rest,
     time_scale=fastest,
-    confusable_with=("added_mass", "block_lag"),
+    confusable_with=(
+        "added_mass",
+        "block_lag",
+    ),
 )

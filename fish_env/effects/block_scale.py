@@ -25,5 +25,8 @@ EFFECT = Effect(
         EffectParameter("scale", "-", 1.0, 0.0, 3.0, (0.8, 1.2), "stroke over commanded stroke"),
     ),
     hooks={"inputs": scale_displacement},
-    confusable_with=("block_lag", "com_offset"),
+    confusable_with=(
+        "block_lag",
+        "com_offset",
+    ),
 )

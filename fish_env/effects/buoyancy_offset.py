@@ -23,5 +23,12 @@ EFFECT = Effect(
         EffectParameter("mass", "kg", 0.0, -1.0, 1.0, (-0.01, 0.01), "extra displaced mass"),
     ),
     hooks={"barycentre": shift_buoyancy},
-    confusable_with=("hull_compression", "water_ingress", "com_offset", "depth_bias"),
+    confusable_with=(
+        "com_offset",
+        "current",
+        "depth_bias",
+        "hull_compression",
+        "water_ingress",
+        "wave",
+    ),
 )

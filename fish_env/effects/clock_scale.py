@@ -18,5 +18,11 @@ EFFECT = Effect(
     source="Clock skew between two recorders",
     parameters=(EffectParameter("scale", "-", 1.0, 0.5, 2.0, (0.97, 1.03), "rate of true time"),),
     sample_time=true_time,
-    confusable_with=("frequency_scale", "sensor_delay", "position_scale"),
+    confusable_with=(
+        "battery_sag",
+        "frequency_scale",
+        "position_scale",
+        "sensor_delay",
+        "servo_delay",
+    ),
 )

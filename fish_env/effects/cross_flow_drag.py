@@ -34,5 +34,10 @@ EFFECT = Effect(
     source="Hoerner, Fluid-Dynamic Drag, section 3: the cross-flow principle",
     parameters=(_coefficient("sway"), _coefficient("heave")),
     hooks={"wrench": eddy_drag},
-    confusable_with=("added_mass", "linear_drag", "offset_drag", "quadratic_damping"),
+    confusable_with=(
+        "added_mass",
+        "linear_drag",
+        "offset_drag",
+        "quadratic_damping",
+    ),
 )

@@ -25,5 +25,11 @@ EFFECT = Effect(
     source="Fossen, Handbook of Marine Craft, section 10.3",
     parameters=tuple(_component(name) for name in ("north", "east", "down")),
     hooks={"water": add_current},
-    confusable_with=("tether", "linear_drag", "buoyancy_offset"),
+    confusable_with=(
+        "buoyancy_offset",
+        "linear_drag",
+        "position_scale",
+        "tether",
+        "wave",
+    ),
 )

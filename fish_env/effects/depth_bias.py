@@ -21,5 +21,8 @@ EFFECT = Effect(
     source="Zero of a pressure sensor: 1 mbar of air pressure is 1 cm of water",
     parameters=(EffectParameter("offset", "m", 0.0, -5.0, 5.0, (-0.1, 0.1), "added to the depth"),),
     measure=add_offset,
-    confusable_with=("buoyancy_offset", "hull_compression"),
+    confusable_with=(
+        "buoyancy_offset",
+        "hull_compression",
+    ),
 )

@@ -10,7 +10,9 @@ from fish_env.model.jit import kernel
 @kernel
 def scale_frequency(inputs, time, fish, e):
     """f1 -> scale f1."""
-    return with_tail_frequency(inputs, e.scale * inputs.tail_frequency)
+    return with_tail_frequency(
+        inputs, e.scale * inputs.tail_frequency, e.scale * inputs.tail_frequency_rate
+    )
 
 
 EFFECT = Effect(
@@ -23,5 +25,9 @@ EFFECT = Effect(
         EffectParameter("scale", "-", 1.0, 0.2, 3.0, (0.9, 1.05), "beat over commanded beat"),
     ),
     hooks={"inputs": scale_frequency},
-    confusable_with=("battery_sag", "clock_scale", "tail_gain"),
+    confusable_with=(
+        "battery_sag",
+        "clock_scale",
+        "tail_gain",
+    ),
 )

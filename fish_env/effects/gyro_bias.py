@@ -11,7 +11,7 @@ def add_bias(channels, values):
 
 
 def _axis(name: str, axis: str) -> EffectParameter:
-    return EffectParameter(name, "rad/s", 0.0, -2.0, 2.0, (-0.03, 0.03), f"bias about {axis}")
+    return EffectParameter(name, "rad/s", 0.0, -2.0, 2.0, (-0.05, 0.05), f"bias about {axis}")
 
 
 EFFECT = Effect(
@@ -22,5 +22,8 @@ EFFECT = Effect(
     source="Zero-rate offset of low-cost gyros, some degrees a second",
     parameters=(_axis("p", "x"), _axis("q", "y"), _axis("r", "z")),
     measure=add_bias,
-    confusable_with=("attitude_misalignment", "tail_bias"),
+    confusable_with=(
+        "attitude_misalignment",
+        "tail_bias",
+    ),
 )

@@ -25,5 +25,11 @@ EFFECT = Effect(
         ),
     ),
     hooks={"barycentre": compress},
-    confusable_with=("buoyancy_offset", "depth_bias", "surface_drag", "tether", "water_ingress"),
+    confusable_with=(
+        "buoyancy_offset",
+        "depth_bias",
+        "surface_drag",
+        "tether",
+        "water_ingress",
+    ),
 )

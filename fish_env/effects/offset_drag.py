@@ -26,5 +26,9 @@ EFFECT = Effect(
         ),
     ),
     hooks={"wrench": brake},
-    confusable_with=("cross_flow_drag", "linear_drag", "surface_drag"),
+    confusable_with=(
+        "cross_flow_drag",
+        "linear_drag",
+        "surface_drag",
+    ),
 )

@@ -22,8 +22,13 @@ EFFECT = Effect(
     equation="measured (x, y, z) = scale (x, y, z)",
     source="Calibration of a camera that looks through a water surface of refractive index 1.33",
     parameters=(
-        EffectParameter("scale", "-", 1.0, 0.2, 5.0, (0.95, 1.05), "measured over true distance"),
+        EffectParameter("scale", "-", 1.0, 0.2, 5.0, (0.93, 1.07), "measured over true distance"),
     ),
     measure=scale_position,
-    confusable_with=("clock_scale", "current", "tail_gain", "tether"),
+    confusable_with=(
+        "clock_scale",
+        "current",
+        "tail_gain",
+        "tether",
+    ),
 )

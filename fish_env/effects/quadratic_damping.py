@@ -33,10 +33,13 @@ EFFECT = Effect(
     equation="M = -diag(roll, pitch, yaw) |omega| omega",
     source="Fossen, Handbook of Marine Craft, section 6.4: nonlinear damping",
     parameters=(
-        _coefficient("roll", (0.0005, 0.01)),
+        _coefficient("roll", (0.0005, 0.02)),
         _coefficient("pitch", (0.001, 0.03)),
         _coefficient("yaw", (0.0005, 0.01)),
     ),
     hooks={"wrench": damp_rotation},
-    confusable_with=("added_mass", "cross_flow_drag"),
+    confusable_with=(
+        "added_mass",
+        "cross_flow_drag",
+    ),
 )

@@ -21,5 +21,10 @@ EFFECT = Effect(
     ),
     sample_time=true_time,
     order=1,
-    confusable_with=("clock_scale", "servo_delay", "servo_lag", "wake_memory"),
+    confusable_with=(
+        "clock_scale",
+        "servo_delay",
+        "servo_lag",
+        "wake_memory",
+    ),
 )

@@ -49,5 +49,13 @@ EFFECT = Effect(
     states={"tail": ("angle",)},
     initial_states=start_at_command,
     time_scale=fastest,
-    confusable_with=("servo_delay", "tail_gain", "tail_flexibility", "wake_memory", "sensor_delay"),
+    order=5,
+    confusable_with=(
+        "sensor_delay",
+        "servo_delay",
+        "servo_rate_limit",
+        "tail_flexibility",
+        "tail_gain",
+        "wake_memory",
+    ),
 )

@@ -1,4 +1,9 @@
-"""Servo rate limit: the tail's servo turns only so fast."""
+"""Servo rate limit: the tail's servo turns only so fast.
+
+The tail's rate jumps where it meets its command again, and a fixed step that such a jump falls
+into loses its order: the angles stay exact, the path is off by up to a tenth of the effect on it
+at a step of 10 ms, by a twentieth at 5 ms.
+"""
 
 from __future__ import annotations
 
@@ -69,5 +74,9 @@ EFFECT = Effect(
     initial_states=start_at_command,
     time_scale=fastest,
     order=4,
-    confusable_with=("servo_backlash", "servo_lag", "tail_gain"),
+    confusable_with=(
+        "servo_backlash",
+        "servo_lag",
+        "tail_gain",
+    ),
 )

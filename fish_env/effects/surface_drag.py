@@ -22,9 +22,13 @@ EFFECT = Effect(
     parameters=(
         EffectParameter("gain", "-", 0.0, 0.0, 20.0, (0.1, 3.0), "extra drag at the surface"),
         EffectParameter(
-            "depth", "m", 0.1, 0.005, 5.0, (0.03, 0.3), "depth at which it fades", shapes=True
+            "depth", "m", 0.1, 0.005, 5.0, (0.03, 0.4), "depth at which it fades", shapes=True
         ),
     ),
     hooks={"body_drag": raise_drag},
-    confusable_with=("hull_compression", "linear_drag", "offset_drag"),
+    confusable_with=(
+        "hull_compression",
+        "linear_drag",
+        "offset_drag",
+    ),
 )

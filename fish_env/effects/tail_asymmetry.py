@@ -1,6 +1,13 @@
-"""Tail asymmetry: the tail swings further to one side."""
+"""Tail asymmetry: the tail swings further to one side.
+
+The two half strokes meet with a jump of the tail's rate. Both angle and rate go over from one
+to the other within a phase of about KINK, so that a physics step of 10 ms does not miss the jump;
+the acceleration, which only the water's inertia sees, holds the whole jump as a wider pulse.
+"""
 
 from __future__ import annotations
+
+import math
 
 from fish_env.model.effect import Effect, EffectParameter
 from fish_env.model.jit import kernel
@@ -8,31 +15,30 @@ from fish_env.model.records import Tail
 from fish_env.model.tail import TWO_PI
 from fish_env.model.trigonometry import sincos
 
-KINK_AREA = 0.6169605345437128  # integral of cos^16 over half a turn, pi C(16, 8) / 2^16
+KINK = 0.03
+"""rad of the tail's phase over which one half stroke goes over into the other."""
+PULSE_AREA = 0.6169605345437128  # integral of cos^16 over half a turn, pi C(16, 8) / 2^16
 
 
 @kernel
 def stretch_half_strokes(tail, inputs, phase, time, fish, e):
-    """A1 (1 + ratio) where sin(phi_t) > 0, A1 (1 - ratio) elsewhere: adds ratio A1 |sin(phi_t)|.
-
-    The rate jumps by 2 ratio A1 d(phi_t)/dt where the half strokes meet. The acceleration holds
-    that jump as a pulse cos^16(phi_t) around it, so that it still integrates to the rate.
-    """
+    """Adds ratio A1 |sin(phi_t)|, with |sin| rounded to sqrt(sin^2 + KINK^2)."""
     sine, cosine = sincos(phase)
     omega = TWO_PI * inputs.tail_frequency
     amplitude, amplitude_rate = inputs.tail_amplitude, inputs.tail_amplitude_rate
-    side = e.ratio if sine > 0.0 else -e.ratio
+    size = math.sqrt(sine * sine + KINK * KINK)
+    side = 1.0 if sine > 0.0 else -1.0
     pulse = cosine * cosine
     pulse = pulse * pulse
     pulse = pulse * pulse
     pulse = pulse * pulse
-    kinks = e.ratio * ((2.0 / KINK_AREA) * (omega * omega) * amplitude * pulse)
+    bend = (2.0 / PULSE_AREA) * pulse - side * sine
+    swing = omega * amplitude
+    slewing = 2.0 * omega * amplitude_rate + TWO_PI * inputs.tail_frequency_rate * amplitude
     return Tail(
-        tail.angle + side * (amplitude * sine),
-        tail.rate + side * (omega * amplitude * cosine + amplitude_rate * sine),
-        tail.acceleration
-        + side * (2.0 * omega * amplitude_rate * cosine - omega * omega * amplitude * sine)
-        + kinks,
+        tail.angle + e.ratio * (amplitude * size),
+        tail.rate + e.ratio * (swing * (sine * cosine / size) + amplitude_rate * size),
+        tail.acceleration + e.ratio * (omega * swing * bend + side * (slewing * cosine)),
     )
 
 
@@ -49,5 +55,8 @@ EFFECT = Effect(
     ),
     hooks={"tail": stretch_half_strokes},
     order=1,
-    confusable_with=("tail_bias", "com_offset"),
+    confusable_with=(
+        "com_offset",
+        "tail_bias",
+    ),
 )

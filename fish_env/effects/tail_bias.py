@@ -24,5 +24,9 @@ EFFECT = Effect(
     ),
     hooks={"tail": offset_tail},
     order=2,
-    confusable_with=("tail_asymmetry", "com_offset", "gyro_bias"),
+    confusable_with=(
+        "com_offset",
+        "gyro_bias",
+        "tail_asymmetry",
+    ),
 )

@@ -26,9 +26,9 @@ def bend(tail, inputs, phase, time, fish, e, states):
 
 
 @kernel
-def start_straight(inputs, tail, fish, e):
-    """The run starts with the tail unbent, moving with its root."""
-    return tail.angle, tail.rate
+def start_unbent(inputs, tail, fish, e):
+    """The run starts with the tail unbent and at rest."""
+    return tail.angle, 0.0
 
 
 def fastest(values):
@@ -53,8 +53,14 @@ EFFECT = Effect(
     ),
     hooks={"tail": bend},
     states={"tail": ("angle", "rate")},
-    initial_states=start_straight,
+    initial_states=start_unbent,
     time_scale=fastest,
     order=7,
-    confusable_with=("servo_delay", "servo_lag", "tail_gain", "tail_reactive", "wake_memory"),
+    confusable_with=(
+        "servo_delay",
+        "servo_lag",
+        "tail_gain",
+        "tail_reactive",
+        "wake_memory",
+    ),
 )

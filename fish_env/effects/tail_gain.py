@@ -17,6 +17,7 @@ def scale_amplitude(inputs, time, fish, e):
         inputs.tail_frequency,
         inputs.tail_offset_rate,
         e.gain * inputs.tail_amplitude_rate,
+        inputs.tail_frequency_rate,
     )
 
 

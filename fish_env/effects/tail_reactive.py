@@ -128,5 +128,10 @@ EFFECT = Effect(
         EffectParameter("scale", "-", 0.0, 0.0, 5.0, (0.1, 1.5), "1 is the theory's virtual mass"),
     ),
     hooks={"inertia": reactive_inertia, "wrench": reactive_wrench},
-    confusable_with=("added_mass", "tail_gain", "wake_memory"),
+    confusable_with=(
+        "added_mass",
+        "tail_flexibility",
+        "tail_gain",
+        "wake_memory",
+    ),
 )

@@ -39,5 +39,10 @@ EFFECT = Effect(
         _anchor("z", "down"),
     ),
     hooks={"wrench": pull},
-    confusable_with=("current", "hull_compression", "linear_drag", "position_scale"),
+    confusable_with=(
+        "current",
+        "hull_compression",
+        "linear_drag",
+        "position_scale",
+    ),
 )

@@ -27,5 +27,8 @@ EFFECT = Effect(
         EffectParameter("fraction", "-", 0.0, -0.5, 0.9, (0.05, 0.4), "speed lost at the tail"),
     ),
     hooks={"tail_inflow": slow_inflow},
-    confusable_with=("linear_drag", "tail_gain"),
+    confusable_with=(
+        "linear_drag",
+        "tail_gain",
+    ),
 )

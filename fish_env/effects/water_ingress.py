@@ -25,5 +25,8 @@ EFFECT = Effect(
         ),
     ),
     hooks={"barycentre": fill},
-    confusable_with=("buoyancy_offset", "hull_compression"),
+    confusable_with=(
+        "buoyancy_offset",
+        "hull_compression",
+    ),
 )

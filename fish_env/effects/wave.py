@@ -36,5 +36,8 @@ EFFECT = Effect(
         ),
     ),
     hooks={"water": add_wave},
-    confusable_with=("current", "buoyancy_offset"),
+    confusable_with=(
+        "buoyancy_offset",
+        "current",
+    ),
 )

@@ -24,8 +24,9 @@ A hook may carry numbers of its own through time. *States* obey a differential e
 takes their tuple as a further argument and returns ``(value, derivatives)``. *Memory* follows a
 rule from one physics step to the next, such as "move at most so far": the hook takes the tuple
 that the last step left and the time since then (s), and returns ``(value, memory)``, the memory
-as it is at this instant; the engine keeps what it is at the end of the step. A hook with both
-takes ``(..., e, states, memory, since)`` and returns ``(value, derivatives, memory)``.
+as it is at this instant; the engine keeps what it is at the end of the step. It is for the drive:
+the stages ``inputs`` and ``tail``. A hook with both takes ``(..., e, states, memory, since)`` and
+returns ``(value, derivatives, memory)``.
 
 Hooks of a stage run in the order of section, ``order`` and name, those of users' effects last.
 """
@@ -101,7 +102,7 @@ class Effect:
         parameters: its parameters, in the order hooks read them.
         hooks: stage -> kernel (see the module's table); empty for measurement effects.
         states: stage -> names of the states integrated with the fish (at most one stage).
-        memory: stage -> names of the numbers kept from step to step (at most one stage).
+        memory: stage -> names of the numbers kept from step to step (``inputs`` or ``tail``).
         initial_states: (inputs, tail, fish, e) -> tuple of states, then memory, at the start of a
             run; inputs and tail as the hooks before this one leave them.
         command_delay: name of the parameter (s) by which the tail's command is late.
@@ -149,6 +150,8 @@ class Effect:
             raise EffectError(
                 f"effect {self.name}: states and memory belong to one of its own hooks"
             )
+        if set(self.memory) - {"inputs", "tail"}:
+            raise EffectError(f"effect {self.name}: memory is for hooks of inputs and tail alone")
         if stages and self.initial_states is None:
             raise EffectError(f"effect {self.name}: give initial_states for its states and memory")
         if self.command_delay not in (None, *self.neutral):

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from fish_env.model.history import COMMAND_FIELDS
+from fish_env.model.history import COMMAND, HEARD
 from fish_env.params.packing import CURVES, RECORD_FIELDS
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ from fish_env.model.coefficients import (
 )
 from fish_env.model.frames import quaternion_rate, rotation, to_body, to_inertial
 from fish_env.model.history import (
-    COMMAND_FIELDS, TOLD_ROWS, assume_running, late_command, recall, remember, running_command,
+    HEARD, RECORD, assume_running, late_command, recall, remember, running_command,
 )
 from fish_env.model.hydrostatics import buoyancy_force, gravity_wrench
 from fish_env.model.jit import entry_point, kernel
@@ -87,8 +87,8 @@ class Emitter:
             f"N_TERMS = {len(self.composition.term_names)}\n"
             f"LATE_TAIL = {bool(self.composition.delays)}\n"
         )
-        functions = (self.derivative(), self.terms(), self.initialise(), self.command())
-        return "\n".join([sizes, *functions])
+        parts = (self.derivative, self.terms, self.initialise, self.command, self.memory)
+        return "\n".join([sizes, *(part() for part in parts)])
 
     def function(self, name: str, arguments: str, lines: Sequence[str]) -> str:
         """One kernel from its lines."""
@@ -138,11 +138,31 @@ class Emitter:
         ]
 
     def command(self) -> str:
-        """What the tail's servo is told at the start of a step, for a command that comes late."""
+        """What the tail's servo is told in a step that begins now, for commands that come late."""
         lines = ["shift = 0.0", *self.unpack(), *self.apply("inputs", "inputs", "time, fish")]
-        told = (*(f"inputs.tail_{name}" for name in COMMAND_FIELDS[:-1]), "phase", self.delay())
+        told = [f"inputs.tail_{name}" for name in COMMAND] + ["phase", self.delay()]
         lines += [f"work[(TOLD + {i}) * width + k] = {value}" for i, value in enumerate(told)]
         return self.function("lane_command", "k, width, elapsed, work", lines)
+
+    def memory(self) -> str:
+        """What effects remember of a step that ends in the present state."""
+        lines = [
+            "shift = h",
+            *self.unpack(),
+            *self.apply("inputs", "inputs", "time, fish"),
+            *self.command_lines(self.recalled()),
+            *self.apply("tail", "tail", "tail_inputs, tail_phase, time, fish"),
+        ]
+        for effect in self.effects:
+            for i, name in enumerate(effect.memory_names):
+                row = self.states.index(f"{effect.name}.{name}")
+                lines.append(f"work[(X + {row}) * width + k] = m_{effect.name}_{i}")
+        return self.function("lane_remember", "k, width, elapsed, h, work", lines)
+
+    def recalled(self) -> str:
+        """Inputs and phase that reach the tail in a rollout."""
+        past = ", ".join(f"work[(PAST + {i}) * width + k]" for i in range(len(HEARD)))
+        return f"late_command(late, inputs, phase, {past})"
 
     def delay(self) -> str:
         """How late the tail's command is (s)."""
@@ -236,11 +256,10 @@ class Emitter:
 
     def evaluation(self) -> list[str]:
         """Everything up to the wrench terms."""
-        past = ", ".join(f"work[(PAST + {i}) * width + k]" for i in range(len(COMMAND_FIELDS)))
         lines = [
             *self.unpack(),
             *self.apply("inputs", "inputs", "time, fish"),
-            *self.command_lines(f"late_command(late, inputs, phase, {past})"),
+            *self.command_lines(self.recalled()),
             *self.apply("tail", "tail", "tail_inputs, tail_phase, time, fish"),
             "centre = barycentre(inputs, fish)",
             *self.apply("barycentre", "centre", "place, inputs, time, fish"),
@@ -351,7 +370,7 @@ class Emitter:
         ]
 
     def rates(self) -> list[str]:
-        """Store the derivative of every state, and what is remembered as it is at this instant."""
+        """Store the derivative of every state."""
         quaternion = ", ".join(f"work[(X + {i}) * width + k]" for i in range(3, 7))
         values = [
             "drift.x",
@@ -367,8 +386,6 @@ class Emitter:
         ]
         for effect in self.effects:
             values += [f"d_{effect.name}_{i}" for i in range(len(effect.state_names))]
-        for effect in self.effects:
-            values += [f"m_{effect.name}_{i}" for i in range(len(effect.memory_names))]
         return [
             "drift = to_inertial(attitude, velocity)",
             f"spin = quaternion_rate({quaternion}, omega.x, omega.y, omega.z)",

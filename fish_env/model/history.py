@@ -1,11 +1,11 @@
 """What the tail's servo was told a while ago, for commands that reach it late.
 
-A *told* command is (offset, amplitude, frequency, rate of the offset, rate of the amplitude,
-phase). It is constant in a physics step but for its rates, so that remembering it at the start
-of every step recalls any instant between exactly.
+A *told* command is constant in a physics step but for the rates of offset, amplitude and frequency,
+so that remembering it at the start of every step recalls any instant between exactly.
 
 A history is an array of shape (1 + slots * RECORD, N): row 0 counts the steps remembered, then
-come the slots, used in turn, each with the time (s) at which its step began and what was told.
+come the slots, a power of two, used in turn, each with the time (s) at which its step began and
+what was told.
 Before its first step a fish is taken to have been told the same all along.
 """
 
@@ -22,10 +22,21 @@ from fish_env.model.jit import kernel
 if TYPE_CHECKING:
     from fish_env.model.runtime import Grid
 
-COMMAND_FIELDS = ("offset", "amplitude", "frequency", "offset_rate", "amplitude_rate", "phase")
-TOLD_ROWS = len(COMMAND_FIELDS) + 1
-"""Rows of the work array for what is told now, the last one being how late it arrives (s)."""
-RECORD = len(COMMAND_FIELDS) + 1
+COMMAND = (
+    "offset",
+    "amplitude",
+    "frequency",
+    "offset_rate",
+    "amplitude_rate",
+    "frequency_rate",
+)
+"""What the tail is told, in rad, rad, Hz, and their rates."""
+HEARD = (*COMMAND, "phase")
+"""Rows of what is heard at an instant: what was told a delay ago."""
+TOLD = (*HEARD, "delay")
+"""Rows of what is told when a step begins, and how late that is heard (s)."""
+RECORD = len(TOLD)
+"""Numbers of a slot: the time at which a step began (s), then what was told."""
 
 FloatArray = npt.NDArray[np.float64]
 _TWO_PI = 6.283185307179586
@@ -38,10 +49,10 @@ def remember(work, width, told, start, history, first, count):
     slots = (history.shape[0] - 1) // RECORD
     for k in range(count):
         steps = history[0, first + k]
-        row = 1 + RECORD * (int(steps) % slots)
+        row = 1 + RECORD * (int(steps) & (slots - 1))
         history[row, first + k] = work[start * width + k]
-        for i in range(RECORD - 1):
-            history[row + 1 + i, first + k] = work[(told + i) * width + k]
+        for i in range(1, RECORD):
+            history[row + i, first + k] = work[(told + i - 1) * width + k]
         history[0, first + k] = steps + 1.0
 
 
@@ -61,22 +72,21 @@ def recall(work, width, told, past, start, shift, h, history, first, count):
         newest = int(history[0, lane]) - 1
         oldest = max(0, newest + 1 - slots)
         step = max(oldest, newest - int(min(late / h, float(slots))))
-        while (step > oldest) & (history[1 + RECORD * (step % slots), lane] > time + edge):
+        while (step > oldest) & (history[1 + RECORD * (step & (slots - 1)), lane] > time + edge):
             step -= 1
-        while step < newest and history[1 + RECORD * ((step + 1) % slots), lane] <= time + edge:
+        while (
+            step < newest and history[1 + RECORD * ((step + 1) & (slots - 1)), lane] <= time + edge
+        ):
             step += 1
-        row = 1 + RECORD * (step % slots)
+        row = 1 + RECORD * (step & (slots - 1))
         since = time - history[row, lane]
         moving = 0.0 if since < -_ROUNDING else 1.0
-        offset_rate = moving * history[row + 4, lane]
-        amplitude_rate = moving * history[row + 5, lane]
-        frequency = history[row + 3, lane]
-        work[past * width + k] = history[row + 1, lane] + since * offset_rate
-        work[(past + 1) * width + k] = history[row + 2, lane] + since * amplitude_rate
-        work[(past + 2) * width + k] = frequency
-        work[(past + 3) * width + k] = offset_rate
-        work[(past + 4) * width + k] = amplitude_rate
-        work[(past + 5) * width + k] = history[row + 6, lane] + _TWO_PI * frequency * since
+        for i in range(3):
+            rate = moving * history[row + 4 + i, lane]
+            work[(past + i) * width + k] = history[row + 1 + i, lane] + since * rate
+            work[(past + 3 + i) * width + k] = rate
+        mean = 0.5 * (history[row + 3, lane] + work[(past + 2) * width + k])
+        work[(past + 6) * width + k] = history[row + 7, lane] + _TWO_PI * mean * since
 
 
 @kernel
@@ -84,17 +94,17 @@ def assume_running(work, width, told, past):
     """Set the ``past`` rows as if every fish had always been told what it is told now."""
     for k in range(width):
         late = work[(told + RECORD - 1) * width + k]
-        frequency = work[(told + 2) * width + k]
         for i in range(3):
             work[(past + i) * width + k] = work[(told + i) * width + k]
-        work[(past + 3) * width + k] = 0.0
-        work[(past + 4) * width + k] = 0.0
-        work[(past + 5) * width + k] = work[(told + 5) * width + k] - _TWO_PI * frequency * late
+            work[(past + 3 + i) * width + k] = 0.0
+        turned = _TWO_PI * work[(told + 2) * width + k] * late
+        work[(past + 6) * width + k] = work[(told + 6) * width + k] - turned
 
 
 @kernel
 def late_command(
-    late, inputs, phase, offset, amplitude, frequency, offset_rate, amplitude_rate, past_phase
+    late, inputs, phase, offset, amplitude, frequency, offset_rate, amplitude_rate,
+    frequency_rate, past_phase,
 ):  # fmt: skip
     """Inputs and phase that reach the tail: those recalled if they come late, else those of now."""
     on = late > 0.0
@@ -105,6 +115,7 @@ def late_command(
         frequency if on else inputs.tail_frequency,
         offset_rate if on else inputs.tail_offset_rate,
         amplitude_rate if on else inputs.tail_amplitude_rate,
+        frequency_rate if on else inputs.tail_frequency_rate,
     )
     return heard, past_phase if on else phase
 
@@ -113,7 +124,7 @@ def late_command(
 def running_command(inputs, phase, late):
     """Inputs and phase that reach the tail when the present command has been running all along."""
     heard = with_tail_command(
-        inputs, inputs.tail_offset, inputs.tail_amplitude, inputs.tail_frequency, 0.0, 0.0
+        inputs, inputs.tail_offset, inputs.tail_amplitude, inputs.tail_frequency, 0.0, 0.0, 0.0
     )
     return heard, phase - _TWO_PI * inputs.tail_frequency * late
 
@@ -122,18 +133,22 @@ def history_rows(longest_delay: float, shortest_step: float) -> int:
     """Rows of a history that reaches back far enough for steps of this size or longer (s)."""
     if longest_delay <= 0.0:
         return 0
-    return 1 + RECORD * (int(np.ceil(longest_delay / shortest_step)) + 2)
+    return _rows(int(np.ceil(longest_delay / shortest_step)) + 2)
 
 
 def history_rows_on(grid: Grid, longest_delay: float) -> int:
-    """Rows of a history that reaches back far enough on this grid, with room for no more."""
+    """Rows of a history that reaches back far enough on this grid."""
     if longest_delay <= 0.0:
         return 0
     counts: npt.NDArray[np.int64] = grid.steps
     index = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
     begins = np.repeat(grid.starts, counts) + index * np.repeat(grid.sizes, counts)
     reached = np.searchsorted(begins, begins - longest_delay - 2 * _ROUNDING)
-    return 1 + RECORD * (int(np.max(np.arange(begins.size) - reached)) + 3)
+    return _rows(int(np.max(np.arange(begins.size) - reached)) + 3)
+
+
+def _rows(slots: int) -> int:
+    return 1 + RECORD * (1 << (slots - 1).bit_length())
 
 
 def forget(history: FloatArray, lanes: npt.NDArray[np.int64], rows: int) -> FloatArray:

@@ -7,8 +7,10 @@ from fish_env.model.records import Inputs
 
 
 @kernel
-def with_tail_command(inputs, offset, amplitude, frequency, offset_rate, amplitude_rate):
-    """The same inputs with another command of the tail; the frequency slews as it did."""
+def with_tail_command(
+    inputs, offset, amplitude, frequency, offset_rate, amplitude_rate, frequency_rate
+):  # fmt: skip
+    """The same inputs with another command of the tail (rad, rad, Hz) and its rates."""
     return Inputs(
         offset,
         amplitude,
@@ -17,15 +19,15 @@ def with_tail_command(inputs, offset, amplitude, frequency, offset_rate, amplitu
         inputs.block_angle,
         offset_rate,
         amplitude_rate,
-        inputs.tail_frequency_rate,
+        frequency_rate,
         inputs.block_displacement_rate,
         inputs.block_angle_rate,
     )
 
 
 @kernel
-def with_tail_frequency(inputs, frequency):
-    """The same inputs with another frequency of the tail (Hz)."""
+def with_tail_frequency(inputs, frequency, rate):
+    """The same inputs with another frequency of the tail (Hz) and its rate (Hz/s)."""
     return with_tail_command(
         inputs,
         inputs.tail_offset,
@@ -33,6 +35,7 @@ def with_tail_frequency(inputs, frequency):
         frequency,
         inputs.tail_offset_rate,
         inputs.tail_amplitude_rate,
+        rate,
     )
 
 

@@ -19,9 +19,10 @@ from fish_env.model.composed import (
     lane_command,
     lane_derivative,
     lane_initialise,
+    lane_remember,
     lane_terms,
 )
-from fish_env.model.history import COMMAND_FIELDS, TOLD_ROWS, assume_running, recall, remember
+from fish_env.model.history import HEARD, RECORD, assume_running, recall, remember
 from fish_env.model.jit import entry_point, kernel
 
 # --- end ---
@@ -39,8 +40,8 @@ SLEW = U_END + 5
 TIME = SLEW + 5
 BEGIN = TIME + 1  # time at which a step begins (s), then the tail's command (see model.history)
 TOLD = BEGIN + LATE_TAIL
-PAST = TOLD + LATE_TAIL * TOLD_ROWS
-PAR = PAST + LATE_TAIL * len(COMMAND_FIELDS)
+PAST = TOLD + LATE_TAIL * RECORD
+PAR = PAST + LATE_TAIL * len(HEARD)
 WORK_ROWS = PAR + N_PARAMETERS
 LARGEST = 1e4  # a state beyond this many SI units has diverged
 
@@ -94,7 +95,7 @@ def tell_tail(work, width, elapsed, history, first, count):
 
 @kernel
 def rk4_step(work, width, elapsed, h, tables, late, history, first, count, pace):
-    """One classical Runge-Kutta step of every lane: X0 -> X. Memory takes its value at the end.
+    """One classical Runge-Kutta step of every lane: X0 -> X. Memory follows from where it ends.
 
     ``pace``, (width,), multiplies the rate of each lane's own time; without entries it is one.
     """
@@ -125,8 +126,9 @@ def rk4_step(work, width, elapsed, h, tables, late, history, first, count, pace)
             for n in range(N_SLOPES * width):
                 total = work[SUM * width + n] + work[DX * width + n]
                 work[X * width + n] = work[X0 * width + n] + (h / 6.0) * total
-    for n in range(N_SLOPES * width, N_STATES * width):
-        work[X * width + n] = work[DX * width + n]
+    if N_MEMORY > 0:
+        for k in range(width):
+            lane_remember(k, width, elapsed, h, work)
 
 
 @kernel

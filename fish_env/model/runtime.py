@@ -163,9 +163,7 @@ class Kernels:
         """
         work = self._work(state, inputs, rates, par, time)
         self.entry("derivative_batch")(work, state.shape[1], tables)
-        slopes = self._rows(work, self.module.DX, state.shape[1])
-        slopes[self.module.N_SLOPES :] = 0.0
-        return slopes
+        return self._rows(work, self.module.DX, state.shape[1])
 
     def terms(
         self,

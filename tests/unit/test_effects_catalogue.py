@@ -12,13 +12,18 @@ from fish_env.simulator import Simulator
 from tests.broken import PlainKernels
 from tests.physics.cases import ALL_EFFECTS, SWIM, TUMBLE, random_inputs, random_states, swimmer
 
-MOVING = {name: effect for name, effect in catalogue().items() if effect.hooks}
+MOVING = {name: effect for name, effect in catalogue().items() if effect.acts_on_motion}
+BUSY = [
+    {**SWIM[0], "tail_frequency": 3.5},
+    {"t": 0.05, "tail_offset": -0.2, "tail_amplitude": 0.2, "block_displacement": 0.004},
+]
+"""Something for every effect to act on: fast strokes, and every command but the angle changes."""
 
 
 def on(name):
     """Values that switch an effect of the catalogue on."""
     effect = get_effect(name)
-    plausible = {p.name: p.plausible[0] + 0.6 * np.ptp(p.plausible) for p in effect.parameters}
+    plausible = {p.name: p.plausible[0] + 0.4 * np.ptp(p.plausible) for p in effect.parameters}
     return effect.complete(ALL_EFFECTS.get(name, plausible))
 
 
@@ -57,7 +62,7 @@ def test_neutral_effects_change_nothing_while_another_is_on(name):
         simulator = Simulator(swimmer())
         simulator.model = ExtendedModel(swimmer(), {name: on(name)}, declared, ())
         vars(simulator.model)["kernels"] = PlainKernels(Composition(declared), {})
-        run = simulator.run(SWIM, duration_s=0.1, initial=TUMBLE)
+        run = simulator.run(BUSY, duration_s=0.1, initial=TUMBLE)
         ends.append(run.states[:, :18])
     np.testing.assert_array_equal(ends[0], ends[1])
 
@@ -65,9 +70,9 @@ def test_neutral_effects_change_nothing_while_another_is_on(name):
 @pytest.mark.parametrize("name", MOVING)
 def test_an_effect_that_is_on_changes_the_motion(name):
     """Otherwise the tests above would say nothing."""
-    baseline = Simulator(swimmer()).run(SWIM, duration_s=0.5, initial=TUMBLE)
+    baseline = Simulator(swimmer()).run(BUSY, duration_s=0.5, initial=TUMBLE)
     changed = Simulator(swimmer(), effects={name: on(name)}).run(
-        SWIM, duration_s=0.5, initial=TUMBLE
+        BUSY, duration_s=0.5, initial=TUMBLE
     )
     assert not np.array_equal(baseline.states[:, :14], changed.states[:, :14])
 
@@ -77,26 +82,95 @@ def test_a_plausible_effect_leaves_a_finite_motion(name):
     """No NaN at either end of the plausible range."""
     for end in (0, 1):
         values = {p.name: p.plausible[end] for p in get_effect(name).parameters}
-        run = Simulator(swimmer(), effects={name: values}).run(SWIM, duration_s=2.0)
+        run = Simulator(swimmer(), effects={name: values}).run(BUSY, duration_s=2.0)
         assert np.all(np.isfinite(run.states))
 
 
 @pytest.mark.parametrize("effect", catalogue().values(), ids=catalogue())
 def test_an_effect_declares_what_reports_need(effect):
-    """Section, equation, source, units; plausible within bounds; confusions are real names or not
-    shipped yet, and never itself."""
+    """Section, equation, source, units; plausible within bounds and reached by ordinary steps."""
     assert effect.section in SECTIONS
     assert effect.summary
     assert effect.equation
     assert effect.source
-    assert effect.name not in effect.confusable_with
-    assert effect.hooks or effect.sample_time or effect.measure
+    assert effect.acts_on_motion or effect.sample_time or effect.measure
     for parameter in effect.parameters:
         assert parameter.unit
         assert parameter.description
         low, high = parameter.plausible
         assert parameter.lower <= low < high <= parameter.upper
         assert parameter.lower <= parameter.neutral <= parameter.upper
+    if effect.time_scale is not None:
+        for end in (0, 1):
+            assert effect.time_scale({p.name: p.plausible[end] for p in effect.parameters}) >= 0.01
+        assert effect.time_scale(effect.neutral) == np.inf
+
+
+@pytest.mark.parametrize("effect", catalogue().values(), ids=catalogue())
+def test_confusions_are_other_effects_and_mutual(effect):
+    """In alphabetical order, so that a missing one is seen."""
+    assert effect.confusable_with
+    assert list(effect.confusable_with) == sorted(set(effect.confusable_with) - {effect.name})
+    for other in effect.confusable_with:
+        assert effect.name in get_effect(other).confusable_with, other
+
+
+def test_the_catalogue_is_that_of_the_specification():
+    """Names and parameter names are public; the neutral values switch each effect off."""
+    public = {
+        "tail_bias": {"offset": 0},
+        "tail_gain": {"gain": 1},
+        "tail_asymmetry": {"ratio": 0},
+        "servo_lag": {"time_constant": 0},
+        "servo_rate_limit": {"rate": np.inf},
+        "servo_delay": {"delay": 0},
+        "servo_backlash": {"gap": 0},
+        "tail_flexibility": {"natural_frequency": np.inf, "damping_ratio": 1},
+        "frequency_scale": {"scale": 1},
+        "battery_sag": {"rate": 0},
+        "block_scale": {"scale": 1},
+        "block_lag": {"time_constant": 0},
+        "added_mass": dict.fromkeys(("surge", "sway", "heave", "roll", "pitch", "yaw"), 0),
+        "block_reaction": {"scale": 0},
+        "linear_drag": dict.fromkeys(("surge", "sway", "heave"), 0),
+        "quadratic_damping": dict.fromkeys(("roll", "pitch", "yaw"), 0),
+        "cross_flow_drag": dict.fromkeys(("sway", "heave"), 0),
+        "tail_reactive": {"scale": 0},
+        "wake_fraction": {"fraction": 0},
+        "wake_memory": {"time_constant": 0},
+        "offset_drag": {"coefficient": 0},
+        "buoyancy_offset": {"mass": 0},
+        "hull_compression": {"rate": 0},
+        "water_ingress": {"rate": 0},
+        "com_offset": dict.fromkeys("xyz", 0),
+        "current": dict.fromkeys(("north", "east", "down"), 0),
+        "wave": {"amplitude": 0, "frequency": None, "phase": None, "decay": None},
+        "surface_drag": {"gain": 0, "depth": None},
+        "tether": dict.fromkeys(("stiffness", "x", "y", "z"), 0),
+        "clock_scale": {"scale": 1},
+        "sensor_delay": {"delay": 0},
+        "gyro_bias": dict.fromkeys("pqr", 0),
+        "attitude_misalignment": dict.fromkeys(("roll", "pitch", "yaw"), 0),
+        "depth_bias": {"offset": 0},
+        "position_scale": {"scale": 1},
+    }
+    shipped = {
+        name: {
+            key: value if public[name].get(key, 0) is not None else None
+            for key, value in effect.neutral.items()
+        }
+        for name, effect in catalogue().items()
+    }
+    assert shipped == public
+
+
+def test_the_drive_acts_in_the_order_from_command_to_water():
+    """Amplitude and bias, delay, the servo's limits, the play behind it, the soft tail."""
+    order = [name for name, effect in catalogue().items() if effect.section == "actuation"]
+    chain = ("tail_asymmetry", "tail_bias", "servo_delay", "servo_rate_limit", "servo_lag")
+    chain = (*chain, "servo_backlash", "tail_flexibility")
+    assert [name for name in order if name in chain] == list(chain)
+    assert order.index("block_scale") < order.index("block_lag")
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import product
 
@@ -14,7 +14,8 @@ from fish_env.model.effect import Effect, EffectParameter
 
 Probe = Mapping[str, float]
 PARAMETER = "parameter:"
-Size = Callable[[EffectParameter], float]
+SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Sizes tried between small and large."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +41,9 @@ class Cause:
 
 def causes_of(problem: Problem) -> tuple[Cause, ...]:
     """Every cause that can be considered for a problem."""
+    step = max(float(np.max(np.diff(run.clock) / run.substeps[1:])) for run in problem.runs)
     effects = [
-        Cause(effect.name, probes_of(effect))
+        Cause(effect.name, probes_of(effect, step))
         for effect in problem.known.values()
         if effect.acts_on_motion or effect.sample_time or effect.measure
     ]
@@ -49,29 +51,42 @@ def causes_of(problem: Problem) -> tuple[Cause, ...]:
     return (*effects, *coefficients)
 
 
-def probes_of(effect: Effect) -> tuple[tuple[Probe, ...], ...]:
-    """Small settings that show what an effect does.
+def probes_of(effect: Effect, step: float = 0.0) -> tuple[tuple[Probe, ...], ...]:
+    """Small and large settings that show what an effect does.
 
     Parameters that switch the effect on are probed one at a time; those that only shape it (a
     frequency, a phase, an anchor) take a few values of their plausible range.
+
+    Args:
+        effect: the effect.
+        step: longest RK4 step (s); settings that are too quick for it are moved towards the large
+            ones until they are not.
     """
     switches = [p for p in effect.parameters if not p.shapes]
     shapes = [p for p in effect.parameters if p.shapes]
-    settings = [
-        dict(zip([s.name for s in shapes], values, strict=True))
-        for values in product(*(_shape_values(s) for s in shapes))
-    ]
-    alternatives = []
-    for setting in settings:
-        for size in _sizes(switches):
-            alternatives.append(
-                tuple({**_off(effect, switches), **setting, p.name: size(p)} for p in switches)
-            )
+    alternatives: list[tuple[Probe, ...]] = []
+    for values in product(*(_shape_values(s) for s in shapes)):
+        setting = dict(zip([s.name for s in shapes], values, strict=True))
+        for shares in (SHARES, SHARES[-1:]):
+            candidates = [_alternative(effect, switches, setting, share) for share in shares]
+            slow = [c for c in candidates if _slow_enough(effect, c, step)]
+            if slow and slow[0] not in alternatives:
+                alternatives.append(slow[0])
     return tuple(alternatives)
 
 
-def _off(effect: Effect, switches: list[EffectParameter]) -> Probe:
-    return {p.name: p.neutral for p in switches}
+def _alternative(
+    effect: Effect, switches: list[EffectParameter], setting: Probe, share: float
+) -> tuple[Probe, ...]:
+    off = {p.name: p.neutral for p in switches}
+    return tuple({**off, **setting, p.name: _between(p, share)} for p in switches)
+
+
+def _slow_enough(effect: Effect, alternative: tuple[Probe, ...], step: float) -> bool:
+    """Whether RK4 follows the effect: its shortest time constant is about a step or longer."""
+    if effect.time_scale is None:
+        return True
+    return all(effect.time_scale(probe) >= 0.9 * step for probe in alternative)
 
 
 def _shape_values(parameter: EffectParameter) -> tuple[float, ...]:
@@ -83,19 +98,21 @@ def _shape_values(parameter: EffectParameter) -> tuple[float, ...]:
     return tuple(np.linspace(low, high, 3).tolist())
 
 
-def _sizes(switches: list[EffectParameter]) -> tuple[Size, Size]:
-    """Sizes to probe, a small and a large one; where the neutral is infinite, low is strong."""
-    if any(np.isinf(p.neutral) for p in switches):
-        return (_weak_limit, _middling_limit)
-    return (_small, _large)
+def _between(p: EffectParameter, share: float) -> float:
+    """A size from small (share 0) to large (share 1)."""
+    small, large = _ends(p)
+    if small * large > 0.0:
+        return float(small * (large / small) ** share)
+    return small + share * (large - small)
 
 
-def _weak_limit(p: EffectParameter) -> float:
-    return p.plausible[1]
-
-
-def _middling_limit(p: EffectParameter) -> float:
-    return float(np.sqrt(p.plausible[0] * p.plausible[1]))
+def _ends(p: EffectParameter) -> tuple[float, float]:
+    """A small and a large departure from neutral; where neutral is infinite, low is large."""
+    low, high = p.plausible
+    if np.isinf(p.neutral):
+        return high, float(np.sqrt(low * high))
+    far = high if abs(high - p.neutral) >= abs(low - p.neutral) else low
+    return _small(p), p.neutral + 0.6 * (far - p.neutral)
 
 
 def _small(p: EffectParameter) -> float:
@@ -103,12 +120,6 @@ def _small(p: EffectParameter) -> float:
     if low <= p.neutral <= high:
         return p.neutral + 0.1 * (high - p.neutral if high > p.neutral else low - p.neutral)
     return low if abs(low - p.neutral) < abs(high - p.neutral) else high
-
-
-def _large(p: EffectParameter) -> float:
-    low, high = p.plausible
-    far = high if abs(high - p.neutral) >= abs(low - p.neutral) else low
-    return p.neutral + 0.6 * (far - p.neutral)
 
 
 def effect_values(problem: Problem, name: str, probe: Probe) -> dict[str, float]:

@@ -35,7 +35,7 @@ def preconditions(
     problem: Problem, screen: Screen, causes: Sequence[Cause]
 ) -> tuple[Precondition, ...]:
     """Detectability and confusability of every effect; a cause without a signal is not excited."""
-    strongest = _most_informative(screen)
+    strongest = _representative(problem, screen)
     result = []
     for cause in causes:
         if not cause.is_effect:
@@ -60,15 +60,27 @@ def preconditions(
     return tuple(result)
 
 
-def _most_informative(screen: Screen) -> dict[str, Signal]:
-    chosen: dict[str, Signal] = {}
+def _representative(problem: Problem, screen: Screen) -> dict[str, Signal]:
+    """One alternative of each cause, to speak for it.
+
+    A cause with shapes is judged by the shape that shows best. Without shapes the alternatives are
+    sizes, and the one nearest to what can just be detected is the truest: effects saturate.
+    """
+    alternatives: dict[str, list[Signal]] = {}
     for signal in screen.signals:
-        if signal.probe < 0:
-            continue
-        known = chosen.get(signal.cause.name)
-        if known is None or np.trace(signal.projected) > np.trace(known.projected):
-            chosen[signal.cause.name] = signal
-    return chosen
+        if signal.probe >= 0:
+            alternatives.setdefault(signal.cause.name, []).append(signal)
+    return {
+        name: max(signals, key=lambda s: float(np.trace(s.projected)))
+        if any(p.shapes for p in problem.known[name].parameters)
+        else min(signals, key=lambda s: abs(np.log(_multiple(s, screen.threshold))))
+        for name, signals in alternatives.items()
+    }
+
+
+def _multiple(signal: Signal, threshold: float) -> float:
+    """Smallest detectable size in units of the alternative, of the setting that shows best."""
+    return min(smallest_detectable(signal, i, threshold) for i in range(signal.freedom))
 
 
 def _sizes(problem: Problem, signal: Signal, threshold: float) -> dict[str, float]:

@@ -45,3 +45,13 @@ def test_a_probe_outside_the_bounds_would_be_found():
         (EffectParameter("gain", "-", 0.0, lower=0.0, upper=0.01, plausible=(0.0, 1.0)),),
     )  # fmt: skip
     assert "gain outside its bounds" in faults(wrong)
+
+
+def test_probes_are_slow_enough_for_the_step():
+    step = 0.02
+    for effect in catalogue().values():
+        for probe in (p for a in probes_of(effect, step) for p in a):
+            assert effect.time_scale is None or effect.time_scale(probe) >= 0.9 * step
+    assert len(probes_of(catalogue()["servo_lag"], step)) == 2
+    fastest = min(p["time_constant"] for a in probes_of(catalogue()["servo_lag"]) for p in a)
+    assert fastest < 0.9 * step  # without the rule one of them would be too quick

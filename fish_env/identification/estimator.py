@@ -11,7 +11,9 @@ import numpy.typing as npt
 
 from fish_env.identification.filtering import Filtered, NoiseModel
 from fish_env.identification.noise import fit_noise
+from fish_env.identification.phases import settle_phases
 from fish_env.identification.problem import Point, Problem
+from fish_env.identification.products import inner
 
 FloatArray = npt.NDArray[np.float64]
 Z_STEP = 0.05
@@ -182,6 +184,8 @@ def fit(
     vector = free.clip(free.pack(Point(given.z, values)))
     noise = noise or default_noise(problem)
     for round_ in range(rounds if refit_noise else 1):
+        if refit_noise:
+            problem = settle_phases(problem, free.unpack(vector), noise)
         vector, filtered = _gauss_newton(problem, free, vector, noise, iterations, tolerance)
         if not refit_noise:
             break
@@ -216,7 +220,7 @@ def _gauss_newton(
     for _ in range(iterations):
         lin = linearise(problem, free, vector, noise, filtered)
         hessian = _hessian(lin, free)
-        gradient = lin.slopes.T @ lin.residuals + free.prior * vector
+        gradient = inner(lin.slopes, lin.residuals[:, None])[:, 0] + free.prior * vector
         for _ in range(5):
             damped = hessian + damping * np.diag(np.diag(hessian))
             trial = free.clip(vector - np.linalg.solve(damped, gradient))
@@ -236,7 +240,7 @@ def _gauss_newton(
 
 def _hessian(lin: Linearised, free: _Free) -> FloatArray:
     """Information of data and prior; a parameter without effect keeps a finite inverse."""
-    information = lin.slopes.T @ lin.slopes
+    information = inner(lin.slopes, lin.slopes)
     floor = 1e-9 * np.diag(information) + 1e-12
     return np.asarray(information + np.diag(free.prior + floor))
 

@@ -24,7 +24,7 @@ from fish_env.identification.filtering import (
 )
 from fish_env.identification.noise import white_noise_sd
 from fish_env.identification.parameters import Baseline, EffectFreedom, freedoms, measurement_of
-from fish_env.identification.runs import prepare_run, usable_channels
+from fish_env.identification.runs import RunData, prepare_run, usable_channels
 from fish_env.model.effect import Effect
 from fish_env.params.io import load_fish
 from fish_env.params.schema import FishParams
@@ -111,11 +111,15 @@ class Problem:
         if len(self.runs) <= count:
             return self
         chosen = np.linspace(0, len(self.runs) - 1, count).round().astype(int)
-        smaller = copy(self)
-        smaller.runs = tuple(self.runs[i] for i in chosen)
+        return self.with_runs([self.runs[i] for i in chosen])
+
+    def with_runs(self, runs: Sequence[RunData]) -> Problem:
+        """The same problem on other runs."""
+        other = copy(self)
+        other.runs = tuple(runs)
         for name in ("filter", "lean_filter"):
-            smaller.__dict__.pop(name, None)
-        return smaller
+            other.__dict__.pop(name, None)
+        return other
 
     @property
     def samples(self) -> int:
@@ -165,9 +169,13 @@ class Problem:
         self, point: Point, noise: NoiseModel, keep_slopes: bool = False
     ) -> list[Filtered]:
         """Extended Kalman filter of every run at one point."""
-        effects = {path: np.array([value]) for path, value in point.effects.items()}
-        record, measurement = self._lanes(point.z[:, None], effects, 1)
+        record, measurement = self.lane(point)
         return self.filter_for(point.effects).run(record, measurement, noise, keep_slopes)
+
+    def lane(self, point: Point) -> tuple[FloatArray, Measurement]:
+        """Parameter record (parameters, 1) of a point, and what its sensors do."""
+        effects = {path: np.array([value]) for path, value in point.effects.items()}
+        return self._lanes(point.z[:, None], effects, 1)
 
     def _lanes(
         self, z: FloatArray, effects: Mapping[str, FloatArray], count: int

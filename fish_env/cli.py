@@ -97,6 +97,31 @@ def diagnose(
 
 
 @app.command()
+def fit(
+    dataset: Annotated[
+        str, typer.Argument(help="A folder with dataset.yaml, or a shipped dataset's name.")
+    ],
+    fish: Annotated[
+        str | None, typer.Option(help="Another fish than the dataset names: preset or file.")
+    ] = None,
+    effects: Annotated[
+        str, typer.Option(help="Effects to fit beside the coefficients, a comma between.")
+    ] = "",
+    out: Annotated[Path, typer.Option(help="The parameter file to write.")] = Path(
+        "identified.yaml"
+    ),
+) -> None:
+    """Fit a fish's coefficients to measured runs and write them with their uncertainty.
+
+    **Example:** `robofish fit trials --effects servo_lag --out identified.yaml`
+    """
+    from fish_env.commands.fit import fit_dataset
+
+    names = tuple(name.strip() for name in effects.split(",") if name.strip())
+    fit_dataset(Console(), dataset, fish, names, out)
+
+
+@app.command()
 def info(
     fish: Annotated[str, typer.Option(help="A preset's name, or a parameter file.")] = (
         "zheng-2021-a"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -163,6 +163,7 @@ def fit(
     iterations: int = 5,
     tolerance: float = 0.1,
     rounds: int = 4,
+    report: Callable[[str], None] = lambda step: None,
 ) -> Fit:
     """Estimate baseline coefficients and effect parameters.
 
@@ -176,6 +177,7 @@ def fit(
         iterations: most Gauss-Newton steps in a round.
         tolerance: stop when no parameter moves by more of its standard deviation.
         rounds: most alternations between parameters and disturbance.
+        report: told what is being done.
     """
     names = problem.effects if effects is None else tuple(effects)
     free = _Free(problem, names, released)
@@ -186,9 +188,11 @@ def fit(
     for round_ in range(rounds if refit_noise else 1):
         if refit_noise:
             problem = settle_phases(problem, free.unpack(vector), noise)
+        report(f"fitting parameters, round {round_ + 1}")
         vector, filtered = _gauss_newton(problem, free, vector, noise, iterations, tolerance)
         if not refit_noise:
             break
+        report(f"fitting the noise, round {round_ + 1}")
         last = noise
         noise = _noise_at(problem, free.unpack(vector), noise, final=round_ > 0)
         if _settled(last, noise):

@@ -1,0 +1,87 @@
+"""`robofish fit`: a fish's coefficients from measured runs, written as a fish of its own."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from fish_env.data import Dataset, load_dataset
+from fish_env.effects.extended import PREFIX
+from fish_env.errors import DatasetError
+from fish_env.identification import Fit, Problem, fit
+from fish_env.identification.starts import likely_start
+from fish_env.identification.writing import identified_fish
+from fish_env.params import load_fish, save_fish
+
+
+def fit_dataset(
+    console: Console, dataset: str, fish: str | None, effects: tuple[str, ...], out: Path
+) -> Fit:
+    """Fits a fish to measured runs, prints what was found and writes the fish.
+
+    Args:
+        console: Where the tables go.
+        dataset: Folder, or name of a shipped dataset, of runs over time.
+        fish: Another fish than the dataset names: preset or file.
+        effects: Effects whose parameters are free beside the coefficients.
+        out: The file to write.
+
+    Raises:
+        RoboticFishError: The data or the fish cannot be used.
+    """
+    measured = load_dataset(dataset)
+    if not isinstance(measured, Dataset):
+        raise DatasetError(f"{dataset}: a table of steady motion; fit needs runs over time")
+    with console.status("reading runs") as status:
+        problem = Problem(measured, load_fish(fish or measured.fish), effects=effects)
+        status.update("looking for a start")
+        start = likely_start(problem, problem.effects)
+        result = fit(problem, start=start, report=status.update)
+    out.parent.mkdir(parents=True, exist_ok=True)
+    save_fish(identified_fish(result, out.stem), out)
+    print_fit(console, result)
+    console.print(f"written: {out}", soft_wrap=True)
+    return result
+
+
+def print_fit(console: Console, result: Fit) -> None:
+    """Prints estimates beside what was believed before, then noise and conditioning."""
+    table = Table(box=box.SIMPLE, title=result.problem.dataset.name, padding=(0, 1, 0, 0))
+    table.add_column("parameter", overflow="fold")
+    table.add_column("unit", overflow="fold")
+    for heading in ("before", "prior sd", "found", "95 % interval", "moved"):
+        table.add_column(heading, justify="right", no_wrap="interval" in heading)
+    for i, name in enumerate(result.names):
+        table.add_row(*_row(result, i, name))
+    console.print(table)
+    noise = result.noise
+    console.print(
+        f"disturbance found: {1e3 * noise.force_sd:.3g} mN, {1e3 * noise.moment_sd:.3g} mN m, "
+        f"correlated over {noise.correlation_s:.2g} s"
+    )
+    sensors = zip(result.problem.channels, noise.sensor_sd, strict=True)
+    console.print("sensor noise found: " + ", ".join(f"{n} {sd:.2g}" for n, sd in sensors))
+    left = float(np.sqrt(np.mean(result.linearised.residuals**2)))
+    console.print(
+        f"prediction errors: {left:.2f} of what noise explains; "
+        f"condition number {result.condition:.2g}"
+    )
+    if result.at_bounds:
+        console.print(f"at a bound: {', '.join(result.at_bounds)}")
+
+
+def _row(result: Fit, i: int, name: str) -> tuple[str, ...]:
+    low, high = result.interval(name)
+    found = f"{result.estimates[i]:.4g}", f"{low:.4g} to {high:.4g}"
+    if name.startswith(PREFIX):
+        effect, parameter = name.removeprefix(PREFIX).split(".")
+        known = result.problem.known[effect]
+        unit = next(p.unit for p in known.parameters if p.name == parameter)
+        return name, unit, f"{known.neutral[parameter]:.4g}", "-", *found, "-"
+    info = result.problem.fish.info(name)
+    moved = (result.estimates[i] - info.value) / info.prior_sd
+    return name, info.unit, f"{info.value:.4g}", f"{info.prior_sd:.2g}", *found, f"{moved:+.1f} sd"

@@ -1,0 +1,57 @@
+"""A fit as a fish: values, where they come from, and how surely they are known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from fish_env.effects.extended import PREFIX
+from fish_env.identification.estimator import Fit
+from fish_env.params.provenance import Posterior
+from fish_env.params.schema import FishParams
+
+
+def identified_fish(fit: Fit, name: str) -> FishParams:
+    """The fish of a fit, with status ``identified`` and its posterior.
+
+    It loads wherever a fish does; its posterior can drive the environment's randomisation.
+
+    Args:
+        fit: result of an identification.
+        name: name of the new fish.
+    """
+    values = dict(zip(fit.names, fit.estimates.tolist(), strict=True))
+    source = f"identified from {fit.problem.dataset.name}, {len(fit.problem.runs)} runs"
+    coefficients = {p: v for p, v in values.items() if not p.startswith(PREFIX)}
+    fish = fit.problem.fish.replace(coefficients, "identified", source)
+    effects = {effect: dict(known) for effect, known in fish.effects.items()}
+    for path, value in values.items():
+        if path.startswith(PREFIX):
+            effect, parameter = path.removeprefix(PREFIX).split(".")
+            effects.setdefault(effect, {})[parameter] = value
+    covariance = 0.5 * (fit.covariance + fit.covariance.T)
+    posterior = Posterior(
+        fit.names,
+        tuple(fit.estimates.tolist()),
+        tuple(tuple(row) for row in covariance.tolist()),
+        validity(fit),
+    )
+    return replace(fish, name=name, effects=effects, posterior=posterior, source_file=None)
+
+
+def validity(fit: Fit) -> dict[str, Any]:
+    """Ranges of the motion and of the commands behind a fit, (lowest, highest), SI."""
+    states = np.concatenate([f.states for f in fit.filtered])
+    commands = np.concatenate([run.command_values for run in fit.problem.runs])
+    rows = {"surge": 7, "sway": 8, "heave": 9, "depth": 2, "roll_rate": 10, "pitch_rate": 11}
+    rows["yaw_rate"] = 12
+    ranges: dict[str, Any] = {name: _range(states[:, row]) for name, row in rows.items()}
+    names = ("tail_offset", "tail_amplitude", "tail_frequency", "block_displacement", "block_angle")
+    ranges |= {name: _range(commands[:, i]) for i, name in enumerate(names)}
+    return ranges
+
+
+def _range(values: Any) -> list[float]:
+    return [float(np.min(values)), float(np.max(values))]

@@ -88,8 +88,12 @@ def attribute(
         if gain < penalty(problem, best, current):
             break
         current = best
-        rivals = tuple(e for e in tried[1:] if alike(problem, best, e))
         screens.append(screen(best.fit, causes, rng))
+        rivals = tuple(
+            e
+            for e in tried[1:]
+            if alike(problem, best, e) and explained_away(e.causes[-1], screens[-2], screens[-1])
+        )
         if rivals:
             break
     return Attribution(Explanation((), baseline), tuple(screens), current, rivals, ranking)
@@ -181,6 +185,16 @@ def _rank(
 def _size(problem: Problem, explanation: Explanation) -> float:
     parameters = len(explanation.fit.names) + len(explanation.fit.released)
     return parameters * float(np.log(problem.samples))
+
+
+def explained_away(cause: str, before: Screen, after: Screen) -> bool:
+    """Whether a cause lost most of its evidence when another was accepted.
+
+    If it did not, the two explain different parts of the data: it is a further cause, no rival.
+    """
+    evidence = {s.cause.name: s.statistic for s in before.best()}
+    left = {s.cause.name: s.statistic for s in after.best()}
+    return left.get(cause, 0.0) < 0.5 * evidence.get(cause, np.inf)
 
 
 def alike(problem: Problem, best: Explanation, other: Explanation) -> bool:

@@ -1,0 +1,84 @@
+"""The test of what is left, on residuals that answer linearly to a wrench."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from fish_env.diagnosis.adequacy import adequacy, regressors
+from fish_env.identification.estimator import Linearised
+from tests.diagnosis.linear import Sized
+
+SAMPLES = 400
+UNIT = np.repeat([1e-3, 1e-5], 3)
+
+
+def swimming(rng):
+    """A run and its filtered states: smooth random motion about level."""
+    clock = np.arange(SAMPLES) / 25.0
+    waves = rng.uniform(0.1, 0.6, 20)
+    states = np.array([np.sin(2 * np.pi * f * clock + i) for i, f in enumerate(waves)]).T
+    states[:, 3:7] *= 0.1
+    states[:, 3] = 1.0
+    states[:, 3:7] /= np.linalg.norm(states[:, 3:7], axis=1)[:, None]
+    states[:, 13] = 8.0 * clock
+    run = SimpleNamespace(
+        clock=clock, command_times=np.arange(0.0, 16.0, 1.5),
+        command_values=rng.uniform(0.1, 0.6, (11, 5)), id="r01",
+    )  # fmt: skip
+    return run, SimpleNamespace(states=states)
+
+
+class Answering:
+    """A problem in which each direction of the wrench moves one of six channels."""
+
+    def __init__(self, run, residuals):
+        self.runs, self.residuals, self.baseline = (run,), residuals, Sized(())
+
+    def innovations(self, z, effects, noise, filtered, pushes):
+        out = np.tile(self.residuals, (len(pushes.column), 1)).reshape(-1, SAMPLES, 6)
+        for lane, (column, size) in enumerate(zip(pushes.column, pushes.size, strict=True)):
+            function, direction = divmod(column, 6)
+            out[lane, :, direction] -= size / UNIT[direction] * pushes.bases[0][:, function]
+        return out.reshape(len(out), -1)
+
+
+def fit_with(missing, seed=0):
+    """A fit whose residuals hold noise and a missing wrench: (function, channel, size)."""
+    rng = np.random.default_rng(seed)
+    run, filtered = swimming(np.random.default_rng(1))
+    residuals = rng.standard_normal((SAMPLES, 6))
+    for function, channel, size in missing:
+        basis = regressors(run, filtered)[function]
+        residuals[:, channel] += size * basis / np.sqrt(np.mean(basis**2))
+    flat = residuals.ravel()
+    lin = Linearised(flat, np.zeros((len(flat), 0)), np.zeros(len(flat), np.int64),
+                     np.repeat(run.clock, 6))  # fmt: skip
+    problem = Answering(run, flat)
+    return SimpleNamespace(
+        problem=problem, filtered=[filtered], linearised=lin, released=(), noise=None,
+        point=SimpleNamespace(z=np.zeros(0), effects={}),
+    )  # fmt: skip
+
+
+def test_noise_alone_reaches_the_floor():
+    reached = [adequacy(fit_with([], seed), np.random.default_rng(0)).reached for seed in range(5)]
+    assert sum(reached) >= 4
+
+
+@pytest.mark.parametrize(
+    ("function", "channel", "direction"),
+    [("depth", 2, "heave"), ("cos yaw", 5, "yaw"), ("beat speed^2", 0, "surge")],
+)
+def test_a_missing_wrench_is_found_with_what_it_depends_on(function, channel, direction):
+    found = adequacy(fit_with([(function, channel, 0.6)]), np.random.default_rng(0))
+    assert not found.reached
+    assert found.misfits[0].direction == direction
+    assert function in [m.function for m in found.misfits if m.direction == direction]
+    unit = UNIT[channel]
+    best = next(m for m in found.misfits if m.function == function)
+    assert best.size == pytest.approx(0.6 * unit, rel=0.4)
+
+
+def test_a_wrench_below_the_noise_is_left_alone():
+    assert adequacy(fit_with([("depth", 2, 0.02)]), np.random.default_rng(0)).reached

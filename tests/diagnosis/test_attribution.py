@@ -1,0 +1,56 @@
+"""When two explanations are rivals, and when both are needed."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from fish_env.diagnosis.attribution import alike, explained_away
+
+
+def screen_of(**statistics):
+    signals = [SimpleNamespace(cause=SimpleNamespace(name=n), statistic=s)
+               for n, s in statistics.items()]  # fmt: skip
+    return SimpleNamespace(best=lambda: signals)
+
+
+def test_a_rival_loses_its_evidence_to_the_accepted_cause():
+    before = screen_of(current=900.0, tether=400.0, gyro_bias=80.0)
+    after = screen_of(tether=3.0, gyro_bias=75.0)
+    assert explained_away("tether", before, after)
+    assert not explained_away("gyro_bias", before, after)
+
+
+def test_a_cause_with_nothing_left_is_explained_away():
+    assert explained_away("wave", screen_of(wave=50.0), screen_of())
+
+
+def explanation(objective, by_run, names=3):
+    filtered = [SimpleNamespace(log_likelihood=value) for value in by_run]
+    return SimpleNamespace(
+        fit=SimpleNamespace(
+            objective=objective, names=("n",) * names, released=(), filtered=filtered
+        )
+    )
+
+
+PROBLEM = SimpleNamespace(samples=50_000)
+
+
+@pytest.mark.parametrize(
+    ("gap", "runs", "expected"),
+    [
+        (3.0, (10.0, 10.0, 10.0), True),
+        (30.0, (5.0, 5.0, 5.0), False),  # every run prefers the first
+        (30.0, (35.0, -15.0, -5.0), True),  # a single run does
+        (90.0, (80.0, 20.0, -10.0), False),
+    ],
+)
+def test_explanations_are_alike_within_the_scatter_of_runs(gap, runs, expected):
+    best = explanation(0.0, [0.5 * r for r in runs])
+    other = explanation(gap, [0.0] * len(runs))
+    assert alike(PROBLEM, best, other) is expected
+
+
+def test_a_simpler_explanation_is_not_beaten_by_parameters_alone():
+    best, other = explanation(0.0, [0.0, 0.0], names=4), explanation(5.0, [0.0, 0.0], names=3)
+    assert alike(PROBLEM, best, other)

@@ -1,0 +1,68 @@
+"""Gain on final runs: share of the reachable gap, and predictions without feedback."""
+
+import numpy as np
+import pytest
+
+from fish_env.diagnosis import open_loop
+from fish_env.diagnosis.gain import reachable_share
+from fish_env.identification.runs import RunData
+
+
+def squares(level, runs=3, windows=10, seed=0):
+    rng = np.random.default_rng(seed)
+    return [level * rng.chisquare(200, windows) / 200 for _ in range(runs)]
+
+
+@pytest.mark.parametrize(("extended", "share"), [(1.0, 1.0), (3.0, 0.5), (5.0, 0.0), (7.0, -0.5)])
+def test_share_of_the_gap_between_baseline_and_floor(extended, share):
+    found, interval = reachable_share(
+        squares(5.0), squares(extended, seed=1), np.random.default_rng(0)
+    )
+    assert found == pytest.approx(share, abs=0.06)
+    assert interval[0] < found < interval[1]
+    assert interval[1] - interval[0] < 0.3
+
+
+def test_a_baseline_at_the_floor_leaves_no_gap():
+    level = [np.full(10, 1.0)] * 2
+    assert reachable_share(level, level, np.random.default_rng(0)) == (None, None)
+
+
+def test_runs_that_differ_widen_the_interval():
+    rng = np.random.default_rng(0)
+    even = reachable_share([np.full(5, 5.0)] * 3, [np.full(5, 2.0)] * 3, rng)[1]
+    odd = reachable_share(
+        [np.full(5, 5.0)] * 3, [np.full(5, v) for v in (1.0, 1.0, 4.0)], rng
+    )[1]  # fmt: skip
+    assert odd[1] - odd[0] > 0.3 > even[1] - even[0]
+
+
+def run_of(seconds=10.0, rate=10.0):
+    clock = np.arange(0.0, seconds + 1e-9, 1.0 / rate)
+    return RunData(
+        id="r", condition=None, clock=clock, substeps=np.ones(len(clock), np.int64),
+        command_times=np.array([0.0, 4.0, 7.0]), command_values=np.arange(15.0).reshape(3, 5),
+        measured=np.arange(len(clock), dtype=float)[:, None], state0=np.zeros(18),
+        covariance0=np.eye(19), phase_known=True,
+    )  # fmt: skip
+
+
+def test_windows_cover_a_run_once_and_start_from_filtered_states():
+    run = run_of()
+    states = np.arange(len(run.clock))[:, None] * np.ones(20)
+    filtered = open_loop.without_feedback(run)
+    filtered = type(filtered)(**{**filtered.__dict__, "states": states})
+    pieces = open_loop.windows(run, filtered, 3.0)
+    assert [piece.clock[0] for piece in pieces] == pytest.approx([0.0, 3.0, 6.0])
+    assert [piece.state0[0] for piece in pieces] == [0.0, 30.0, 60.0]
+    for piece in pieces:
+        first = round(piece.clock[0] * 10)
+        assert piece.measured[:, 0] == pytest.approx(np.arange(first, first + len(piece.clock)))
+        assert len(piece.state0) == 18
+
+
+def test_windows_know_the_command_that_holds_when_they_begin():
+    run = run_of()
+    filtered = open_loop.without_feedback(run, states=20)
+    begun = [piece.command_values[0, 0] for piece in open_loop.windows(run, filtered, 3.0)]
+    assert begun == [0.0, 0.0, 5.0]

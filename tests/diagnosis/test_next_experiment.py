@@ -1,0 +1,45 @@
+"""The next experiment: manoeuvres within limits, and separation that no refit can close."""
+
+import numpy as np
+import pytest
+
+from fish_env.diagnosis.manoeuvres import DURATION_S, MENU, Manoeuvre
+from fish_env.diagnosis.next_experiment import unfollowed
+
+LIMITS = {"tail_offset": 0.6, "tail_amplitude": 0.6, "tail_frequency": 2.6,
+          "block_displacement": 0.01, "block_angle": 0.6}  # fmt: skip
+FASTEST_STROKE = 7.0
+
+
+def faults(manoeuvre: Manoeuvre) -> list[str]:
+    found = [name for row in manoeuvre.schedule for name, limit in LIMITS.items()
+             if abs(row[name]) > limit]  # fmt: skip
+    stroke = manoeuvre.values[:, 1] * 2 * np.pi * manoeuvre.values[:, 2]
+    times = manoeuvre.times_s
+    if stroke.max() > FASTEST_STROKE:
+        found.append("stroke")
+    if times[0] != 0.0 or np.any(np.diff(times) <= 0) or times[-1] >= DURATION_S:
+        found.append("times")
+    return found
+
+
+@pytest.mark.parametrize("manoeuvre", MENU, ids=lambda m: m.name)
+def test_the_menu_keeps_within_servo_and_tank_limits(manoeuvre):
+    assert faults(manoeuvre) == []
+
+
+def test_a_manoeuvre_beyond_the_servo_would_be_found():
+    assert faults(Manoeuvre("too fast", ((0.0, 0.0, 0.6, 2.6, 0.02, 0.0),))) == [
+        "block_displacement", "stroke",
+    ]  # fmt: skip
+
+
+def test_separation_is_what_no_coefficient_follows():
+    rng = np.random.default_rng(0)
+    slopes, rest = rng.standard_normal((300, 2)), rng.standard_normal(300)
+    rest -= slopes @ np.linalg.lstsq(slopes, rest, rcond=None)[0]
+    difference = (slopes @ [2.0, -1.0] + rest)[:, None]
+    free = unfollowed(slopes, difference, 1e-9 * np.eye(2))
+    held = unfollowed(slopes, difference, 1e9 * np.eye(2))
+    assert free[0] == pytest.approx(rest @ rest, rel=1e-6)
+    assert held[0] == pytest.approx(difference[:, 0] @ difference[:, 0], rel=1e-4)

@@ -15,7 +15,7 @@ def move_barycentre(centre, place, inputs, time, fish, e):
 
 def _component(axis: str, way: str) -> EffectParameter:
     text = f"displacement of the barycentre {way}"
-    return EffectParameter(axis, "m", 0.0, -0.02, 0.02, (-0.003, 0.003), text)
+    return EffectParameter(axis, "m", 0.0, -0.02, 0.02, (-0.002, 0.002), text)
 
 
 EFFECT = Effect(

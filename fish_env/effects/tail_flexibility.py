@@ -46,7 +46,7 @@ EFFECT = Effect(
     equation="xi'' + 2 damping_ratio w xi' + w^2 xi = w^2 cmd, w = 2 pi natural_frequency",
     source="Pseudo-rigid-body model, Howell, Compliant Mechanisms, chapter 5",
     parameters=(
-        EffectParameter("natural_frequency", "Hz", inf, 0.1, inf, (2.0, 8.0), "in water, undamped"),
+        EffectParameter("natural_frequency", "Hz", inf, 0.1, inf, (3.0, 8.0), "in water, undamped"),
         EffectParameter(
             "damping_ratio", "-", 1.0, 0.05, 5.0, (0.2, 1.2), "1 is critical", shapes=True
         ),

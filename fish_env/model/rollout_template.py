@@ -127,7 +127,8 @@ def rk4_step(work, width, elapsed, h, tables, late, history, first, count, pace)
                 total = work[SUM * width + n] + work[DX * width + n]
                 work[X * width + n] = work[X0 * width + n] + (h / 6.0) * total
     if N_MEMORY > 0:
-        for k in range(width):
+        # Not over the width: a loop of known length would be unrolled instead of vectorised.
+        for k in range(count):
             lane_remember(k, width, elapsed, h, work)
 
 

@@ -279,19 +279,19 @@ def default_noise(problem: Problem) -> NoiseModel:
 
 
 def _noise_at(problem: Problem, point: Point, noise: NoiseModel, final: bool) -> NoiseModel:
-    """Noise model of largest likelihood at a point, from at most four runs.
+    """Noise model of largest likelihood at a point, from at most six runs.
 
     The search starts from the present one and from a small disturbance, so that a disturbance
     which once stood in for a misfit does not stay.
     """
-    few = problem.subset(4)
+    few = problem.subset(6)
     found = noise
     for _ in range(3):
         filtered, made_with = few.filtered(point, found, keep_slopes=True), found
         replay = partial(few.filter_for(point.effects).replay, filtered, made_with)
         small = NoiseModel(found.sensor_sd, 3e-3, 1e-4, 1.0)
         found = fit_noise(
-            replay, max((found, small), key=replay), 30, problem.sensor_sd if final else None
+            replay, max((found, small), key=replay), 45, problem.sensor_sd if final else None
         )
         if _settled(made_with, found, 0.4):
             break

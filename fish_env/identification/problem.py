@@ -66,7 +66,7 @@ class Problem:
         paths: Sequence[str] | None = None,
         effects: Iterable[str] = (),
         user_effects: Iterable[Effect] = (),
-        dt: float = 0.02,
+        dt: float = 0.01,
     ) -> None:
         self.dataset = dataset
         self.fish = fish or load_fish(dataset.fish)

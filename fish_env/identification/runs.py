@@ -65,7 +65,7 @@ def usable_channels(names: Sequence[str]) -> tuple[str, ...]:
 
 
 def prepare_run(
-    run: Run, channels: Sequence[str], noise_sd: FloatArray, dt: float = 0.02
+    run: Run, channels: Sequence[str], noise_sd: FloatArray, dt: float = 0.01
 ) -> RunData:
     """Read a run for the filter.
 

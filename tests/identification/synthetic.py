@@ -1,0 +1,106 @@
+"""Measured runs made up with the filter's own assumptions: white sensors and a random wrench."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fish_env.data import CommandSteps, Dataset, Run
+from fish_env.effects.extended import ExtendedModel
+from fish_env.identification.applied_wrench import EFFECT as APPLIED_WRENCH
+from fish_env.identification.filtering import NoiseModel, filter_kernels
+from fish_env.model.runtime import Grid
+from fish_env.params import load_fish
+from fish_env.sensing.channels import channels_from_states
+
+FISH = "zheng-2021-a"
+ALL = ("x", "y", "z", "roll", "pitch", "yaw", "p", "q", "r")
+SENSOR_SD = dict.fromkeys("xyz", 0.0015) | dict.fromkeys(("roll", "pitch", "yaw"), 0.004)
+SENSOR_SD |= dict.fromkeys("pqr", 0.008)
+PATHS = (
+    "tail.drag.c2",
+    "tail.lift.c1",
+    "body.plane_xy.drag.c0",
+    "body.rotational_damping[2]",
+    "inertia.rest[2]",
+)
+
+
+def model():
+    """The nominal fish behind the lean kernel."""
+    return ExtendedModel(load_fish(FISH), {}, (APPLIED_WRENCH,), ())
+
+
+@dataclass
+class Setup:
+    """What is simulated."""
+
+    seed: int = 0
+    runs: int = 2
+    duration: float = 8.0
+    rate: float = 25.0
+    channels: tuple[str, ...] = ALL
+    force_sd: float = 0.003
+    moment_sd: float = 1e-4
+    correlation_s: float = 1.0
+    changes: dict[str, float] = field(default_factory=dict)
+    phase: float = 0.0
+    phase_known: bool = True
+    rest_s: float = 0.0
+    missing: float = 0.0
+    uneven: bool = False
+
+    @property
+    def noise(self) -> NoiseModel:
+        sensor = np.array([SENSOR_SD[name] for name in self.channels])
+        return NoiseModel(sensor, self.force_sd, self.moment_sd, self.correlation_s)
+
+
+def simulate(setup: Setup) -> Dataset:
+    """Runs with commands that step every second."""
+    rng = np.random.default_rng(setup.seed)
+    times = np.arange(round(setup.duration * setup.rate) + 1) / setup.rate
+    if setup.uneven:
+        times[1:-1] += rng.uniform(-0.3, 0.3, len(times) - 2) / setup.rate
+    switch = np.arange(0.0, setup.duration, 1.0)
+    low, high = [-0.4, 0.2, 1.0, 0.0, 0.0], [0.4, 0.5, 2.2, 0.0, 0.0]
+    values = rng.uniform(low, high, (setup.runs, len(switch), 5))
+    steps = [CommandSteps(times[np.searchsorted(times, switch)], v) for v in values]
+    states = motion(setup, times, steps, rng)
+    runs = []
+    for i in range(setup.runs):
+        true = channels_from_states(states[:, :, i].T)
+        shown = {
+            n: true[n] + SENSOR_SD[n] * rng.standard_normal(len(times)) for n in setup.channels
+        }
+        for channel in shown.values():
+            channel[rng.random(len(times)) < setup.missing] = np.nan
+        start = "rest" if setup.phase_known else "unknown"
+        phase = setup.phase if setup.phase_known else None
+        runs.append(Run(f"r{i}", times, shown, steps[i], start, phase))
+    return Dataset("synthetic", FISH, tuple(runs), {n: SENSOR_SD[n] for n in setup.channels})
+
+
+def motion(setup, times, steps, rng):
+    """States (T, states, runs)."""
+    fish = model()
+    kernels, count = filter_kernels(fish), setup.runs
+    par = np.repeat(fish.records(setup.changes), count, axis=1)
+    state = np.zeros((len(kernels.state_names), count))
+    state[2], state[3], state[13] = 1.0, 1.0, setup.phase
+    spread = np.repeat([setup.force_sd, setup.moment_sd], 3)[:, None]
+    wrench = spread * rng.standard_normal((6, count))
+    out = [state.copy()]
+    for k, span in enumerate(np.diff(times)):
+        commands = np.stack([s.at([times[k]])[0] for s in steps], axis=1)
+        par[-6:] = wrench
+        sub = max(1, int(np.ceil(span / 0.01 - 1e-9)))
+        grid = Grid(*(np.array([v]) for v in (0, 0.0, sub, span / sub, 1)))
+        kernels.advance(
+            state, commands.copy(), par, np.full((5, count), np.inf), np.full(count, times[k]),
+            commands[None], grid, tables=fish.tables, failed_at=np.full(count, np.inf),
+        )  # fmt: skip
+        keep = np.exp(-span / setup.correlation_s)
+        fresh = spread * rng.standard_normal((6, count))
+        wrench = keep * wrench + np.sqrt(1.0 - keep**2) * fresh
+        out.append(state.copy())
+    return np.array(out)

@@ -72,11 +72,11 @@ def attribute(
     rivals: tuple[Explanation, ...] = ()
     ranking: tuple[tuple[str, float], ...] = ()
     while len(current.causes) < MOST_CAUSES:
-        leading = [s for s in screens[-1].best() if s.p_value < screens[-1].threshold]
-        if not leading:
+        chosen = shortlisted(problem, screens[-1], shortlist)
+        if not chosen:
             break
         tried = []
-        for signal in leading[:shortlist]:
+        for signal in chosen:
             report(f"refitting with {signal.cause.name}")
             tried.append(_refit(problem, current, signal))
         tried, noise_fit = _rank(problem, current, tried)
@@ -97,6 +97,19 @@ def attribute(
         if rivals:
             break
     return Attribution(Explanation((), baseline), tuple(screens), current, rivals, ranking)
+
+
+def shortlisted(problem: Problem, screen: Screen, count: int) -> list[Signal]:
+    """The most significant causes, and among the others those known to look like the first.
+
+    A strong effect is screened far from where it is, so its place among its like means little.
+    """
+    leading = [s for s in screen.best() if s.p_value < screen.threshold]
+    if not leading:
+        return []
+    first = problem.known.get(leading[0].cause.name)
+    alike = set(first.confusable_with) if first else set()
+    return leading[:count] + [s for s in leading[count:] if s.cause.name in alike]
 
 
 def penalty(problem: Problem, candidate: Explanation, current: Explanation) -> float:

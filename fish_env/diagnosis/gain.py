@@ -102,7 +102,7 @@ def _open_loop(problem: Problem, fit: Fit) -> tuple[list[FloatArray], Problem]:
         for run, result in zip(problem.runs, filtered, strict=True)
         for window in open_loop.windows(run, result, WINDOW_S)
     ]
-    cut = open_loop.on_runs(problem, pieces)
+    cut = problem.with_runs(pieces)
     return open_loop.errors(cut, fit.point, fit.noise), cut
 
 

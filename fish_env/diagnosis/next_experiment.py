@@ -133,9 +133,9 @@ def _lanes(problem: Problem, points: Sequence[Point]) -> tuple[FloatArray, dict[
 def flown(fit: Fit, manoeuvre: Manoeuvre) -> Problem:
     """The manoeuvre as the present explanation would swim it, without noise."""
     blank = _blank(fit.problem, manoeuvre)
-    on_blank = open_loop.on_runs(fit.problem, [blank])
+    on_blank = fit.problem.with_runs([blank])
     predicted = -open_loop.errors(on_blank, fit.point, fit.noise)[0]
-    return open_loop.on_runs(fit.problem, [replace(blank, measured=predicted)])
+    return fit.problem.with_runs([replace(blank, measured=predicted)])
 
 
 def _blank(problem: Problem, manoeuvre: Manoeuvre) -> RunData:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -15,14 +13,6 @@ from fish_env.identification.runs import RunData
 from fish_env.model.state import BASE_STATES
 
 FloatArray = npt.NDArray[np.float64]
-
-
-def on_runs(problem: Problem, runs: Sequence[RunData]) -> Problem:
-    """The same problem on other runs."""
-    other = copy(problem)
-    other.runs = tuple(runs)
-    other.__dict__.pop("filter", None)
-    return other
 
 
 def without_feedback(run: RunData, states: int = len(BASE_STATES)) -> Filtered:

@@ -4,7 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from fish_env.diagnosis.attribution import alike, explained_away
+from fish_env.diagnosis.attribution import alike, explained_away, shortlisted
+from fish_env.effects import catalogue
 
 
 def screen_of(**statistics):
@@ -54,3 +55,16 @@ def test_explanations_are_alike_within_the_scatter_of_runs(gap, runs, expected):
 def test_a_simpler_explanation_is_not_beaten_by_parameters_alone():
     best, other = explanation(0.0, [0.0, 0.0], names=4), explanation(5.0, [0.0, 0.0], names=3)
     assert alike(PROBLEM, best, other)
+
+
+def test_what_looks_like_the_first_is_always_tried():
+    names = ["servo_lag", "tether", "wave", "current", "tail_flexibility"]
+    signals = [SimpleNamespace(cause=SimpleNamespace(name=n), p_value=-100.0 + i)
+               for i, n in enumerate(names)]  # fmt: skip
+    problem = SimpleNamespace(known=catalogue())
+    assert "tail_flexibility" in catalogue()["servo_lag"].confusable_with
+    screen = SimpleNamespace(best=lambda: signals, threshold=-50.0)
+    tried = [s.cause.name for s in shortlisted(problem, screen, 2)]
+    assert tried == ["servo_lag", "tether", "tail_flexibility"]
+    nothing = SimpleNamespace(best=lambda: signals, threshold=-200.0)
+    assert shortlisted(problem, nothing, 2) == []

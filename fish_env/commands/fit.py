@@ -49,12 +49,11 @@ def fit_dataset(
 
 
 def print_fit(console: Console, result: Fit) -> None:
-    """Prints estimates beside what was believed before, then noise and conditioning."""
+    """Prints estimates (SI) beside what was believed before, then noise and conditioning."""
     table = Table(box=box.SIMPLE, title=result.problem.dataset.name, padding=(0, 1, 0, 0))
-    table.add_column("parameter", overflow="fold")
-    table.add_column("unit", overflow="fold")
-    for heading in ("before", "prior sd", "found", "95 % interval", "moved"):
-        table.add_column(heading, justify="right", no_wrap="interval" in heading)
+    table.add_column("parameter", no_wrap=True)
+    for heading in ("before, prior sd", "found, 95 % interval", "moved"):
+        table.add_column(heading, justify="right")
     for i, name in enumerate(result.names):
         table.add_row(*_row(result, i, name))
     console.print(table)
@@ -75,13 +74,12 @@ def print_fit(console: Console, result: Fit) -> None:
 
 
 def _row(result: Fit, i: int, name: str) -> tuple[str, ...]:
+    """Name, value and spread before, value and interval found, and how far it moved."""
     low, high = result.interval(name)
-    found = f"{result.estimates[i]:.4g}", f"{low:.4g} to {high:.4g}"
+    found = f"{result.estimates[i]:.4g}  {low:.3g} to {high:.3g}"
     if name.startswith(PREFIX):
         effect, parameter = name.removeprefix(PREFIX).split(".")
-        known = result.problem.known[effect]
-        unit = next(p.unit for p in known.parameters if p.name == parameter)
-        return name, unit, f"{known.neutral[parameter]:.4g}", "-", *found, "-"
+        return name, f"{result.problem.known[effect].neutral[parameter]:.4g}", found, "-"
     info = result.problem.fish.info(name)
     moved = (result.estimates[i] - info.value) / info.prior_sd
-    return name, info.unit, f"{info.value:.4g}", f"{info.prior_sd:.2g}", *found, f"{moved:+.1f} sd"
+    return name, f"{info.value:.4g}, {info.prior_sd:.2g}", found, f"{moved:+.1f} sd"

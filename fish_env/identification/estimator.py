@@ -316,17 +316,27 @@ def _finish(
     physical = scale @ covariance @ scale.T
     point = free.unpack(vector)
     estimates = np.r_[problem.baseline.values(point.z[:, None])[:, 0], vector[free.count :]]
-    bounds = tuple(
-        f.path
-        for f, v in zip(free.freedoms, vector[free.count :], strict=True)
-        if v <= f.lower or v >= f.upper
-    )
+    bounds = (*_coefficients_at_bounds(problem, estimates), *_effects_at_bounds(free, vector))
     diagonal = np.sqrt(np.diag(hessian))
     condition = float(np.linalg.cond(hessian / np.outer(diagonal, diagonal)))
     return Fit(
         problem, effects, released, point, noise, free.names, estimates, physical,
         float(sum(r.log_likelihood for r in filtered)), value, bounds, condition, filtered, lin,
     )  # fmt: skip
+
+
+def _coefficients_at_bounds(problem: Problem, estimates: FloatArray) -> list[str]:
+    """Coefficients that ended at the edge of what is physically possible."""
+    baseline = problem.baseline
+    low, high = baseline.bounds
+    values, margin = estimates[: len(baseline)], 2e-3 * baseline.sd
+    stuck = (values <= low + margin) | (values >= high - margin)
+    return [path for path, at in zip(baseline.paths, stuck, strict=True) if at]
+
+
+def _effects_at_bounds(free: _Free, vector: FloatArray) -> list[str]:
+    values = zip(free.freedoms, vector[free.count :], strict=True)
+    return [f.path for f, value in values if value <= f.lower or value >= f.upper]
 
 
 def sandwich(

@@ -118,6 +118,6 @@ def test_the_command_fits_and_writes(tmp_path):
     out = tmp_path / "found" / "identified.yaml"
     result = CliRunner().invoke(app, ["fit", str(tmp_path / "trials"), "--out", str(out)])
     assert result.exit_code == 0, result.output
-    for words in ("95 % interval", "disturbance found", "condition number", "written"):
+    for words in ("95 %", "disturbance found", "condition number", "written"):
         assert words in result.output
     assert load_fish(out).name == "identified"

@@ -48,10 +48,10 @@ def test_a_data_frame_holds_every_column(run):
 
 def test_csv_reads_back_to_the_last_bit(run, tmp_path):
     run.to_csv(tmp_path / "run.csv")
-    frame = pd.read_csv(tmp_path / "run.csv", float_precision="round_trip")
-    assert list(frame) == list(run.columns)
-    for name, values in run.columns.items():
-        np.testing.assert_array_equal(frame[name], values)
+    header, *rows = (tmp_path / "run.csv").read_text().splitlines()
+    assert header.split(",") == list(run.columns)
+    table = np.array([row.split(",") for row in rows], float)
+    np.testing.assert_array_equal(table, np.column_stack(list(run.columns.values())))
 
 
 def test_csv_can_hold_chosen_columns(run, tmp_path):

@@ -62,8 +62,8 @@ def fit_with(missing, seed=0):
 
 
 def test_noise_alone_reaches_the_floor():
-    reached = [adequacy(fit_with([], seed), np.random.default_rng(0)).reached for seed in range(5)]
-    assert sum(reached) >= 4
+    reached = [adequacy(fit_with([], seed), np.random.default_rng(0)).reached for seed in range(3)]
+    assert all(reached)
 
 
 @pytest.mark.parametrize(

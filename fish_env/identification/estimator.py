@@ -186,8 +186,7 @@ def fit(
     vector = free.clip(free.pack(Point(given.z, values)))
     noise = noise or default_noise(problem)
     for round_ in range(rounds if refit_noise else 1):
-        if refit_noise:
-            problem = settle_phases(problem, free.unpack(vector), noise)
+        problem = settle_phases(problem, free.unpack(vector), noise)
         report(f"fitting parameters, round {round_ + 1}")
         vector, filtered = _gauss_newton(problem, free, vector, noise, iterations, tolerance)
         if not refit_noise:
@@ -270,6 +269,7 @@ def objective_at(
     free = _Free(problem, effects, released)
     values = {**problem.neutral(effects), **point.effects}
     vector = free.clip(free.pack(Point(point.z, values)))
+    problem = settle_phases(problem, free.unpack(vector), noise)
     return _objective(problem, free, vector, noise)[0]
 
 

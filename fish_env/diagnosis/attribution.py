@@ -78,7 +78,12 @@ def attribute(
         tried = []
         for signal in chosen:
             report(f"refitting with {signal.cause.name}")
-            tried.append(_refit(problem, current, signal))
+            try:
+                tried.append(_refit(problem, current, signal))
+            except np.linalg.LinAlgError:
+                report(f"no refit with {signal.cause.name}: the simulation diverges")
+        if not tried:
+            break
         tried, noise_fit = _rank(problem, current, tried)
         if not ranking:
             base = noise_fit

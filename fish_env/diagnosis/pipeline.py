@@ -147,7 +147,7 @@ def diagnose_runs(
     fitted, final = _split(dataset, seed)
     progress("refitting the baseline")
     problem = Problem(dataset, fish, fitted)
-    baseline = fit(problem, rounds=2)
+    baseline = _refitted(problem)
     causes = causes_of(problem)
     progress("screening causes")
     attribution = attribute(problem, baseline, causes, rng, 3 if quick else 6, progress)
@@ -168,6 +168,16 @@ def diagnose_runs(
         dataset, final, problem, attribution, left, shown, verdict, misfit, gain, proposal, seed,
         quick, time.perf_counter() - begin,
     )  # fmt: skip
+
+
+def _refitted(problem: Problem) -> Fit:
+    try:
+        return fit(problem, rounds=2)
+    except np.linalg.LinAlgError:
+        raise DatasetError(
+            f"{problem.dataset.name}: the simulation diverges while {problem.fish.name} is refitted "
+            "to these runs; check that fish, units and frame are those of the data"
+        ) from None
 
 
 def _split(dataset: Dataset, seed: int) -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -175,8 +175,8 @@ def _refitted(problem: Problem) -> Fit:
         return fit(problem, rounds=2)
     except np.linalg.LinAlgError:
         raise DatasetError(
-            f"{problem.dataset.name}: the simulation diverges while {problem.fish.name} is refitted "
-            "to these runs; check that fish, units and frame are those of the data"
+            f"{problem.dataset.name}: the simulation diverges while {problem.fish.name} is refitted"
+            " to these runs; check that fish, units and frame are those of the data"
         ) from None
 
 

@@ -11,9 +11,13 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ProcessPoolExecutor, as_completed
 
 import gymnasium as gym
+import numpy as np
 
 import fish_env  # noqa: F401  (registers the environment)
+from fish_env.data import Dataset, Run
+from fish_env.data.schema import CommandSteps
 from fish_env.effects.extended import EffectValues
+from fish_env.identification import Problem, fit
 from fish_env.simulator import Simulator
 from fish_env.steady import steady_motion
 
@@ -49,10 +53,24 @@ def vector_environment(effects: EffectValues) -> None:
     envs.step(envs.action_space.sample())
 
 
+def filters(effects: EffectValues) -> None:
+    """The Kalman filter over one short run."""
+    run = Simulator(FISH).run(
+        [{"t": 0.0, "tail_amplitude": 0.3, "tail_frequency": 2.0}], 2.0, rate_hz=25.0
+    )
+    channels = {name: run.channels[name] for name in ("x", "y", "z", "yaw")}
+    noisy = {n: v + 1e-3 * np.sin(np.arange(len(v)) ** 2) for n, v in channels.items()}
+    steps = CommandSteps(run.time_s[:1], run.inputs[:1])
+    measured = Run("warm", run.time_s, noisy, steps, "rest", 0.0)
+    problem = Problem(Dataset("warm", FISH, (measured,)), paths=["mass.total"])
+    fit(problem, list(effects), refit_noise=False, iterations=1)
+
+
 TASKS: Mapping[str, tuple[Callable[[EffectValues], None], EffectValues]] = {
     f"{name}, {kind}": (task, effects)
     for kind, effects in (("catalogue of effects", EFFECT), ("no effects", {}))
     for name, task in (
+        ("filter", filters),
         ("vector environment", vector_environment),
         ("environment", single_environment),
         ("batch", many_fish),

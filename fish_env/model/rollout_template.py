@@ -37,7 +37,9 @@ U = SUM + N_STATES
 U_RATE = U + 5
 U_END = U_RATE + 5
 SLEW = U_END + 5
-TIME = SLEW + 5
+TARGET = SLEW + 5
+FAILED = TARGET + 5  # time at which a lane diverged (s), infinite where it has not
+TIME = FAILED + 1
 BEGIN = TIME + 1  # time at which a step begins (s), then the tail's command (see model.history)
 TOLD = BEGIN + LATE_TAIL
 PAST = TOLD + LATE_TAIL * RECORD
@@ -47,41 +49,56 @@ LARGEST = 1e4  # a state beyond this many SI units has diverged
 
 
 @kernel
-def gather(work, width, row, source, first, count):
-    """Copy rows of lanes first..first+count into the block; spare lanes repeat the last one."""
-    for i in range(source.shape[0]):
-        for k in range(width):
-            lane = first + (k if k < count else count - 1)
-            work[(row + i) * width + k] = source[i, lane]
+def gather(work, width, row, rows, source, first, count):
+    """Copy rows of lanes first..first+count into the block; spare lanes repeat the last one.
+
+    A slice of each row, not its index: indices that might be negative are not vectorised.
+    """
+    for i in range(rows):
+        lanes = source[i, first : first + count]
+        if count == width:
+            for k in range(width):
+                work[(row + i) * width + k] = lanes[k]
+        else:
+            for k in range(width):
+                work[(row + i) * width + k] = lanes[min(k, count - 1)]
 
 
 @kernel
-def scatter(work, width, row, target, first, count):
+def scatter(work, width, row, rows, target, first, count):
     """Copy rows of the block back."""
-    for i in range(target.shape[0]):
+    for i in range(rows):
+        lanes = target[i, first : first + count]
         for k in range(count):
-            target[i, first + k] = work[(row + i) * width + k]
+            lanes[k] = work[(row + i) * width + k]
 
 
 @kernel
-def plan_actuators(work, width, commands, slot, first, count, h):
-    """Where each actuator goes in this step: at once if its slew limit is infinite."""
+def gather_targets(work, width, commands, slot, first, count):
+    """Copy the targets that hold in a segment into the block."""
     shared = commands.shape[2] == 1
-    per_second = 1.0 / h
     for j in range(5):
         for k in range(width):
-            lane = first + (k if k < count else count - 1)
-            target = commands[slot, j, 0 if shared else lane]
-            slew = work[(SLEW + j) * width + k]
-            position = work[(U + j) * width + k]
-            ideal = slew == np.inf
-            limit = slew * h
-            gap = target - position
-            move = min(max(gap, -limit), limit)
-            end = target if abs(gap) <= limit else position + move
-            work[(U + j) * width + k] = target if ideal else position
-            work[(U_RATE + j) * width + k] = 0.0 if ideal else move * per_second
-            work[(U_END + j) * width + k] = end
+            lane = 0 if shared else first + min(k, count - 1)
+            work[(TARGET + j) * width + k] = commands[slot, j, lane]
+
+
+@kernel
+def plan_actuators(work, width, h):
+    """Where each actuator goes in this step: at once if its slew limit is infinite."""
+    per_second = 1.0 / h
+    for n in range(5 * width):
+        target = work[TARGET * width + n]
+        slew = work[SLEW * width + n]
+        position = work[U * width + n]
+        ideal = slew == np.inf
+        limit = slew * h
+        gap = target - position
+        move = min(max(gap, -limit), limit)
+        end = target if abs(gap) <= limit else position + move
+        work[U * width + n] = target if ideal else position
+        work[U_RATE * width + n] = 0.0 if ideal else move * per_second
+        work[U_END * width + n] = end
 
 
 @kernel
@@ -133,7 +150,7 @@ def rk4_step(work, width, elapsed, h, tables, late, history, first, count, pace)
 
 
 @kernel
-def accept_step(work, width, elapsed, failed_at, first, count):
+def accept_step(work, width, elapsed):
     """Normalise the quaternion; a lane that diverged stays at its last good state for good."""
     for k in range(width):
         norm = 0.0
@@ -146,17 +163,16 @@ def accept_step(work, width, elapsed, failed_at, first, count):
             value = work[(X + j) * width + k]
             bounded = (j < 13) | ((j >= 18) & (j < N_SLOPES))
             size += abs(value) if bounded else 0.0 * value
-        lane = first + (k if k < count else count - 1)
-        good = (size < LARGEST) & (failed_at[lane] == np.inf)
+        failed = work[FAILED * width + k]
+        good = (size < LARGEST) & (failed == np.inf)
         for j in range(N_STATES):
             value = work[(X + j) * width + k]
             value = value * scale if (j >= 3) & (j < 7) else value
             work[(X0 + j) * width + k] = value if good else work[(X0 + j) * width + k]
-        for j in range(5):
-            work[(U + j) * width + k] = work[(U_END + j) * width + k]
-        if (not good) & (k < count):
-            at = work[TIME * width + k] + elapsed
-            failed_at[first + k] = min(failed_at[first + k], at)
+        now = work[TIME * width + k] + elapsed
+        work[FAILED * width + k] = failed if good else min(failed, now)
+    for n in range(5 * width):
+        work[U * width + n] = work[U_END * width + n]
 
 
 @kernel
@@ -166,30 +182,35 @@ def advance_block(
 ):  # fmt: skip
     """Advance lanes first..first+count through all segments (see :func:`advance_lanes`)."""
     work = np.empty(WORK_ROWS * width)
-    gather(work, width, X0, state, first, count)
-    gather(work, width, U, inputs, first, count)
-    gather(work, width, SLEW, slew, first, count)
-    gather(work, width, PAR, par, first, count)
+    gather(work, width, X0, N_STATES, state, first, count)
+    gather(work, width, U, 5, inputs, first, count)
+    gather(work, width, SLEW, 5, slew, first, count)
+    gather(work, width, PAR, N_PARAMETERS, par, first, count)
     for k in range(width):
-        work[TIME * width + k] = time[first + (k if k < count else count - 1)]
+        lane = first + min(k, count - 1)
+        work[TIME * width + k] = time[lane]
+        work[FAILED * width + k] = failed_at[lane]
     late = LATE_TAIL & (history.shape[0] > 0)
     own_time = np.empty(0)
     stored = trace_at
     for segment in range(steps.shape[0]):
         h = sizes[segment]
+        gather_targets(work, width, commands, slots[segment], first, count)
         for i in range(steps[segment]):
             elapsed = starts[segment] + i * h
-            plan_actuators(work, width, commands, slots[segment], first, count, h)
+            plan_actuators(work, width, h)
             rk4_step(work, width, elapsed, h, tables, late, history, first, count, own_time)
-            accept_step(work, width, elapsed + h, failed_at, first, count)
+            accept_step(work, width, elapsed + h)
             if (trace.shape[0] > 0) & ((i + 1) % every[segment] == 0):
                 sample = stored % trace.shape[0]
                 for j in range(trace.shape[1]):
                     for k in range(count):
                         trace[sample, j, first + k] = work[(X0 + trace_row + j) * width + k]
                 stored += 1
-    scatter(work, width, X0, state, first, count)
-    scatter(work, width, U, inputs, first, count)
+    scatter(work, width, X0, N_STATES, state, first, count)
+    scatter(work, width, U, 5, inputs, first, count)
+    for k in range(count):
+        failed_at[first + k] = work[FAILED * width + k]
 
 
 @entry_point

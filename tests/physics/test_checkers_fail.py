@@ -49,8 +49,9 @@ GRAVITY_OFF_CENTRE = {"gravity = gravity_wrench(attitude, centre, fish)": (
     "gravity = gravity_wrench(attitude, centre._replace(x=centre.x + 1e-3), fish)"
 )}  # fmt: skip
 ROUNDED_OTHERWISE = {"(h / 6.0) * total": "((h / 6.0) * total if width == 1 else h * total / 6.0)"}
-LATE_SWITCH = {"plan_actuators(work, width, commands, slots[segment], first, count, h)": (
-    "plan_actuators(work, width, commands, slots[max(segment - (i == 0), 0)], first, count, h)"
+LATE_SWITCH = {"plan_actuators(work, width, h)\n": (
+    "gather_targets(work, width, commands, slots[max(segment - (i == 0), 0)], first, count)\n"
+    "            plan_actuators(work, width, h)\n"
 )}  # fmt: skip
 ADDED_MASS_OVER_GROUND = {"t_added_mass = added_mass_wrench(motion,": (
     "t_added_mass = added_mass_wrench(motion._replace(water_u=0.0),"

@@ -22,24 +22,18 @@ def sincos(angle):
     turns = (angle * _TWO_OVER_PI + _ROUND) - _ROUND
     x = ((angle - turns * _HALF_PI_1) - turns * _HALF_PI_2) - turns * _HALF_PI_3
     y = x * x
-    sine = 1.0 / 355687428096000.0
-    sine = sine * y - 1.0 / 1307674368000.0
-    sine = sine * y + 1.0 / 6227020800.0
-    sine = sine * y - 1.0 / 39916800.0
-    sine = sine * y + 1.0 / 362880.0
-    sine = sine * y - 1.0 / 5040.0
-    sine = sine * y + 1.0 / 120.0
-    sine = sine * y - 1.0 / 6.0
-    sine = x + x * (y * sine)
-    cosine = 1.0 / 20922789888000.0
-    cosine = cosine * y - 1.0 / 87178291200.0
-    cosine = cosine * y + 1.0 / 479001600.0
-    cosine = cosine * y - 1.0 / 3628800.0
-    cosine = cosine * y + 1.0 / 40320.0
-    cosine = cosine * y - 1.0 / 720.0
-    cosine = cosine * y + 1.0 / 24.0
-    cosine = cosine * y - 0.5
-    cosine = 1.0 + y * cosine
+    y2 = y * y
+    y4 = y2 * y2
+    low = (y * (1.0 / 120.0) - 1.0 / 6.0) + y2 * (y * (1.0 / 362880.0) - 1.0 / 5040.0)
+    high = (y * (1.0 / 6227020800.0) - 1.0 / 39916800.0) + y2 * (
+        y * (1.0 / 355687428096000.0) - 1.0 / 1307674368000.0
+    )
+    sine = x + (x * y) * (low + y4 * high)
+    low = (y * (1.0 / 24.0) - 0.5) + y2 * (y * (1.0 / 40320.0) - 1.0 / 720.0)
+    high = (y * (1.0 / 479001600.0) - 1.0 / 3628800.0) + y2 * (
+        y * (1.0 / 20922789888000.0) - 1.0 / 87178291200.0
+    )
+    cosine = 1.0 + y * (low + y4 * high)
     quarter = turns - 4.0 * (((turns - 1.5) * 0.25 + _ROUND) - _ROUND)
     odd = (quarter == 1.0) | (quarter == 3.0)
     first = cosine if odd else sine

@@ -32,6 +32,23 @@ def inertial_wrench(motion, centre):
 
 
 @kernel
+def solve_symmetric(s00, s10, s20, s11, s21, s22, y0, y1, y2):
+    """Solve a symmetric 3x3 system by its adjugate: one division, and no long chain of them."""
+    k00 = s11 * s22 - s21 * s21
+    k10 = s20 * s21 - s10 * s22
+    k20 = s10 * s21 - s20 * s11
+    k11 = s00 * s22 - s20 * s20
+    k21 = s10 * s20 - s00 * s21
+    k22 = s00 * s11 - s10 * s10
+    inverse = 1.0 / (s00 * k00 + s10 * k10 + s20 * k20)
+    return (
+        inverse * (k00 * y0 + k10 * y1 + k20 * y2),
+        inverse * (k10 * y0 + k11 * y1 + k21 * y2),
+        inverse * (k20 * y0 + k21 * y1 + k22 * y2),
+    )
+
+
+@kernel
 def solve_rigid(inertia, wrench):
     """Accelerations (dV/dt, d omega/dt) of a rigid body: the sparse case of :func:`solve_full`.
 
@@ -44,23 +61,18 @@ def solve_rigid(inertia, wrench):
     l31, l32 = a.m31 * inverse, a.m32 * inverse
     l40, l42 = a.m40 * inverse, a.m42 * inverse
     l50, l51 = a.m50 * inverse, a.m51 * inverse
-    d3 = a.m33 - l31 * a.m31 - l32 * a.m32
-    i3 = 1.0 / d3
-    c43 = a.m43 - l42 * a.m32
-    c53 = a.m53 - l51 * a.m31
-    l43, l53 = c43 * i3, c53 * i3
-    d4 = a.m44 - l40 * a.m40 - l42 * a.m42 - l43 * c43
-    i4 = 1.0 / d4
-    c54 = a.m54 - l50 * a.m40 - l53 * c43
-    l54 = c54 * i4
-    d5 = a.m55 - l50 * a.m50 - l51 * a.m51 - l53 * c53 - l54 * c54
     y0, y1, y2 = wrench.fx, wrench.fy, wrench.fz
-    y3 = wrench.mx - l31 * y1 - l32 * y2
-    y4 = wrench.my - l40 * y0 - l42 * y2 - l43 * y3
-    y5 = wrench.mz - l50 * y0 - l51 * y1 - l53 * y3 - l54 * y4
-    x5 = y5 * (1.0 / d5)
-    x4 = y4 * i4 - l54 * x5
-    x3 = y3 * i3 - l43 * x4 - l53 * x5
+    x3, x4, x5 = solve_symmetric(
+        a.m33 - l31 * a.m31 - l32 * a.m32,
+        a.m43 - l42 * a.m32,
+        a.m53 - l51 * a.m31,
+        a.m44 - l40 * a.m40 - l42 * a.m42,
+        a.m54 - l50 * a.m40,
+        a.m55 - l50 * a.m50 - l51 * a.m51,
+        wrench.mx - l31 * y1 - l32 * y2,
+        wrench.my - l40 * y0 - l42 * y2,
+        wrench.mz - l50 * y0 - l51 * y1,
+    )
     x2 = y2 * inverse - l32 * x3 - l42 * x4
     x1 = y1 * inverse - l31 * x3 - l51 * x5
     x0 = y0 * inverse - l40 * x4 - l50 * x5
@@ -69,7 +81,11 @@ def solve_rigid(inertia, wrench):
 
 @kernel
 def solve_full(inertia, wrench):
-    """Accelerations for a full symmetric positive-definite 6x6 mass matrix (LDL^T, unrolled)."""
+    """Accelerations for a full symmetric positive-definite 6x6 mass matrix.
+
+    The translational half is eliminated (LDL^T, unrolled); what is left of the rotational half,
+    its Schur complement, is solved by :func:`solve_symmetric`.
+    """
     a = inertia
     i0 = 1.0 / a.m00
     l10, l20, l30, l40, l50 = a.m10 * i0, a.m20 * i0, a.m30 * i0, a.m40 * i0, a.m50 * i0
@@ -84,23 +100,20 @@ def solve_full(inertia, wrench):
     c42 = a.m42 - l40 * a.m20 - l41 * c21
     c52 = a.m52 - l50 * a.m20 - l51 * c21
     l32, l42, l52 = c32 * i2, c42 * i2, c52 * i2
-    i3 = 1.0 / (a.m33 - l30 * a.m30 - l31 * c31 - l32 * c32)
-    c43 = a.m43 - l40 * a.m30 - l41 * c31 - l42 * c32
-    c53 = a.m53 - l50 * a.m30 - l51 * c31 - l52 * c32
-    l43, l53 = c43 * i3, c53 * i3
-    i4 = 1.0 / (a.m44 - l40 * a.m40 - l41 * c41 - l42 * c42 - l43 * c43)
-    c54 = a.m54 - l50 * a.m40 - l51 * c41 - l52 * c42 - l53 * c43
-    l54 = c54 * i4
-    i5 = 1.0 / (a.m55 - l50 * a.m50 - l51 * c51 - l52 * c52 - l53 * c53 - l54 * c54)
     y0 = wrench.fx
     y1 = wrench.fy - l10 * y0
     y2 = wrench.fz - l20 * y0 - l21 * y1
-    y3 = wrench.mx - l30 * y0 - l31 * y1 - l32 * y2
-    y4 = wrench.my - l40 * y0 - l41 * y1 - l42 * y2 - l43 * y3
-    y5 = wrench.mz - l50 * y0 - l51 * y1 - l52 * y2 - l53 * y3 - l54 * y4
-    x5 = y5 * i5
-    x4 = y4 * i4 - l54 * x5
-    x3 = y3 * i3 - l43 * x4 - l53 * x5
+    x3, x4, x5 = solve_symmetric(
+        a.m33 - l30 * a.m30 - l31 * c31 - l32 * c32,
+        a.m43 - l40 * a.m30 - l41 * c31 - l42 * c32,
+        a.m53 - l50 * a.m30 - l51 * c31 - l52 * c32,
+        a.m44 - l40 * a.m40 - l41 * c41 - l42 * c42,
+        a.m54 - l50 * a.m40 - l51 * c41 - l52 * c42,
+        a.m55 - l50 * a.m50 - l51 * c51 - l52 * c52,
+        wrench.mx - l30 * y0 - l31 * y1 - l32 * y2,
+        wrench.my - l40 * y0 - l41 * y1 - l42 * y2,
+        wrench.mz - l50 * y0 - l51 * y1 - l52 * y2,
+    )
     x2 = y2 * i2 - l32 * x3 - l42 * x4 - l52 * x5
     x1 = y1 * i1 - l21 * x2 - l31 * x3 - l41 * x4 - l51 * x5
     x0 = y0 * i0 - l10 * x1 - l20 * x2 - l30 * x3 - l40 * x4 - l50 * x5

@@ -68,6 +68,9 @@ from fish_env.model.tail import (
 )
 '''
 
+ACROSS = {1: "xz_", 2: "xy_"}
+"""Component of the force across each body plane, which is zero."""
+
 
 class Emitter:
     """Writes the functions that evaluate one lane."""
@@ -355,7 +358,7 @@ class Emitter:
             for name, kind in self.wrench_terms():
                 if kind == "wrench":
                     parts.append(f"{name}.{attribute}")
-                elif (kind == "force") == is_force:
+                elif (kind == "force") == is_force and name[:3] != ACROSS.get(component):
                     parts.append(f"{name}.{'xyz'[component % 3]}")
             sums.append(" + ".join(parts))
         return [f"total = Wrench({', '.join(sums)})"]

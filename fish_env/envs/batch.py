@@ -15,7 +15,7 @@ from fish_env.envs.layout import GOAL, MAX_BEAT_S, OBSERVATION, OUTPUTS, SENSORS
 from fish_env.envs.options import EnvOptions
 from fish_env.errors import ConfigError
 from fish_env.model.history import forget, history_rows
-from fish_env.model.runtime import Kernels, default_threads, kernels, run_in_threads
+from fish_env.model.runtime import Grid, Kernels, default_threads, kernels, run_in_threads
 from fish_env.model.state import BASE_STATES, INTEGRAL_ROW
 
 FloatArray = npt.NDArray[np.float64]
@@ -29,6 +29,17 @@ def _step_kernels(options: EnvOptions) -> Kernels:
     """The physics of these options with the environment step behind it."""
     composition = options.model.kernels.composition
     return kernels(replace(composition, templates=(*composition.templates, STEP_TEMPLATE)))
+
+
+def _control_step(options: EnvOptions) -> Grid:
+    """One control step on the grid of physics steps; actions that come late split it in two."""
+    substeps, dt = options.config.substeps, options.config.dt
+    whole, part = divmod(options.action_lag, substeps)
+    slots = [-whole] if part == 0 else [-whole - 1, -whole]
+    steps = [substeps] if part == 0 else [part, substeps - part]
+    starts = [0.0] if part == 0 else [0.0, part * dt]
+    ones = np.ones(len(steps), np.int64)
+    return Grid(np.array(slots), np.array(starts), np.array(steps), np.full(len(steps), dt), ones)
 
 
 class FishBatch:
@@ -53,6 +64,7 @@ class FishBatch:
         self._substeps = config.substeps
         self._queue = np.zeros((options.action_lag // config.substeps + 2, 5, count))
         self._queue_at = 0
+        self._grid = _control_step(options)
         self._trace_row = 0 if options.observation_lag else INTEGRAL_ROW
         beat = int(np.ceil(MAX_BEAT_S / config.dt)) + 2
         slots = max(beat + options.observation_lag, config.substeps) + 1
@@ -79,10 +91,11 @@ class FishBatch:
         self._rows = rows = self._kernels.module
         self.reward = self._data[rows.ROW_REWARD]
         self.outputs = self._data[rows.ROW_OUTPUT : rows.ROW_OUTPUT + len(OUTPUTS)]
+        self._work = self._kernels.scratch()
         self._step = self._kernels.entry("step_one" if self.count == 1 else "step_lanes")
 
     def __getstate__(self) -> dict[str, Any]:
-        bound = ("_base", "_kernels", "_rows", "reward", "outputs", "_step")
+        bound = ("_base", "_kernels", "_rows", "reward", "outputs", "_step", "_work")
         return {name: value for name, value in vars(self).items() if name not in bound}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -195,10 +208,11 @@ class FishBatch:
     def _advance(self, first: int, last: int) -> int:
         return int(
             self._step(
-                self._data, self._actions, self._queue, self._queue_at, self._ring, self._ring_at,
-                self._noise, self.obs, self._setup, self._substeps, self.options.action_lag,
+                self._data, self._actions, self._queue, self._queue_at, *self._grid, self._ring,
+                self._ring_at, self._noise, self.obs, self._setup, self._substeps,
                 self.options.observation_lag, self._trace_row, self._history,
                 self.options.model.tables, first, last,
+                self._work if self.count == 1 else self._kernels.scratch(),
             )
         )  # fmt: skip
 

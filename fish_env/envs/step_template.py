@@ -26,6 +26,7 @@ from fish_env.model.composed import (
     advance_block,
     entry_point,
     kernel,
+    lean_entry_point,
 )
 
 # --- end ---
@@ -40,7 +41,9 @@ ROW_ACTION = ROW_FAILED + 1
 ROW_WITHIN = ROW_ACTION + 5
 ROW_REWARD = ROW_WITHIN + 1
 ROW_OUTPUT = ROW_REWARD + 1
-DATA_ROWS = ROW_OUTPUT + len(OUTPUTS)
+ROW_CHANGE = ROW_OUTPUT + len(OUTPUTS)
+ROW_ENERGY = ROW_CHANGE + 1
+DATA_ROWS = ROW_ENERGY + 1
 SPEED_INDEX = ROW_GOAL + len(GOAL) - 1
 
 DT = int(Setup.DT)
@@ -271,15 +274,11 @@ def observe(data, lane, ring, newest, back, trace_row, noise, obs, setup):
 
 @kernel
 def step_block(
-    width, data, actions, queue, queue_at, ring, ring_at, noise, obs, setup, n_sub, lag, back,
-    trace_row, history, tables, first, count,
+    work, width, data, actions, queue, queue_at, slots, starts, steps, sizes, every, ring, ring_at,
+    noise, obs, setup, n_sub, back, trace_row, history, tables, first, count,
 ):  # fmt: skip
     """Step lanes first..first+count (see :func:`step_lanes`)."""
-    dt = setup[DT]
-    period = n_sub * dt
-    depth_of_queue = queue.shape[0]
-    change = np.empty(width)
-    energy = np.empty(width)
+    period = n_sub * setup[DT]
     bad = 0
     for k in range(count):
         lane = first + k
@@ -294,25 +293,11 @@ def step_block(
             total += step * step
             data[ROW_ACTION + j, lane] = action
             queue[queue_at, j, lane] = setup[CENTRE + j] + setup[HALF_RANGE + j] * action
-        change[k] = total / 20.0
-        energy[k] = data[17, lane]
-    whole = lag // n_sub
-    part = lag % n_sub
-    segments = 1 if part == 0 else 2
-    slots = np.empty(segments, np.int64)
-    starts = np.zeros(segments)
-    steps = np.empty(segments, np.int64)
-    slots[0] = (queue_at - whole - (0 if part == 0 else 1)) % depth_of_queue
-    steps[0] = n_sub if part == 0 else part
-    if segments == 2:
-        slots[1] = (queue_at - whole) % depth_of_queue
-        steps[1] = n_sub - part
-        starts[1] = part * dt
-    sizes = np.full(segments, dt)
-    every = np.ones(segments, np.int64)
+        data[ROW_CHANGE, lane] = total / 20.0
+        data[ROW_ENERGY, lane] = data[17, lane]
     advance_block(
-        width, data[:ROW_INPUTS], data[ROW_INPUTS:ROW_SLEW], data[ROW_PAR:ROW_TIME],
-        data[ROW_SLEW:ROW_PAR], data[ROW_TIME], queue, slots, starts, steps, sizes, every,
+        work, width, data[:ROW_INPUTS], data[ROW_INPUTS:ROW_SLEW], data[ROW_PAR:ROW_TIME],
+        data[ROW_SLEW:ROW_PAR], data[ROW_TIME], queue, queue_at, slots, starts, steps, sizes, every,
         trace_row, ring_at, ring, data[ROW_FAILED], history, tables, first, count,
     )  # fmt: skip
     newest = ring_at + n_sub - 1
@@ -321,15 +306,16 @@ def step_block(
         # A whole number of periods, so that rounding does not add up over an episode.
         data[ROW_TIME, lane] = math.floor(data[ROW_TIME, lane] / period + 1.5) * period
         offset = INTEGRAL_ROW - trace_row
-        judge(data, lane, ring, newest, offset, energy[k], change[k], period, setup)
+        change, energy_before = data[ROW_CHANGE, lane], data[ROW_ENERGY, lane]
+        judge(data, lane, ring, newest, offset, energy_before, change, period, setup)
         observe(data, lane, ring, newest, back, trace_row, noise, obs, setup)
     return bad
 
 
-@entry_point
+@lean_entry_point
 def step_lanes(
-    data, actions, queue, queue_at, ring, ring_at, noise, obs, setup, n_sub, lag, back, trace_row,
-    history, tables, first, last,
+    data, actions, queue, queue_at, slots, starts, steps, sizes, every, ring, ring_at, noise, obs,
+    setup, n_sub, back, trace_row, history, tables, first, last, work,
 ):  # fmt: skip
     """One control step of fish first..last, in place.
 
@@ -338,19 +324,24 @@ def step_lanes(
         actions: (N, 5) float32 in [-1, 1]; clipped, NaN counts as 0 and is reported.
         queue: (Q, 5, N) past targets of the actuators; slot ``queue_at`` is written now.
         queue_at: slot of this step's targets.
+        slots: (segments,) slot of the targets that hold in each segment, counted from queue_at.
+        starts: (segments,) as for ``advance_lanes``; so are
+        steps: (segments,),
+        sizes: (segments,) and
+        every: (segments,).
         ring: (L, rows, N) samples after every physics step, the last L of them.
         ring_at: slot of this step's first sample (not wrapped).
         noise: (sensors, N) added to what sensors see, or no rows.
         obs: (N, observations) float32, written.
         setup: shared numbers, see layout.Setup.
         n_sub: physics steps in a control step.
-        lag: action delay in physics steps.
         back: observation delay in physics steps.
         trace_row: first state row that the ring holds.
         history: (rows, N) what tails were told (see :mod:`fish_env.model.history`), or no rows.
         tables: packed coefficient curves.
         first: first fish.
         last: one past the last.
+        work: scratch, (WORK_ROWS * LANES,).
 
     Returns:
         How many action values were NaN.
@@ -358,23 +349,24 @@ def step_lanes(
     bad = 0
     for block in range(first, last, LANES):
         bad += step_block(
-            LANES, data, actions, queue, queue_at, ring, ring_at, noise, obs, setup, n_sub, lag,
-            back, trace_row, history, tables, block, min(LANES, last - block),
+            work, LANES, data, actions, queue, queue_at, slots, starts, steps, sizes, every, ring,
+            ring_at, noise, obs, setup, n_sub, back, trace_row, history, tables, block,
+            min(LANES, last - block),
         )  # fmt: skip
     return bad
 
 
-@entry_point
+@lean_entry_point
 def step_one(
-    data, actions, queue, queue_at, ring, ring_at, noise, obs, setup, n_sub, lag, back, trace_row,
-    history, tables, first, last,
+    data, actions, queue, queue_at, slots, starts, steps, sizes, every, ring, ring_at, noise, obs,
+    setup, n_sub, back, trace_row, history, tables, first, last, work,
 ):  # fmt: skip
     """As :func:`step_lanes`, one fish at a time: for a single fish."""
     bad = 0
     for lane in range(first, last):
         bad += step_block(
-            1, data, actions, queue, queue_at, ring, ring_at, noise, obs, setup, n_sub, lag, back,
-            trace_row, history, tables, lane, 1,
+            work, 1, data, actions, queue, queue_at, slots, starts, steps, sizes, every, ring,
+            ring_at, noise, obs, setup, n_sub, back, trace_row, history, tables, lane, 1,
         )  # fmt: skip
     return bad
 

@@ -58,7 +58,7 @@ from fish_env.model.history import (
     HEARD, RECORD, assume_running, late_command, recall, remember, running_command,
 )
 from fish_env.model.hydrostatics import buoyancy_force, gravity_wrench
-from fish_env.model.jit import entry_point, kernel
+from fish_env.model.jit import entry_point, kernel, lean_entry_point
 from fish_env.model.mass_properties import barycentre, rigid_inertia
 from fish_env.model.newton_euler import inertial_wrench, solve_full, solve_rigid
 from fish_env.model.plate import drag_force, lift_force, speed_and_inverse

@@ -23,7 +23,7 @@ from fish_env.model.composed import (
     lane_terms,
 )
 from fish_env.model.history import HEARD, RECORD, assume_running, recall, remember
-from fish_env.model.jit import entry_point, kernel
+from fish_env.model.jit import entry_point, kernel, lean_entry_point
 
 # --- end ---
 
@@ -177,11 +177,13 @@ def accept_step(work, width, elapsed):
 
 @kernel
 def advance_block(
-    width, state, inputs, par, slew, time, commands, slots, starts, steps, sizes, every, trace_row,
-    trace_at, trace, failed_at, history, tables, first, count,
+    work, width, state, inputs, par, slew, time, commands, turn, slots, starts, steps, sizes,
+    every, trace_row, trace_at, trace, failed_at, history, tables, first, count,
 ):  # fmt: skip
-    """Advance lanes first..first+count through all segments (see :func:`advance_lanes`)."""
-    work = np.empty(WORK_ROWS * width)
+    """Advance lanes first..first+count through all segments (see :func:`advance_lanes`).
+
+    Slots are counted from ``turn``, around the end of ``commands``.
+    """
     gather(work, width, X0, N_STATES, state, first, count)
     gather(work, width, U, 5, inputs, first, count)
     gather(work, width, SLEW, 5, slew, first, count)
@@ -191,11 +193,12 @@ def advance_block(
         work[TIME * width + k] = time[lane]
         work[FAILED * width + k] = failed_at[lane]
     late = LATE_TAIL & (history.shape[0] > 0)
-    own_time = np.empty(0)
+    own_time = work[:0]
     stored = trace_at
     for segment in range(steps.shape[0]):
         h = sizes[segment]
-        gather_targets(work, width, commands, slots[segment], first, count)
+        slot = (slots[segment] + turn) % commands.shape[0]
+        gather_targets(work, width, commands, slot, first, count)
         for i in range(steps[segment]):
             elapsed = starts[segment] + i * h
             plan_actuators(work, width, h)
@@ -213,10 +216,10 @@ def advance_block(
         failed_at[first + k] = work[FAILED * width + k]
 
 
-@entry_point
+@lean_entry_point
 def advance_lanes(
     state, inputs, par, slew, time, commands, slots, starts, steps, sizes, every, trace_row,
-    trace_at, trace, failed_at, history, tables, first, last,
+    trace_at, trace, failed_at, history, tables, first, last, work,
 ):  # fmt: skip
     """Advance fish first..last in place, sixteen at a time.
 
@@ -241,24 +244,26 @@ def advance_lanes(
         tables: packed coefficient curves.
         first: first fish.
         last: one past the last fish.
+        work: scratch, (WORK_ROWS * LANES,).
     """
     for block in range(first, last, LANES):
         advance_block(
-            LANES, state, inputs, par, slew, time, commands, slots, starts, steps, sizes, every,
-            trace_row, trace_at, trace, failed_at, history, tables, block, min(LANES, last - block),
+            work, LANES, state, inputs, par, slew, time, commands, 0, slots, starts, steps, sizes,
+            every, trace_row, trace_at, trace, failed_at, history, tables, block,
+            min(LANES, last - block),
         )  # fmt: skip
 
 
-@entry_point
+@lean_entry_point
 def advance_one(
     state, inputs, par, slew, time, commands, slots, starts, steps, sizes, every, trace_row,
-    trace_at, trace, failed_at, history, tables, first, last,
+    trace_at, trace, failed_at, history, tables, first, last, work,
 ):  # fmt: skip
     """As :func:`advance_lanes`, one fish at a time: for a single fish."""
     for lane in range(first, last):
         advance_block(
-            1, state, inputs, par, slew, time, commands, slots, starts, steps, sizes, every,
-            trace_row, trace_at, trace, failed_at, history, tables, lane, 1,
+            work, 1, state, inputs, par, slew, time, commands, 0, slots, starts, steps, sizes,
+            every, trace_row, trace_at, trace, failed_at, history, tables, lane, 1,
         )  # fmt: skip
 
 

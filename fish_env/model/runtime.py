@@ -137,7 +137,7 @@ class Kernels:
         def task(first: int, last: int) -> int:
             function(
                 state, inputs, par, slew, time, commands, *grid, trace_row, trace_at, trace,
-                failed_at, history, tables, first, last,
+                failed_at, history, tables, first, last, self.scratch(),
             )  # fmt: skip
             return 0
 
@@ -147,6 +147,13 @@ class Kernels:
         """How late the latest tail command of these records (parameters, N) is (s)."""
         rows = [self.parameter_names.index(name) for name in self.composition.delays]
         return float(np.max(par[rows].sum(axis=0), initial=0.0))
+
+    def scratch(self) -> FloatArray:
+        """Room for one block of fish, at the start of a cache line, as vector registers like it."""
+        size = self.module.WORK_ROWS * self.lanes
+        room = np.empty(size + 8)
+        first = -room.ctypes.data // 8 % 8
+        return room[first : first + size]
 
     def derivative(
         self,

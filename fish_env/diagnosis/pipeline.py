@@ -148,6 +148,7 @@ def diagnose_runs(
     progress("refitting the baseline")
     problem = Problem(dataset, fish, fitted)
     baseline = _refitted(problem)
+    problem = baseline.problem  # with the tail phases settled
     causes = causes_of(problem)
     progress("screening causes")
     attribution = attribute(problem, baseline, causes, rng, 3 if quick else 6, progress)

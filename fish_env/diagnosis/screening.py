@@ -17,6 +17,7 @@ from scipy.stats import chi2, ncx2
 
 from fish_env.diagnosis.causes import Cause, effect_values
 from fish_env.identification.estimator import Fit
+from fish_env.identification.products import inner
 
 FloatArray = npt.NDArray[np.float64]
 DRAWS = 4000
@@ -102,7 +103,7 @@ class Projector:
         self.prior[: len(fit.problem.baseline)] = 1.0
         for path in fit.released:
             self.prior[fit.problem.baseline.paths.index(path)] = 1e-4
-        information = slopes.T @ slopes
+        information = inner(slopes, slopes)
         self.hessian = information + np.diag(self.prior + 1e-9 * np.diag(information) + 1e-12)
         self.factor = np.linalg.cholesky(self.hessian)
         self.block = self._blocks()
@@ -113,14 +114,14 @@ class Projector:
 
     def coefficients(self, columns: FloatArray) -> FloatArray:
         """How a refit follows the columns: (n, m)."""
-        right = self.lin.slopes.T @ columns
+        right = inner(self.lin.slopes, columns)
         return np.asarray(np.linalg.solve(self.factor.T, np.linalg.solve(self.factor, right)))
 
     def signal(self, cause: Cause, probe: int, columns: FloatArray) -> Signal | None:
         """Project a cause; None where nothing of it is left."""
         followed = self.coefficients(columns)
         left = columns - self.lin.slopes @ followed
-        projected = left.T @ left + followed.T @ (self.prior[:, None] * followed)
+        projected = inner(left, left) + followed.T @ (self.prior[:, None] * followed)
         energy = np.einsum("ij,ij->j", columns, columns)
         if np.any(np.diag(projected) < 1e-4) or np.any(energy < 1e-3):
             return None
@@ -225,7 +226,7 @@ def null_threshold(signals: Sequence[Signal], rng: np.random.Generator, level: f
     smallest = np.zeros(DRAWS)
     if effects:
         stacked = np.concatenate([s.left for s in effects], axis=1)
-        gram = stacked.T @ stacked
+        gram = inner(stacked, stacked)
         scale = np.sqrt(np.diag(gram))
         correlation = gram / np.outer(scale, scale)
         values, vectors = np.linalg.eigh(correlation)

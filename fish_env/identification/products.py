@@ -16,7 +16,8 @@ BLOCK = 64
 
 def inner(a: FloatArray, b: FloatArray) -> FloatArray:
     """``a.T @ b`` of tall matrices (D, n) and (D, m)."""
-    whole = len(a) // BLOCK * BLOCK
-    rows_a = a[:whole].T.reshape(a.shape[1], -1, BLOCK).transpose(1, 0, 2)
-    rows_b = b[:whole].T.reshape(b.shape[1], -1, BLOCK).transpose(1, 2, 0)
+    count = len(a) // BLOCK
+    whole = count * BLOCK
+    rows_a = a[:whole].T.reshape(a.shape[1], count, BLOCK).transpose(1, 0, 2)
+    rows_b = b[:whole].T.reshape(b.shape[1], count, BLOCK).transpose(1, 2, 0)
     return np.asarray((rows_a @ rows_b).sum(axis=0) + a[whole:].T @ b[whole:])

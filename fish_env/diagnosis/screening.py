@@ -17,11 +17,11 @@ from scipy.stats import chi2, ncx2
 
 from fish_env.diagnosis.causes import Cause, effect_values
 from fish_env.identification.estimator import Fit
+from fish_env.identification.information import block_sums, information, prior_precision
 from fish_env.identification.products import inner
 
 FloatArray = npt.NDArray[np.float64]
 DRAWS = 4000
-BLOCK_S = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,19 +98,10 @@ class Projector:
     def __init__(self, fit: Fit) -> None:
         self.lin = fit.linearised
         slopes = self.lin.slopes
-        count = slopes.shape[1]
-        self.prior = np.zeros(count)
-        self.prior[: len(fit.problem.baseline)] = 1.0
-        for path in fit.released:
-            self.prior[fit.problem.baseline.paths.index(path)] = 1e-4
-        information = inner(slopes, slopes)
-        self.hessian = information + np.diag(self.prior + 1e-9 * np.diag(information) + 1e-12)
+        baseline = fit.problem.baseline
+        self.prior = prior_precision(baseline, slopes.shape[1] - len(baseline), fit.released)
+        self.hessian = information(slopes, self.prior)
         self.factor = np.linalg.cholesky(self.hessian)
-        self.block = self._blocks()
-
-    def _blocks(self) -> npt.NDArray[np.int64]:
-        key = self.lin.run_of * 10_000 + np.floor(self.lin.time_of / BLOCK_S).astype(np.int64)
-        return np.unique(key, return_inverse=True)[1]
 
     def coefficients(self, columns: FloatArray) -> FloatArray:
         """How a refit follows the columns: (n, m)."""
@@ -134,8 +125,7 @@ class Projector:
 
     def _inflation(self, left: FloatArray, residuals: FloatArray) -> float:
         """Spread of block sums of the score against what white residuals would give."""
-        sums = np.zeros((self.block.max() + 1, left.shape[1]))
-        np.add.at(sums, self.block, left * residuals[:, None])
+        sums = block_sums(left * residuals[:, None], self.lin.run_of, self.lin.time_of)
         white = np.einsum("ij,ij->j", left, left)
         ratios = np.einsum("ij,ij->j", sums, sums) / np.maximum(white, 1e-12)
         return float(max(1.0, ratios.max()))

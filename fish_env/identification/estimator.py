@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fish_env.identification.filtering import Filtered, NoiseModel
+from fish_env.identification.information import block_sums, information, prior_precision
 from fish_env.identification.noise import fit_noise
 from fish_env.identification.phases import settle_phases
 from fish_env.identification.problem import Point, Problem
@@ -89,11 +90,7 @@ class _Free:
         self.freedoms = problem.freedoms(effects)
         self.count = len(problem.baseline)
         self.names = (*problem.baseline.paths, *(f.path for f in self.freedoms))
-        prior = np.ones(self.count + len(self.freedoms))
-        prior[self.count :] = 0.0
-        for path in released:
-            prior[problem.baseline.paths.index(path)] = 1e-4
-        self.prior = prior
+        self.prior = prior_precision(problem.baseline, len(self.freedoms), released)
         self.steps = np.r_[np.full(self.count, Z_STEP), [f.step for f in self.freedoms]]
 
     def pack(self, point: Point) -> FloatArray:
@@ -222,7 +219,7 @@ def _gauss_newton(
     damping = 0.0
     for _ in range(iterations):
         lin = linearise(problem, free, vector, noise, filtered)
-        hessian = _hessian(lin, free)
+        hessian = information(lin.slopes, free.prior)
         gradient = inner(lin.slopes, lin.residuals[:, None])[:, 0] + free.prior * vector
         for _ in range(5):
             damped = hessian + damping * np.diag(np.diag(hessian))
@@ -239,13 +236,6 @@ def _gauss_newton(
         if moved.max() < tolerance:
             break
     return vector, filtered
-
-
-def _hessian(lin: Linearised, free: _Free) -> FloatArray:
-    """Information of data and prior; a parameter without effect keeps a finite inverse."""
-    information = inner(lin.slopes, lin.slopes)
-    floor = 1e-9 * np.diag(information) + 1e-12
-    return np.asarray(information + np.diag(free.prior + floor))
 
 
 def _settled(before: NoiseModel, after: NoiseModel, share: float = 0.1) -> bool:
@@ -309,7 +299,7 @@ def _finish(
     filtered: Sequence[Filtered],
 ) -> Fit:
     lin = linearise(problem, free, vector, noise, filtered)
-    hessian = _hessian(lin, free)
+    hessian = information(lin.slopes, free.prior)
     inverse = np.asarray(np.linalg.inv(hessian), float)
     covariance = sandwich(lin, inverse, free.prior)
     scale = free.scale()
@@ -339,19 +329,13 @@ def _effects_at_bounds(free: _Free, vector: FloatArray) -> list[str]:
     return [f.path for f, value in values if value <= f.lower or value >= f.upper]
 
 
-def sandwich(
-    lin: Linearised, inverse: FloatArray, prior: FloatArray, block_s: float = 3.0
-) -> FloatArray:
+def sandwich(lin: Linearised, inverse: FloatArray, prior: FloatArray) -> FloatArray:
     """Covariance corrected for residuals that are still coloured (Morelli and Klein, 1995).
 
     Scores are summed over blocks longer than the correlation; where their spread exceeds what
     white residuals give, the covariance grows by that much. It never shrinks.
     """
-    block = lin.run_of * 10_000 + np.floor(lin.time_of / block_s).astype(np.int64)
-    _, index = np.unique(block, return_inverse=True)
-    scores = lin.slopes * lin.residuals[:, None]
-    sums = np.zeros((index.max() + 1, scores.shape[1]))
-    np.add.at(sums, index, scores)
+    sums = block_sums(lin.slopes * lin.residuals[:, None], lin.run_of, lin.time_of)
     sums -= sums.mean(axis=0)
     meat = sums.T @ sums * len(sums) / max(len(sums) - 1, 1)
     robust = inverse @ (meat + np.diag(prior)) @ inverse

@@ -202,11 +202,10 @@ class Emitter:
             lines.append(f"e_{effect.name} = {effect.name}_record({values})")
             row += len(effect.parameters)
         state = [f"work[(X + {i}) * width + k]" for i in range(14)]
-        order = (0, 1, 2, 3, 4, 5, 6)
         lines += [
             "time = work[TIME * width + k] + elapsed + shift",
             f"place = Vector({', '.join(state[:3])})",
-            f"attitude = rotation({', '.join(state[i] for i in order[3:7])})",
+            f"attitude = rotation({', '.join(state[3:7])})",
             f"velocity = Vector({', '.join(state[7:10])})",
             f"omega = Vector({', '.join(state[10:13])})",
             f"phase = {state[13]}",

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 BLUE, VERMILION, GREEN = "#0072B2", "#D55E00", "#009E73"
@@ -75,9 +74,3 @@ def save(figure: Figure, folder: Path, name: str, formats: tuple[str, ...] | Non
     for path in paths:
         figure.savefig(path, dpi=DOTS_PER_INCH)
     return paths[0]
-
-
-def panel_letters(axes: list[Axes]) -> None:
-    """Letters (a), (b), ... before the titles of panels."""
-    for letter, ax in zip("abcdefghij", axes, strict=False):
-        ax.set_title(f"({letter}) {ax.get_title(loc='left')}", loc="left")

@@ -1,0 +1,53 @@
+"""What residuals say about parameters: information with the prior, and scores summed over time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+import numpy.typing as npt
+
+from fish_env.identification.parameters import Baseline
+from fish_env.identification.products import inner
+
+FloatArray = npt.NDArray[np.float64]
+BLOCK_S = 3.0
+"""Length of the blocks over which scores are summed (s), longer than a disturbance remembers."""
+
+
+def prior_precision(baseline: Baseline, further: int, released: Iterable[str]) -> FloatArray:
+    """Precision of the prior of each free parameter, baseline first, in units of its own spread.
+
+    Args:
+        baseline: coefficients with a prior.
+        further: number of parameters without one, such as those of effects.
+        released: paths of coefficients whose prior is lifted, but for a trace that keeps a
+            parameter without effect in place.
+    """
+    prior = np.concatenate([np.ones(len(baseline)), np.zeros(further)])
+    for path in released:
+        prior[baseline.paths.index(path)] = 1e-4
+    return prior
+
+
+def information(slopes: FloatArray, prior: FloatArray) -> FloatArray:
+    """Information of data and prior (n, n); a parameter without effect keeps a finite inverse.
+
+    Args:
+        slopes: (D, n) derivative of whitened residuals.
+        prior: (n,) precision.
+    """
+    of_data = inner(slopes, slopes)
+    floor = 1e-9 * np.diag(of_data) + 1e-12
+    return np.asarray(of_data + np.diag(prior + floor))
+
+
+def block_sums(
+    scores: FloatArray, run_of: npt.NDArray[np.int64], time_of: FloatArray
+) -> FloatArray:
+    """Scores (D, m) summed over blocks of time of each run, shape (blocks, m)."""
+    block = run_of * 10_000 + np.floor(time_of / BLOCK_S).astype(np.int64)
+    _, index = np.unique(block, return_inverse=True)
+    sums = np.zeros((index.max() + 1, scores.shape[1]))
+    np.add.at(sums, index, scores)
+    return sums

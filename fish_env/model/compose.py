@@ -90,12 +90,11 @@ class Composition:
         return "\n".join([HEADER, *imports, Emitter(self).text(), *bodies])
 
 
-def load(composition: Composition) -> ModuleType:
-    """Import the composed module, writing it to the cache folder first if it is new."""
+def cache_folder(composition: Composition) -> Path:
+    """Where a composed module is kept; another folder after an edit of anything it draws on."""
     files = [effect.file for effect in composition.effects if effect.file is not None]
     for template in composition.templates:
-        if template != TEMPLATE:
-            files += sorted(template.parent.glob("*.py"))
+        files += jit.sources_behind(template)
     # An effect made in Python has no file to tell one version from the next: its code does.
     codes = [
         jit.fingerprint(hook)
@@ -103,7 +102,12 @@ def load(composition: Composition) -> ModuleType:
         if effect.file is None
         for hook in (*effect.hooks.values(), effect.initial_states)
     ]
-    folder = jit.cache_root() / jit.source_hash(files, codes)
+    return jit.cache_root() / jit.source_hash(files, codes)
+
+
+def load(composition: Composition) -> ModuleType:
+    """Import the composed module, writing it to the cache folder first if it is new."""
+    folder = cache_folder(composition)
     name = f"robofish_composed_{composition.label}_{folder.name}"
     if name in sys.modules:
         return sys.modules[name]

@@ -1,21 +1,28 @@
 """The only place that decorates kernels, and the folder their machine code is cached in.
 
 numba's cache does not notice an edited callee in another file (numba issue 1833). Every kernel
-source therefore enters the hash that names the cache folder: an edit anywhere starts a fresh one.
+source therefore enters the hash that names the cache folder: an edit of any of them starts a fresh
+one, and an edit of a file that no kernel draws on compiles nothing anew.
 """
 
 from __future__ import annotations
 
+import ast
 import hashlib
 import os
 import tempfile
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
 
 F = TypeVar("F", bound=Callable[..., Any])
+PACKAGE = Path(__file__).resolve().parent.parent
+PHYSICS = (PACKAGE / "model", PACKAGE / "effects")
+RECORD = PACKAGE / "params" / "packing.py"
+"""Says which row of a record holds which parameter."""
 
 # IEEE semantics on purpose (no fastmath): one lane or sixteen then give the same bits.
 _COMMON: dict[str, Any] = {"error_model": "numpy", "nogil": True}
@@ -89,10 +96,36 @@ def fingerprint(value: Any) -> str:
 
 def source_hash(extra_sources: Iterable[Path] = (), texts: Iterable[str] = ()) -> str:
     """Hash of every kernel source of the physics (``model/``, ``effects/``), files and texts."""
-    package = Path(__file__).resolve().parent.parent
-    folders = ("model", "effects")
-    files = [path for name in folders for path in sorted((package / name).glob("*.py"))]
-    return _hash((*files, *extra_sources), texts)
+    files = [path for folder in PHYSICS for path in sorted(folder.glob("*.py"))]
+    return _hash((*files, RECORD, *extra_sources), texts)
+
+
+@cache
+def sources_behind(template: Path) -> tuple[Path, ...]:
+    """A template and the files of this package that it draws on, beside those of the physics."""
+    found: list[Path] = []
+    waiting = [template]
+    while waiting:
+        file = waiting.pop()
+        if file not in found and file.parent not in PHYSICS:
+            found.append(file)
+            waiting += _imported(file)
+    return tuple(sorted(found))
+
+
+def _imported(file: Path) -> Iterator[Path]:
+    """Files of this package that a source imports when it is loaded."""
+    for node in ast.parse(file.read_bytes()).body:
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+        else:
+            continue
+        for name in names:
+            module = PACKAGE.parent.joinpath(*name.split("."))
+            if PACKAGE in module.parents:
+                yield from filter(Path.is_file, (module.with_suffix(".py"), module / "__init__.py"))
 
 
 def _hash(files: Iterable[Path], texts: Iterable[str]) -> str:

@@ -1,11 +1,14 @@
 """`robofish`, the command line. Thin: every command lives in :mod:`fish_env.commands`.
 
-Only typer and rich are imported here; what a command needs is imported when it runs.
+Only typer and rich are imported here; what a command needs is imported when it runs. Packages that
+build on this one add commands of their own as entry points of the group ``robofish.commands``:
+functions that take the typer app.
 """
 
 from __future__ import annotations
 
 import warnings
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Annotated
 
@@ -173,6 +176,23 @@ def effects() -> None:
     from fish_env.commands.effects import print_effects
 
     print_effects(Console())
+
+
+GROUP = "robofish.commands"
+
+
+def add_commands(to: typer.Typer) -> None:
+    """Adds the commands of installed packages; one that cannot be loaded is left out, and said."""
+    for entry in sorted(entry_points(group=GROUP), key=lambda entry: entry.name):
+        try:
+            register = entry.load()
+        except (ImportError, AttributeError) as error:
+            warnings.warn(f"command '{entry.name}' is left out: {error}", stacklevel=2)
+        else:
+            register(to)
+
+
+add_commands(app)
 
 
 def main() -> None:

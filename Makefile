@@ -63,7 +63,7 @@ $(VENV)/.with-base: pyproject.toml constraints.txt | $(VENV)/bin/python
 $(VENV)/.with-dev: pyproject.toml constraints.txt | $(VENV)/bin/python
 	@echo "Installing robotic-fish with its test and training tools into $(VENV)"
 	@echo "(a few minutes, only this once; PyTorch is the large part)"
-	@$(PIP) --editable ".[dev,train,parquet]"
+	@$(PIP) --editable ".[dev,train,parquet,render]"
 	@touch $(VENV)/.with-base $@
 
 $(VENV)/.with-bench: pyproject.toml constraints.txt | $(VENV)/bin/python

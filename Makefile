@@ -28,10 +28,12 @@ lint: setup  ## style, types and import direction
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
-docs: $(VENV)/.with-base  ## write the generated pages and the generated parts of the README
+docs: $(VENV)/.with-docs  ## write the generated pages, then the site into out/site
 	$(BIN)/python -m scripts.make_effects_page
 	$(BIN)/python -m scripts.make_environment_page
 	$(BIN)/python -m scripts.update_readme
+	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
+	@echo "Open out/site/index.html"
 
 bench: $(VENV)/.with-bench  ## measure speed beside other environments, and put it into the README
 	$(BIN)/python -m scripts.bench.startup
@@ -63,7 +65,12 @@ $(VENV)/.with-base: pyproject.toml constraints.txt | $(VENV)/bin/python
 $(VENV)/.with-dev: pyproject.toml constraints.txt | $(VENV)/bin/python
 	@echo "Installing robotic-fish with its test and training tools into $(VENV)"
 	@echo "(a few minutes, only this once; PyTorch is the large part)"
-	@$(PIP) --editable ".[dev,train,parquet,render]"
+	@$(PIP) --editable ".[dev,train,parquet,render,docs]"
+	@touch $(VENV)/.with-base $(VENV)/.with-docs $@
+
+$(VENV)/.with-docs: pyproject.toml constraints.txt | $(VENV)/bin/python
+	@echo "Installing robotic-fish and what builds its documentation into $(VENV)"
+	@$(PIP) --editable ".[docs]"
 	@touch $(VENV)/.with-base $@
 
 $(VENV)/.with-bench: pyproject.toml constraints.txt | $(VENV)/bin/python

@@ -18,7 +18,7 @@ TESTED = {
 }
 REQUIREMENTS = [
     *PROJECT["dependencies"],
-    *(item for extra, items in EXTRAS.items() if extra != "docs" for item in items),
+    *(item for items in EXTRAS.values() for item in items),
 ]
 
 

@@ -1,0 +1,103 @@
+"""What a policy sees beyond the present: past observations, and low-pass filtered ones.
+
+One observation of noisy, late sensors says little of the water and of a fish that differs from the
+nominal one. A few frames and a slow mean of all sensors tell both, without a recurrent network.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fish_env.errors import ConfigError
+
+BoolArray = npt.NDArray[np.bool_]
+Float32Array = npt.NDArray[np.float32]
+MOST_FRAMES = 50
+
+
+@dataclass(frozen=True)
+class HistorySpec:
+    """Which part of the past a policy sees.
+
+    Attributes:
+        frames: observations side by side, the newest first; 1 is the present alone.
+        low_pass_s: time constants of first-order filters of the whole observation (s).
+        period_s: control period (s).
+    """
+
+    frames: int = 1
+    low_pass_s: tuple[float, ...] = ()
+    period_s: float = 0.1
+
+    def __post_init__(self) -> None:
+        """Refuses what cannot be.
+
+        Raises:
+            ConfigError: says which.
+        """
+        if not 1 <= self.frames <= MOST_FRAMES:
+            raise ConfigError(f"history.frames = {self.frames}: choose 1 to {MOST_FRAMES}")
+        if self.period_s <= 0.0:
+            raise ConfigError(f"history.period_s = {self.period_s}: more than 0 s")
+        if any(constant < self.period_s for constant in self.low_pass_s):
+            raise ConfigError(
+                f"history.low_pass_s = {list(self.low_pass_s)}: each at least the control period, "
+                f"{self.period_s:g} s"
+            )
+
+    def width(self, observation: int) -> int:
+        """Numbers that the policy sees, for observations of so many."""
+        return observation * (self.frames + len(self.low_pass_s))
+
+
+class History:
+    """The past of N episodes side by side; no episode sees another's.
+
+    Args:
+        spec: which part of the past.
+        count: episodes.
+        observation: numbers in one observation.
+    """
+
+    def __init__(self, spec: HistorySpec, count: int, observation: int) -> None:
+        self.spec = spec
+        self._share = [
+            np.float32(-np.expm1(-spec.period_s / constant)) for constant in spec.low_pass_s
+        ]
+        self._frames = np.zeros((spec.frames, count, observation), np.float32)
+        self._filters = np.zeros((len(spec.low_pass_s), count, observation), np.float32)
+        self._fresh = np.ones(count, bool)
+
+    def restart(self, ended: BoolArray) -> None:
+        """The next observation of these episodes (N,) is their first."""
+        self._fresh |= ended
+
+    def push(self, observations: Float32Array) -> Float32Array:
+        """Takes the next observations (N, n) and returns what the policy sees, (N, width).
+
+        A first observation counts as having been there for ever.
+        """
+        self._frames[1:] = self._frames[:-1].copy()
+        self._frames[0] = observations
+        if self._fresh.any():
+            self._frames[:, self._fresh] = observations[self._fresh]
+            self._filters[:, self._fresh] = observations[self._fresh]
+            self._fresh[:] = False
+        for filtered, share in zip(self._filters, self._share, strict=True):
+            filtered += share * (observations - filtered)
+        return self._beside(self._frames, self._filters)
+
+    def last(self, lane: int, observation: Float32Array) -> Float32Array:
+        """What the policy would see of an episode's last observation (n,); changes nothing."""
+        frames = np.concatenate([observation[None], self._frames[:-1, lane]])
+        filters = self._filters[:, lane].copy()
+        for filtered, share in zip(filters, self._share, strict=True):
+            filtered += share * (observation - filtered)
+        return self._beside(frames, filters)
+
+    @staticmethod
+    def _beside(frames: Float32Array, filters: Float32Array) -> Float32Array:
+        return np.concatenate([*frames, *filters], axis=-1)

@@ -1,0 +1,258 @@
+"""Training configurations, ``configs/train/*.yaml``: what they may say, and reading them."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from agents.evaluation.suites import load_suite
+from agents.policies.history import HistorySpec
+from agents.policies.network import ACTIVATIONS
+from agents.training.schema import build
+from fish_env.envs.options import env_options
+from fish_env.errors import ConfigError
+from fish_env.params.io import config_root
+
+SCHEDULES = ("constant", "linear")
+MOST_FISH = 1000
+"""Fish of one batch are seeded one after the other; a seed of a training leaves room for these."""
+
+
+def _check(holds: bool, message: str) -> None:
+    if not holds:
+        raise ConfigError(message)
+
+
+@dataclass(frozen=True)
+class History:
+    """What the policy sees of the past, see :class:`agents.policies.HistorySpec`."""
+
+    frames: int = 1
+    low_pass_s: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class NetworkSettings:
+    """The perceptrons, one for actions and one for values.
+
+    Attributes:
+        layers: widths of the hidden layers.
+        activation: ``tanh`` or ``relu``.
+        log_std_init: logarithm of the first standard deviation of actions (PPO).
+    """
+
+    layers: tuple[int, ...] = (64, 64)
+    activation: str = "tanh"
+    log_std_init: float = -0.5
+
+    def __post_init__(self) -> None:
+        _check(bool(self.layers) and min(self.layers) > 0, "network.layers: positive widths")
+        names = ", ".join(ACTIVATIONS)
+        _check(self.activation in ACTIVATIONS, f"network.activation: one of {names}")
+
+
+@dataclass(frozen=True)
+class LearningRate:
+    """Step size of Adam: constant, or falling in a straight line from ``start`` to ``end``."""
+
+    start: float = 3e-4
+    end: float | None = None
+
+    def __post_init__(self) -> None:
+        _check(self.start > 0, "learning_rate.start must be positive")
+        _check(self.end is None or self.end >= 0, "learning_rate.end must not be negative")
+
+
+@dataclass(frozen=True)
+class Ppo:
+    """Proximal policy optimisation, Schulman et al. 2017; names as in Stable-Baselines3."""
+
+    n_steps: int = 64
+    batch_size: int = 1024
+    n_epochs: int = 6
+    learning_rate: LearningRate = field(default_factory=LearningRate)
+    gamma: float = 0.98
+    gae_lambda: float = 0.95
+    clip_range: float = 0.2
+    ent_coef: float = 0.0
+    vf_coef: float = 0.5
+    max_grad_norm: float = 0.5
+    target_kl: float | None = None
+
+    def __post_init__(self) -> None:
+        positive = (self.n_steps, self.batch_size, self.n_epochs, self.clip_range)
+        _check(min(positive) > 0, "ppo: n_steps, batch_size, n_epochs, clip_range are positive")
+        _check(0 < self.gamma <= 1 and 0 <= self.gae_lambda <= 1, "ppo: gamma, gae_lambda in 0..1")
+
+
+@dataclass(frozen=True)
+class Sac:
+    """Soft actor-critic, Haarnoja et al. 2018; names as in Stable-Baselines3."""
+
+    buffer_size: int = 200_000
+    batch_size: int = 256
+    train_freq: int = 1
+    gradient_steps: int = 8
+    learning_starts: int = 5_000
+    learning_rate: LearningRate = field(default_factory=LearningRate)
+    gamma: float = 0.98
+    tau: float = 0.01
+
+    def __post_init__(self) -> None:
+        positive = (self.buffer_size, self.batch_size, self.train_freq, self.gradient_steps)
+        _check(min(positive) > 0, "sac: sizes and frequencies are positive")
+        _check(0 < self.gamma <= 1 and 0 < self.tau <= 1, "sac: gamma and tau in 0..1")
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Evaluation on the side, on episodes that are not trained on and belong to no suite.
+
+    Attributes:
+        every: steps between two; the best policy so far is kept.
+        episodes: how many.
+    """
+
+    every: int = 200_000
+    episodes: int = 64
+
+    def __post_init__(self) -> None:
+        _check(min(self.every, self.episodes) > 0, "evaluation: every and episodes are positive")
+
+
+@dataclass(frozen=True)
+class Threads:
+    """Threads of PyTorch and of the environment; more do not pay for small networks."""
+
+    torch: int = 1
+    environment: int = 1
+
+    def __post_init__(self) -> None:
+        _check(min(self.torch, self.environment) > 0, "threads: at least 1")
+
+
+@dataclass(frozen=True)
+class TrainConfig:
+    """One training.
+
+    Attributes:
+        name: of the run folder.
+        algorithm: ``ppo`` or ``sac``.
+        total_steps: control steps of all fish together.
+        task: ``hold`` or ``track``.
+        seed: of networks, episodes and exploration.
+        num_envs: fish side by side.
+        disturbances: suite whose conditions (not episodes) are trained under.
+        environment: further keyword arguments of the environment; they replace those of the suite.
+        reward: changes of ``reward`` in the environment's settings that hold in training alone.
+        history: what the policy sees of the past.
+        network: see :class:`NetworkSettings`.
+        ppo: see :class:`Ppo`.
+        sac: see :class:`Sac`.
+        normalise_reward: divide rewards by the running deviation of returns.
+        evaluation: see :class:`Evaluation`.
+        checkpoint_every: steps between two checkpoints.
+        threads: see :class:`Threads`.
+    """
+
+    name: str
+    algorithm: str
+    task: str
+    total_steps: int
+    seed: int = 0
+    num_envs: int = 64
+    disturbances: str = "calm"
+    environment: Mapping[str, Any] = field(default_factory=dict)
+    reward: Mapping[str, Any] = field(default_factory=dict)
+    history: History = field(default_factory=History)
+    network: NetworkSettings = field(default_factory=NetworkSettings)
+    ppo: Ppo = field(default_factory=Ppo)
+    sac: Sac = field(default_factory=Sac)
+    normalise_reward: bool = True
+    evaluation: Evaluation = field(default_factory=Evaluation)
+    checkpoint_every: int = 100_000
+    threads: Threads = field(default_factory=Threads)
+
+    def __post_init__(self) -> None:
+        """Refuses what contradicts itself or the environment.
+
+        Raises:
+            ConfigError: says which.
+        """
+        _check(self.algorithm in ("ppo", "sac"), "algorithm: ppo or sac")
+        _check(0 <= self.seed < 1_000_000, "seed: 0 to 999999")
+        _check(1 <= self.num_envs <= MOST_FISH, f"num_envs: 1 to {MOST_FISH}")
+        _check(min(self.total_steps, self.checkpoint_every) > 0, "steps must be positive")
+        for key in ("task", *(("config",) if self.reward else ())):
+            _check(key not in self.environment, f"environment.{key}: not together with {key}")
+        known = inspect.signature(env_options).parameters
+        for key in self.environment:
+            _check(key in known, f"environment: unknown key '{key}'; known: {', '.join(known)}")
+        self.history_spec(env_options(**self.options(training=True)).config.control_period)
+
+    def options(self, training: bool) -> dict[str, Any]:
+        """Keyword arguments of the environment; the reward of the training only if asked for."""
+        suite = dict(load_suite(self.disturbances).environment)
+        options: dict[str, Any] = {"task": self.task} | suite | dict(self.environment)
+        if training and self.reward:
+            options["config"] = {"reward": dict(self.reward)}
+        return options
+
+    def history_spec(self, period_s: float) -> HistorySpec:
+        """What the policy sees of the past, for a control period (s)."""
+        return HistorySpec(self.history.frames, self.history.low_pass_s, period_s)
+
+    def tree(self) -> dict[str, Any]:
+        """As a YAML file could say it, with every default spelled out."""
+        unused = "sac" if self.algorithm == "ppo" else "ppo"
+        tree = {key: value for key, value in asdict(self).items() if key != unused}
+        return dict(yaml.safe_load(yaml.safe_dump(_plain(tree))))
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _plain(item) for key, item in value.items()}
+    return [_plain(item) for item in value] if isinstance(value, (list, tuple)) else value
+
+
+def load_train_config(name_or_path: str | Path, **changes: Any) -> TrainConfig:
+    """Reads a configuration: a shipped one by its name, or any file by its path.
+
+    Args:
+        name_or_path: ``ppo-hold``, or a path.
+        **changes: fields that replace those of the file; None leaves them.
+
+    Raises:
+        ConfigError: no such file, or something in it that cannot be; names file and key.
+    """
+    file = _find(name_or_path)
+    try:
+        tree = yaml.safe_load(file.read_text(encoding="utf-8"))
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{file}: not readable as YAML: {error}") from error
+    if isinstance(tree, Mapping):
+        tree = {"name": file.stem, **tree}
+        unused = {"ppo": "sac", "sac": "ppo"}.get(str(tree.get("algorithm")))
+        if unused in tree:
+            raise ConfigError(f"{file}: '{unused}' has no effect, the algorithm is another")
+    config = build(TrainConfig, tree, str(file))
+    given = {key: value for key, value in changes.items() if value is not None}
+    return replace(config, **given)
+
+
+def _find(name_or_path: str | Path) -> Path:
+    folder = config_root() / "train"
+    shipped = sorted(file.stem for file in folder.glob("*.yaml"))
+    if str(name_or_path) in shipped:
+        return folder / f"{name_or_path}.yaml"
+    path = Path(name_or_path).expanduser()
+    if path.is_file():
+        return path
+    raise ConfigError(
+        f"{name_or_path}: no such file, and no shipped training; there are: {', '.join(shipped)}"
+    )

@@ -1,0 +1,150 @@
+"""One training from its configuration to a policy file, in one process or over several."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+import yaml
+from stable_baselines3.common import logger
+
+from agents.policies.export import export_policy
+from agents.policies.files import PolicyFile, replace_file, write_policy
+from agents.policies.pretrained import PretrainedPolicy
+from agents.training.callback import Between, Watcher
+from agents.training.card import card, shares
+from agents.training.checkpoint import Progress, load_checkpoint, save_checkpoint
+from agents.training.config import TrainConfig
+from agents.training.model import Model, make_model
+from agents.training.stack import Stack, make_stack, seed_episodes
+from agents.training.trial import try_policy
+from fish_env.errors import ConfigError
+
+CHECKPOINT = "checkpoint.zip"
+POLICY = "policy.npz"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a training came to.
+
+    Attributes:
+        policy: file of the policy that did best in the evaluations on the side.
+        best: row of that evaluation.
+        progress: steps, times and all evaluations.
+    """
+
+    policy: Path
+    best: dict[str, float]
+    progress: Progress
+
+
+def train(config: TrainConfig, folder: Path, watcher: Watcher, resume: bool = False) -> Outcome:
+    """Trains, and leaves everything in a folder.
+
+    The folder gets ``policy.npz`` and ``card.yaml`` (best so far), ``checkpoint.zip``,
+    ``evaluations.csv``, ``config.yaml`` and ``tensorboard/``. A training that was stopped at any
+    moment and resumed takes the same steps, to the bit, as one that was not.
+
+    Args:
+        config: what to train.
+        folder: made if missing.
+        watcher: told about steps and evaluations.
+        resume: go on from the folder's checkpoint; from the start, if it was stopped before the
+            first one.
+
+    Raises:
+        ConfigError: the folder has a checkpoint and ``resume`` is False, or one that does not fit.
+    """
+    checkpoint = folder / CHECKPOINT
+    if checkpoint.exists() and not resume:
+        raise ConfigError(
+            f"{folder}: a training is kept here already; add --resume to go on with it, or give "
+            "another folder with --out"
+        )
+    folder.mkdir(parents=True, exist_ok=True)
+    replace_file(folder / "config.yaml", _yaml(config.tree()))
+    with _torch_threads(config.threads.torch):
+        run = _Run(config, folder)
+        return run.finish(watcher)
+
+
+class _Run:
+    """A training with its folder."""
+
+    def __init__(self, config: TrainConfig, folder: Path) -> None:
+        self.config, self.folder = config, folder
+        self.stack: Stack = make_stack(config)
+        self.model: Model
+        checkpoint = folder / CHECKPOINT
+        if checkpoint.exists():
+            self.model, self.progress = load_checkpoint(checkpoint, config, self.stack)
+        else:
+            self.model, self.progress = make_model(config, self.stack), Progress()
+            seed_episodes(self.stack, config)
+
+    def finish(self, watcher: Watcher) -> Outcome:
+        config, progress = self.config, self.progress
+        left = config.total_steps - progress.steps
+        if left > 0:
+            books = Between(config, progress, watcher, self._evaluate, self._save)
+            self.model.set_logger(
+                logger.configure(str(self.folder / "tensorboard"), ["tensorboard"])
+            )
+            self.model.learn(left, callback=books, reset_num_timesteps=progress.steps == 0)
+        best = max(progress.evaluations, key=_merit)
+        return Outcome(self.folder / POLICY, best, progress)
+
+    def _evaluate(self) -> dict[str, float]:
+        policy = self._policy({})
+        row = try_policy(self.config, PretrainedPolicy(policy))
+        if all(_merit(row) > _merit(other) for other in self.progress.evaluations):
+            self._keep(row)
+        return row
+
+    def _policy(self, about: dict[str, object]) -> PolicyFile:
+        spec = self.stack.past.history.spec
+        return export_policy(self.model, self.stack.outside, spec, self.config.task, about)
+
+    def _keep(self, row: dict[str, float]) -> None:
+        about = card(self.config, self.progress, row)
+        write_policy(self._policy(about), self.folder / POLICY)
+        replace_file(self.folder / "card.yaml", _yaml(about))
+
+    def _save(self) -> None:
+        for name, share in shares(self.progress, self.stack.fish.cpu_s).items():
+            self.model.logger.record(f"time/share_{name}", share)
+        self.progress.env_cpu_s = self.stack.fish.cpu_s
+        save_checkpoint(
+            self.folder / CHECKPOINT, self.config, self.model, self.stack, self.progress
+        )
+        rows = self.progress.evaluations
+        if rows:
+            table = io.StringIO()
+            writer = csv.DictWriter(table, list(rows[0]), lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(rows)
+            replace_file(self.folder / "evaluations.csv", table.getvalue().encode())
+
+
+def _merit(row: dict[str, float]) -> tuple[float, float]:
+    return row["success_rate"], row["episode_return"]
+
+
+def _yaml(tree: dict[str, object]) -> bytes:
+    return yaml.safe_dump(tree, sort_keys=False, allow_unicode=True).encode()
+
+
+@contextmanager
+def _torch_threads(count: int) -> Iterator[None]:
+    before = torch.get_num_threads()
+    torch.set_num_threads(count)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)

@@ -11,6 +11,8 @@ from rich.console import Console
 from fish_env.errors import ConfigError
 
 if TYPE_CHECKING:
+    from rich.table import Table
+
     from agents.evaluation.results import Result
 
 ALL = "all"
@@ -81,24 +83,24 @@ def task_names(task: str) -> list[str]:
 
 
 def print_results(console: Console, results: list[Result]) -> None:
-    """Prints one table, a column for each suite and task."""
+    """Prints a table for each task, a column for each suite."""
+    for task in dict.fromkeys(result.task for result in results):
+        console.print(_table(task, [result for result in results if result.task == task]))
+
+
+def _table(task: str, results: list[Result]) -> Table:
     from rich.table import Table
+
+    from agents.evaluation.labels import LABELS, mean_and_range
 
     first = results[0]
     seeds = f", {first.seeds} training seeds" if first.seeds > 1 else ""
-    table = Table(title=f"{first.agent}: {first.episodes} episodes each{seeds}", box=None)
-    table.add_column("mean, 95 % interval")
+    title = f"{first.agent}, task {task}: {first.episodes} episodes each{seeds}"
+    table = Table(title=title, caption="mean, and its 95 % interval", box=None)
+    table.add_column("")
     for result in results:
-        table.add_column(f"{result.suite}\n{result.task}", justify="right")
-    names = dict.fromkeys(name for result in results for name in result.metrics)
-    for name in names:
-        cells = [result.metrics.get(name) for result in results]
-        table.add_row(name, *(_cell(cell) for cell in cells))
-    console.print(table)
-
-
-def _cell(interval: tuple[float, float, float] | None) -> str:
-    if interval is None:
-        return "-"
-    mean, low, high = interval
-    return f"{mean:.3g}\n[dim]{low:.3g} to {high:.3g}[/dim]"
+        table.add_column(result.suite, justify="right")
+    for name in first.metrics:
+        cells = ("\n".join(mean_and_range(name, result.metrics[name])) for result in results)
+        table.add_row(LABELS[name][0], *cells)
+    return table

@@ -4,26 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
+from agents.registry import Agent
 from fish_env.envs.robotic_fish_3d import RoboticFish3DEnv
 
 FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
-
-
-class Controller(Protocol):
-    """What swims: it is told when an episode begins, and turns observations into actions."""
-
-    def reset(self) -> None:
-        """Forget the last episode."""
-
-    def __call__(self, observation: Float32Array) -> Float32Array:
-        """Action (5,) for an observation (33,)."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +55,7 @@ class Episode:
 
 def swim(
     env: gym.Env[Float32Array, Float32Array],
-    controller: Controller,
+    agent: Agent,
     seed: int,
     options: dict[str, Any] | None = None,
     report: Callable[[], object] = lambda: None,
@@ -73,7 +64,7 @@ def swim(
 
     Args:
         env: ``RoboticFish3D-v0``, with its time limit.
-        controller: what acts.
+        agent: what acts.
         seed: seed of the episode.
         options: reset options, see the environment.
         report: called after each step.
@@ -84,10 +75,10 @@ def swim(
     rows: list[dict[str, float]] = []
     actions, actuators = [], []
     observation, _ = env.reset(seed=seed, options=options)
-    controller.reset()
+    agent.reset(1)
     over = False
     while not over:
-        action = controller(observation)
+        action = agent.act(observation[None])[0]
         observation, _, terminated, truncated, info = env.step(action)
         rows.append(info)
         actions.append(action)

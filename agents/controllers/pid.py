@@ -2,33 +2,53 @@
 
 It sees what any agent sees, the observation vector of ``RoboticFish3D-v0``, and needs no model of
 the fish beyond the signs: a block further aft raises the nose, a positive tail offset turns the
-fish to port.
+fish to port. The gains come from configs/controllers/pid.yaml, which scripts/tune_pid.py writes.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from functools import cache
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import yaml
 
+from agents.controllers.seen import Seen
+from fish_env.errors import ConfigError
+from fish_env.params.io import config_root
+
+FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
+Gain = float | FloatArray
+"""A number, or one for each fish (N,)."""
+DEPTH_WINDOW, HEADING_WINDOW = 0.15, 0.3
+"""Errors (m, rad) within which the integrals grow."""
+HEADING_WINDUP, SPEED_WINDUP = 0.3, 0.6
+"""The action that the integrals of heading and speed may amount to."""
+SLOWEST_SURGE = 0.05
+"""Least surge speed (m/s) that a wanted climb is divided by to give a pitch."""
 
 
 @dataclass(frozen=True)
 class PIDGains:
-    """Gains, in physical units; outputs are actions in [-1, 1].
+    """Gains in physical units; outputs are actions in [-1, 1].
 
     Attributes:
         depth: climb rate asked for per metre of depth error (1/s).
         depth_integral: block action per metre and second of depth error.
-        climb_limit: largest climb rate asked for (m/s).
-        pitch_per_climb: pitch asked for per climb rate over surge speed (rad).
+        depth_windup: block action that the integral of depth may amount to.
+        climb_limit: largest climb rate asked for (m/s), beside that of the goal.
+        climb_damping: climb rate taken off what is asked for, per climb rate.
         pitch: block action per radian of pitch asked for.
         pitch_error: block action per radian of pitch error.
         pitch_rate: block action per pitch rate (s/rad).
         heading: offset action per radian of heading error.
-        heading_rate: offset action per yaw rate error (s/rad).
+        heading_rate: offset action per yaw rate (s/rad).
+        heading_feedforward: offset action per rate of the goal heading (s/rad).
         heading_integral: offset action per radian and second.
         frequency: tail frequency action at the goal speed 0.10 m/s.
         speed: frequency action per m/s of speed error.
@@ -37,85 +57,117 @@ class PIDGains:
         roll: block angle action per radian of roll.
     """
 
-    depth: float = 0.25
-    depth_integral: float = 0.12
-    climb_limit: float = 0.04
-    pitch_per_climb: float = 1.0
-    pitch: float = 3.4
-    pitch_error: float = 1.0
-    pitch_rate: float = 0.8
-    heading: float = 1.2
-    heading_rate: float = 0.35
-    heading_integral: float = 0.10
-    frequency: float = 0.35
-    speed: float = 3.0
-    speed_integral: float = 1.5
-    amplitude: float = 0.2
-    roll: float = 0.0
+    depth: Gain
+    depth_integral: Gain
+    depth_windup: Gain
+    climb_limit: Gain
+    climb_damping: Gain
+    pitch: Gain
+    pitch_error: Gain
+    pitch_rate: Gain
+    heading: Gain
+    heading_rate: Gain
+    heading_feedforward: Gain
+    heading_integral: Gain
+    frequency: Gain
+    speed: Gain
+    speed_integral: Gain
+    amplitude: Gain
+    roll: Gain
+
+
+GAIN_NAMES = tuple(field.name for field in fields(PIDGains))
+
+
+@cache
+def tuned_gains() -> PIDGains:
+    """The gains that come with the package."""
+    return load_gains(config_root() / "controllers" / "pid.yaml")
+
+
+def load_gains(path: Path) -> PIDGains:
+    """Reads gains from a YAML file.
+
+    Raises:
+        ConfigError: no such file, or not exactly a number for each gain.
+    """
+    if not path.is_file():
+        raise ConfigError(f"{path}: no such file; scripts/tune_pid.py writes one")
+    tree = yaml.safe_load(path.read_text(encoding="utf-8"))
+    gains: Mapping[str, Any] = tree.get("gains", {}) if isinstance(tree, dict) else {}
+    wrong = set(gains) ^ set(GAIN_NAMES)
+    wrong |= {name for name, value in gains.items() if not isinstance(value, (int, float))}
+    if wrong:
+        raise ConfigError(f"{path}: 'gains' needs a number for each gain; see {sorted(wrong)}")
+    return PIDGains(**gains)
 
 
 class PIDController:
-    """One fish's controller; call it with an observation (33,) and apply the action (5,).
+    """Controls a batch of fish, each with integrals of its own.
 
     Args:
-        gains: see :class:`PIDGains`.
+        gains: default: those that come with the package.
         period_s: control period of the environment (s).
     """
 
     def __init__(self, gains: PIDGains | None = None, period_s: float = 0.1) -> None:
-        self.gains = gains or PIDGains()
+        self.gains = gains or tuned_gains()
         self.period_s = period_s
-        self.reset()
+        self.reset(1)
 
-    def reset(self) -> None:
-        """Forget the integrals, at the start of an episode."""
-        self._depth = self._heading = self._speed = 0.0
+    def reset(self, count: int) -> None:
+        """Episodes of ``count`` fish begin: forget the integrals."""
+        self._depth, self._heading, self._speed = np.zeros((3, count))
 
-    def __call__(self, observation: npt.ArrayLike) -> Float32Array:
-        """Action for an observation."""
-        obs = np.asarray(observation, float)
-        action = np.array(
-            [
-                self._tail_offset(obs),
-                self.gains.amplitude,
-                self._tail_frequency(obs),
-                self._block_displacement(obs),
-                0.0,
-            ]
+    def act(self, observations: npt.ArrayLike) -> Float32Array:
+        """Actions (N, 5) for observations (N, 33)."""
+        seen = Seen.of(observations)
+        actions = np.zeros((len(seen.depth_error), 5))
+        actions[:, 0] = self._tail_offset(seen)
+        actions[:, 1] = self.gains.amplitude
+        actions[:, 2] = self._tail_frequency(seen)
+        actions[:, 3] = self._block_displacement(seen)
+        actions[:, 4] = -self.gains.roll * seen.roll
+        return np.asarray(np.clip(actions, -1.0, 1.0), np.float32)
+
+    def _block_displacement(self, seen: Seen) -> FloatArray:
+        gains = self.gains
+        climb = np.clip(gains.depth * seen.depth_error, -gains.climb_limit, gains.climb_limit)
+        climb = climb + seen.goal_depth_rate - gains.climb_damping * seen.depth_rate
+        # Down is positive and so is the nose up.
+        pitch = -np.clip(climb / np.maximum(seen.surge, SLOWEST_SURGE), -0.5, 0.5)
+        self._depth = _integrated(
+            self._depth,
+            -gains.depth_integral * seen.depth_error * self.period_s,
+            np.abs(seen.depth_error) < DEPTH_WINDOW,
+            gains.depth_windup,
         )
-        return np.asarray(np.clip(action, -1.0, 1.0), np.float32)
+        action = gains.pitch * pitch + gains.pitch_error * (pitch - seen.pitch)
+        return np.asarray(action - gains.pitch_rate * seen.pitch_rate + self._depth)
 
-    def _block_displacement(self, obs: npt.NDArray[np.float64]) -> float:
+    def _tail_offset(self, seen: Seen) -> FloatArray:
         gains = self.gains
-        error, depth_rate = 0.3 * obs[0], 0.1 * obs[1]
-        rate = np.clip(gains.depth * error, -gains.climb_limit, gains.climb_limit)
-        rate = rate + 0.1 * obs[2]
-        surge = max(0.2 * obs[15], 0.05)
-        wanted = -gains.pitch_per_climb * np.clip((rate - 0.5 * depth_rate) / surge, -0.5, 0.5)
-        pitch = np.arctan2(obs[13], obs[14])
-        action = gains.pitch * wanted + gains.pitch_error * (wanted - pitch)
-        action -= gains.pitch_rate * obs[19]
-        if abs(error) < 0.15:
-            step = gains.depth_integral * error * self.period_s
-            self._depth = float(np.clip(self._depth - step, -0.4, 0.4))
-        return float(action + self._depth)
+        self._heading = _integrated(
+            self._heading,
+            gains.heading_integral * seen.heading_error * self.period_s,
+            np.abs(seen.heading_error) < HEADING_WINDOW,
+            HEADING_WINDUP,
+        )
+        turn = gains.heading * seen.heading_error - gains.heading_rate * seen.yaw_rate
+        turn = turn + gains.heading_feedforward * seen.goal_heading_rate + self._heading
+        return np.asarray(-turn)
 
-    def _tail_offset(self, obs: npt.NDArray[np.float64]) -> float:
+    def _tail_frequency(self, seen: Seen) -> FloatArray:
         gains = self.gains
-        error = np.arctan2(obs[4], obs[5])
-        rate_error = 0.5 * obs[8] - obs[20]
-        if abs(error) < 0.3:
-            step = gains.heading_integral * error * self.period_s
-            self._heading = float(np.clip(self._heading + step, -0.3, 0.3))
-        turn = gains.heading * error + gains.heading_rate * 0.2 * rate_error + self._heading
-        return float(-turn)
+        rest = (seen.goal_speed <= 0.0) & (seen.speed_error <= 0.0)
+        step = gains.speed_integral * seen.speed_error * self.period_s
+        self._speed = _integrated(self._speed, step, ~rest, SPEED_WINDUP)
+        feedforward = (gains.frequency + 1.0) * seen.goal_speed / 0.1 - 1.0
+        action = feedforward + gains.speed * seen.speed_error + self._speed
+        return np.where(rest, -1.0, action)
 
-    def _tail_frequency(self, obs: npt.NDArray[np.float64]) -> float:
-        gains = self.gains
-        error, goal = 0.1 * obs[9], 0.1 * obs[10]
-        if goal <= 0.0 and error <= 0.0:
-            return -1.0
-        step = gains.speed_integral * error * self.period_s
-        self._speed = float(np.clip(self._speed + step, -0.6, 0.6))
-        feedforward = (gains.frequency + 1.0) * goal / 0.1 - 1.0
-        return float(feedforward + gains.speed * error + self._speed)
+
+def _integrated(
+    value: FloatArray, step: FloatArray, grows: npt.NDArray[np.bool_], windup: Gain
+) -> FloatArray:
+    return np.where(grows, np.clip(value + step, -windup, windup), value)

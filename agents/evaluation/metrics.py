@@ -17,12 +17,12 @@ STEP_RESPONSE_TASK = "hold"
 
 def success_rate(record: Record) -> FloatArray:
     """1 where the whole episode was swum and its last 10 s were within all limits."""
-    return record.info["is_success"][-1] * record.alive[-1]
+    return np.asarray(record.info["is_success"][-1] * record.alive[-1])
 
 
 def failure_rate(record: Record) -> FloatArray:
     """1 where the fish left the tank, tumbled or diverged."""
-    return (record.info["failure"][-1] > 0).astype(float)
+    return np.asarray(record.info["failure"][-1] > 0, float)
 
 
 def _rms(values: FloatArray) -> FloatArray:

@@ -53,7 +53,7 @@ class Record:
     @property
     def episodes(self) -> int:
         """How many."""
-        return self.reward.shape[1]
+        return int(self.reward.shape[1])
 
 
 def swim_suite(

@@ -36,6 +36,7 @@ def simulate(
     out: Annotated[
         Path | None, typer.Option(help="A .csv or .parquet file; without it, CSV is printed.")
     ] = None,
+    replay: Annotated[Path | None, typer.Option(help="HTML page that shows it swim.")] = None,
 ) -> None:
     """Simulate one case and write pose and velocities over time.
 
@@ -46,7 +47,7 @@ def simulate(
     """
     from fish_env.commands.simulate import simulate_case
 
-    simulate_case(case, dt, rate, out)
+    simulate_case(case, dt, rate, out, replay)
 
 
 @app.command()
@@ -61,6 +62,9 @@ def compare(
     out: Annotated[Path | None, typer.Option(help="Folder for pictures.")] = None,
     dt: Annotated[float, typer.Option(help="Longest physics step, s.")] = 0.01,
     runs: Annotated[bool, typer.Option("--runs", help="Print every run.")] = False,
+    replay: Annotated[
+        Path | None, typer.Option(help="HTML page that shows measured and simulated swim.")
+    ] = None,
 ) -> None:
     """Compare measured motion with its simulation: how wrong it is, and where.
 
@@ -71,7 +75,33 @@ def compare(
     """
     from fish_env.commands.compare import compare_dataset
 
-    compare_dataset(Console(), dataset, fish, json, out, dt, runs)
+    compare_dataset(Console(), dataset, fish, json, out, dt, runs, replay)
+
+
+@app.command()
+def replay(
+    files: Annotated[
+        list[Path],
+        typer.Argument(help="Trajectories (.csv, .parquet), or runs of a dataset.", metavar="FILE"),
+    ],
+    out: Annotated[Path, typer.Option(help="The page to write.")] = Path("replay.html"),
+    fish: Annotated[
+        str | None, typer.Option(help="Fish whose size is drawn: preset or file.")
+    ] = None,
+    case: Annotated[
+        Path | None, typer.Option(help="Case the files were simulated from, for the tail's beat.")
+    ] = None,
+) -> None:
+    """Write a page that shows fish swim in 3-D beside time plots; it opens without a network.
+
+    Several files are shown at once. One whose name ends in measured, baseline or extended gets
+    that colour.
+
+    **Example:** `robofish replay swim.csv --case case.json --out swim.html`
+    """
+    from fish_env.commands.replay import replay_files
+
+    replay_files(Console(), files, out, fish, case)
 
 
 @app.command()

@@ -18,6 +18,7 @@ from fish_env.comparison.runs import compare_runs
 from fish_env.comparison.tables import compare_steady
 from fish_env.comparison.words import in_words, shown_unit
 from fish_env.data import Dataset, SteadyDataset, load_dataset
+from fish_env.errors import DatasetError
 from fish_env.params import FishParams, load_fish
 
 Comparison = RunsComparison | SteadyComparison
@@ -32,6 +33,7 @@ def compare_dataset(
     out: Path | None,
     dt: float,
     every_run: bool,
+    replay: Path | None = None,
 ) -> Comparison:
     """Compares a dataset with its simulation and writes what was asked for.
 
@@ -43,12 +45,16 @@ def compare_dataset(
         out: Folder for pictures.
         dt: Longest physics step, s.
         every_run: Print each run, not only conditions.
+        replay: HTML page that shows measured and simulated fish swim.
 
     Raises:
-        RoboticFishError: The data or the fish cannot be used.
+        RoboticFishError: The data or the fish cannot be used; or a replay of a steady table.
     """
     measured = load_dataset(dataset)
-    comparison = _compare(console, measured, load_fish(fish or measured.fish), dt)
+    if replay is not None and isinstance(measured, SteadyDataset):
+        raise DatasetError(f"{dataset}: a table of steady motion has no runs to replay")
+    model = load_fish(fish or measured.fish)
+    comparison = _compare(console, measured, model, dt)
     print_comparison(console, comparison, every_run)
     if json_file is not None:
         json_file.parent.mkdir(parents=True, exist_ok=True)
@@ -58,6 +64,11 @@ def compare_dataset(
         console.print(f"numbers: {json_file}", soft_wrap=True)
     if out is not None:
         draw(console, comparison, out)
+    if replay is not None and isinstance(measured, Dataset):
+        from fish_env.commands.replay import replay_comparison
+
+        assert isinstance(comparison, RunsComparison)
+        replay_comparison(console, measured, comparison, model, dt, replay)
     return comparison
 
 

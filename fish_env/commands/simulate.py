@@ -8,6 +8,7 @@ from typing import TextIO
 
 import numpy as np
 import numpy.typing as npt
+from rich.console import Console
 
 from fish_env.commands.case import read_case
 from fish_env.errors import ScheduleError, missing_extra
@@ -19,7 +20,9 @@ COLUMNS = ("t", *POSE_COLUMNS)
 SUFFIXES = (".csv", ".parquet")
 
 
-def simulate_case(case_file: Path, dt: float, rate_hz: float, out: Path | None) -> None:
+def simulate_case(
+    case_file: Path, dt: float, rate_hz: float, out: Path | None, replay: Path | None = None
+) -> None:
     """Simulates a case and writes its motion, to standard output if no file is named.
 
     Args:
@@ -27,6 +30,7 @@ def simulate_case(case_file: Path, dt: float, rate_hz: float, out: Path | None) 
         dt: Longest physics step, s.
         rate_hz: Samples per second.
         out: `.csv` or `.parquet` file.
+        replay: HTML page that shows the fish swim.
 
     Raises:
         ScheduleError: The case or the output's ending is not as it should be.
@@ -37,6 +41,11 @@ def simulate_case(case_file: Path, dt: float, rate_hz: float, out: Path | None) 
     simulator = Simulator(case.fish, dt, case.effects)
     trajectory = simulator.run(case.commands, case.duration_s, case.initial, rate_hz)
     write_table(pose_table(trajectory), out)
+    if replay is not None:
+        from fish_env.commands.replay import replay_case
+
+        # Standard output may be the table.
+        replay_case(Console(stderr=True), case, dt, case_file.stem, replay)
 
 
 def pose_table(trajectory: Trajectory) -> FloatArray:

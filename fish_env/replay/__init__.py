@@ -1,0 +1,22 @@
+"""Replay: a page that opens offline, with fish swimming in three dimensions beside time plots."""
+
+from fish_env.replay.motion import (
+    Motion,
+    motion_from_channels,
+    motion_from_run,
+    motion_from_trajectory,
+)
+from fish_env.replay.page import component, component_scripts, component_style, write_replay
+from fish_env.replay.scene import Scene
+
+__all__ = [
+    "Motion",
+    "Scene",
+    "component",
+    "component_scripts",
+    "component_style",
+    "motion_from_channels",
+    "motion_from_run",
+    "motion_from_trajectory",
+    "write_replay",
+]

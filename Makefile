@@ -31,6 +31,7 @@ lint: setup  ## style, types and import direction
 docs: $(VENV)/.with-docs  ## write the generated pages, then the site into out/site
 	$(BIN)/python -m scripts.make_effects_page
 	$(BIN)/python -m scripts.make_environment_page
+	$(BIN)/python -m scripts.make_benchmarks_page
 	$(BIN)/python -m scripts.update_readme
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
 	@echo "Open out/site/index.html"

@@ -1,0 +1,62 @@
+"""Writes docs/benchmarks.md from the latest measurements.
+
+Run it as ``python -m scripts.make_benchmarks_page``.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = ROOT / "docs" / "benchmarks.md"
+SPEED = ROOT / "scripts" / "bench" / "results"
+DIAGNOSIS = ROOT / "results"
+
+HEAD = """\
+# Benchmarks
+
+Written by `make docs` from the latest measurements, as they are. Each says where and when it was
+measured; the command repeats it.
+"""
+SPEED_HEAD = """\
+## Speed
+
+`make bench` runs this simulator and others in one process, in turn.
+"""
+DIAGNOSIS_HEAD = """\
+## Diagnosis
+
+`make benchmark-diagnosis` hides effects, alone and in pairs, wrong coefficients, or nothing at all
+in made-up measurements, which another implementation of the physics computes, and counts what
+[the diagnosis](diagnosis.md) finds. Intervals are 95 % (Clopper-Pearson).
+"""
+
+
+def page(speed: Path = SPEED, diagnosis: Path = DIAGNOSIS) -> str:
+    """The page as Markdown."""
+    parts = [HEAD, SPEED_HEAD, _latest(speed, "speed"), DIAGNOSIS_HEAD]
+    return "\n".join([*parts, _latest(diagnosis, "diagnosis"), ""]).rstrip() + "\n"
+
+
+def _latest(folder: Path, name: str) -> str:
+    """The latest report of a folder, by the date in its name, its headings one level lower."""
+    reports = sorted(folder.glob(f"{name}-[0-9]*.md"))
+    if not reports:
+        return "No full run is published yet.\n"
+    return lowered(reports[-1].read_text(encoding="utf-8"))
+
+
+def lowered(text: str) -> str:
+    """Markdown with every heading two levels lower, and blank lines before lists."""
+    lines = re.sub(r"^(#+ )", r"##\1", text.strip(), flags=re.MULTILINE).splitlines()
+    spaced: list[str] = []
+    for line in lines:
+        begins_list = line.startswith("- ") and spaced and spaced[-1] and spaced[-1][0] != "-"
+        spaced += [""] * bool(begins_list) + [line]
+    return "\n".join(spaced) + "\n"
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")
+    print(f"written: {PAGE}")

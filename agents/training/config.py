@@ -188,6 +188,11 @@ class TrainConfig:
         _check(0 <= self.seed < 1_000_000, "seed: 0 to 999999")
         _check(1 <= self.num_envs <= MOST_FISH, f"num_envs: 1 to {MOST_FISH}")
         _check(min(self.total_steps, self.checkpoint_every) > 0, "steps must be positive")
+        rollout = self.ppo.n_steps * self.num_envs
+        _check(
+            self.algorithm != "ppo" or rollout % self.ppo.batch_size == 0,
+            f"ppo.batch_size must divide n_steps x num_envs, {rollout}",
+        )
         for key in ("task", *(("config",) if self.reward else ())):
             _check(key not in self.environment, f"environment.{key}: not together with {key}")
         known = inspect.signature(env_options).parameters

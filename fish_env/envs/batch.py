@@ -103,6 +103,11 @@ class FishBatch:
         self._bind()
 
     @property
+    def started(self) -> bool:
+        """Whether there has been a reset."""
+        return self._started
+
+    @property
     def results(self) -> list[float]:
         """Reward of fish 0, then its outputs: what a single environment reads after a step."""
         last = self._rows.ROW_OUTPUT + len(OUTPUTS)

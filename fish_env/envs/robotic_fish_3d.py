@@ -15,8 +15,10 @@ from fish_env.effects.extended import EffectValues
 from fish_env.envs.batch import FishBatch
 from fish_env.envs.layout import OBSERVATION, OBSERVATION_LIMIT, OUTPUTS
 from fish_env.envs.options import env_options
+from fish_env.envs.viewing import Frame, Viewer
 from fish_env.errors import ConfigError
 from fish_env.params.schema import FishParams
+from fish_env.rendering import Scene, Setting
 
 FAILURE = OUTPUTS.index("failure")
 ACTION_SHAPE = (5,)
@@ -28,16 +30,6 @@ ONE = np.zeros(1, np.int64)
 def action_space() -> Box[np.float32]:
     """Five actuators, -1 to 1."""
     return Box(-1.0, 1.0, ACTION_SHAPE, np.float32)
-
-
-def check_render_mode(render_mode: str | None) -> None:
-    """Refuse a picture that nobody draws.
-
-    Raises:
-        ConfigError: any mode but None.
-    """
-    if render_mode is not None:
-        raise ConfigError(f"render_mode '{render_mode}': nothing is drawn yet, leave it out (None)")
 
 
 def observation_space() -> Box[np.float32]:
@@ -138,7 +130,8 @@ class RoboticFish3DEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]
         fish: name of a shipped fish, path of a parameter file (extended models included), or
             parameters. What a file says of measurements (sensor delays, biases) belongs to the
             recordings it was fitted to and does not act here.
-        render_mode: None; there is no rendering yet.
+        render_mode: None, ``"rgb_array"`` (``render`` returns pictures, no screen is needed) or
+            ``"human"`` (a window that runs in real time). Both need the extra ``render``.
         config: YAML file or mapping that changes configs/env/robotic-fish-3d.yaml.
         control_hz: actions a second.
         physics_hz: physics steps a second, a whole multiple of ``control_hz``.
@@ -153,12 +146,16 @@ class RoboticFish3DEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]
         action_delay_s: time until an action reaches the actuators (s).
         randomization: parameters drawn in each episode: ``"prior"``, ``"posterior"``, or
             path -> ``{"relative": sd}``, ``{"sd": sd}`` or ``[low, high]``.
+        render_size: width and height of a picture (pixels).
 
     Raises:
         ConfigError, ParameterError, EffectError: saying what to change.
     """
 
-    metadata: dict[str, Any] = {"render_modes": [], "render_fps": 10}  # noqa: RUF012
+    metadata: dict[str, Any] = {  # noqa: RUF012
+        "render_modes": ["human", "rgb_array"],
+        "render_fps": 10,
+    }
 
     def __init__(
         self,
@@ -177,8 +174,8 @@ class RoboticFish3DEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]
         observation_delay_s: float = 0.0,
         action_delay_s: float = 0.0,
         randomization: str | Mapping[str, Any] | None = None,
+        render_size: tuple[int, int] = (640, 480),
     ) -> None:
-        check_render_mode(render_mode)
         self.render_mode = render_mode
         self.options = env_options(
             task,
@@ -199,6 +196,8 @@ class RoboticFish3DEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]
         self.action_space = action_space()
         self.observation_space = observation_space()
         self._batch = FishBatch(self.options, 1)
+        modes = self.metadata["render_modes"]
+        self._viewer = Viewer(self.options, render_mode, modes, render_size)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -210,6 +209,7 @@ class RoboticFish3DEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]
         _, *outputs = batch.results
         info = dict(zip(OUTPUTS, outputs, strict=True))
         info |= {PARAMETER + path: float(value[0]) for path, value in batch.drawn.items()}
+        self._viewer.after_step(batch)
         return batch.obs[0].copy(), info
 
     def step(
@@ -226,6 +226,7 @@ class RoboticFish3DEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]
         batch.step(action)
         reward, *outputs = batch.results
         info = dict(zip(OUTPUTS, outputs, strict=True))
+        self._viewer.after_step(batch)
         return batch.obs[0].copy(), reward, info["failure"] > 0, False, info
 
     @property
@@ -238,3 +239,39 @@ class RoboticFish3DEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]
     def actuators(self) -> npt.NDArray[np.float64]:
         """(5,) actuator positions (rad, rad, Hz, m, rad)."""
         return self._batch.inputs[:, 0].copy()
+
+    def render(self) -> Frame | None:
+        """A picture (height, width, 3), uint8, in mode "rgb_array"; else nothing.
+
+        The window of mode "human" shows every step by itself.
+
+        Raises:
+            ConfigError: before the first reset.
+        """
+        if self._viewer.mode == "rgb_array":
+            return self._viewer.frames(self._batch)[0]
+        return None
+
+    def close(self) -> None:
+        """Close the window, if there is one; may be called again."""
+        self._viewer.close()
+
+    @property
+    def window_open(self) -> bool:
+        """Whether there is a window and nobody has closed it; steps go on without it."""
+        return self._viewer.is_open
+
+    @property
+    def setting(self) -> Setting:
+        """What surrounds the fish in pictures: its shape, the tank, the actuators' ranges."""
+        return self._viewer.setting
+
+    def scene(self) -> Scene:
+        """The fish as it is now, to be drawn by :mod:`fish_env.rendering` at any time.
+
+        Its wake is kept if there is a ``render_mode``.
+
+        Raises:
+            ConfigError: before the first reset.
+        """
+        return self._viewer.scene(self._batch)

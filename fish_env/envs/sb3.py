@@ -82,7 +82,12 @@ class FishVecEnv(VecEnv):
         return [None if seed is None else seed + i for i in range(self.num_envs)]
 
     def close(self) -> None:
-        """Nothing to release."""
+        """Close the window, if there is one."""
+        self.env.close()
+
+    def get_images(self) -> Sequence[np.ndarray | None]:
+        """A picture of every fish, which SB3 puts together; needs ``render_mode="rgb_array"``."""
+        return list(self.env.render() or ())
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """An attribute of the vector environment, once for each fish asked for."""

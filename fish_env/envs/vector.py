@@ -18,10 +18,11 @@ from fish_env.envs.robotic_fish_3d import (
     FAILURE,
     PARAMETER,
     action_space,
-    check_render_mode,
     observation_space,
 )
+from fish_env.envs.viewing import Frame, Viewer
 from fish_env.errors import ConfigError
+from fish_env.rendering import Scene, Setting
 
 BoolArray = npt.NDArray[np.bool_]
 FloatArray = npt.NDArray[np.float64]
@@ -44,12 +45,16 @@ class RoboticFish3DVectorEnv(VectorEnv[Float32Array, Float32Array, npt.NDArray[A
             ``info["final_info"]``; DISABLED: the caller resets with
             ``options={"reset_mask": mask}``.
         threads: threads for a step; default: all cores of this process.
-        render_mode: None.
+        render_mode: None, ``"rgb_array"`` (a picture of every fish, as Gymnasium's wrappers for
+            videos expect), ``"mosaic"`` (one picture of the first fish side by side) or
+            ``"human"`` (a window with that mosaic).
+        render_count: how many fish a mosaic and a window show.
+        render_size: width and height (pixels) of the picture of one fish, or of the mosaic.
         **kwargs: as for :class:`RoboticFish3DEnv`.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012
-        "render_modes": [],
+        "render_modes": ["human", "rgb_array", "mosaic"],
         "render_fps": 10,
         "autoreset_mode": AutoresetMode.NEXT_STEP,
     }
@@ -61,6 +66,8 @@ class RoboticFish3DVectorEnv(VectorEnv[Float32Array, Float32Array, npt.NDArray[A
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int | None = None,
         render_mode: str | None = None,
+        render_count: int = 9,
+        render_size: tuple[int, int] = (640, 480),
         **kwargs: Any,
     ) -> None:
         if num_envs < 1 or max_episode_steps < 1:
@@ -68,7 +75,8 @@ class RoboticFish3DVectorEnv(VectorEnv[Float32Array, Float32Array, npt.NDArray[A
         self.num_envs = num_envs
         self.max_episode_steps = max_episode_steps
         self.autoreset_mode = AutoresetMode(autoreset_mode)
-        check_render_mode(render_mode)
+        if render_count < 1:
+            raise ConfigError(f"render_count {render_count}: at least 1")
         self.render_mode = render_mode
         self.options = env_options(**kwargs)
         self.metadata = {
@@ -81,6 +89,9 @@ class RoboticFish3DVectorEnv(VectorEnv[Float32Array, Float32Array, npt.NDArray[A
         self.action_space = batch_space(self.single_action_space, num_envs)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.batch = FishBatch(self.options, num_envs, threads)
+        shown = num_envs if render_mode == "rgb_array" else min(render_count, num_envs)
+        modes = self.metadata["render_modes"]
+        self._viewer = Viewer(self.options, render_mode, modes, render_size, shown)
         self._rngs: list[np.random.Generator] = []
         self._steps = np.zeros(num_envs, np.int64)
         self._ended = np.zeros(num_envs, bool)
@@ -104,6 +115,7 @@ class RoboticFish3DVectorEnv(VectorEnv[Float32Array, Float32Array, npt.NDArray[A
         lanes = self._all if mask is None else self._masked(mask)
         self._seed(seed, lanes)
         self._restart(lanes, given)
+        self._viewer.after_step(self.batch)
         fresh = np.isin(self._all, lanes)
         return self.batch.obs.copy(), self._infos(fresh) | self._drawn(fresh)
 
@@ -133,8 +145,42 @@ class RoboticFish3DVectorEnv(VectorEnv[Float32Array, Float32Array, npt.NDArray[A
         if mode is AutoresetMode.SAME_STEP and self._ended.any():
             fresh = self._ended.copy()
             final = self._finish(fresh)
+        self._viewer.after_step(batch)
         infos = self._infos(np.ones(self.num_envs, bool)) | self._drawn(fresh) | final
         return batch.obs.copy(), reward, terminated, truncated, infos
+
+    def render(self) -> tuple[Frame, ...] | Frame | None:  # type: ignore[override]
+        """Pictures (height, width, 3), uint8.
+
+        Mode "rgb_array" gives one of each fish, "mosaic" one of the first fish side by side; the
+        window of mode "human" shows every step by itself.
+
+        Raises:
+            ConfigError: before the first reset.
+        """
+        if self.render_mode == "rgb_array":
+            return tuple(self._viewer.frames(self.batch))
+        if self.render_mode == "mosaic":
+            return self._viewer.mosaic(self.batch)
+        return None
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Close the window, if there is one."""
+        self._viewer.close()
+
+    @property
+    def window_open(self) -> bool:
+        """Whether there is a window and nobody has closed it; steps go on without it."""
+        return self._viewer.is_open
+
+    @property
+    def setting(self) -> Setting:
+        """What surrounds the fish in pictures."""
+        return self._viewer.setting
+
+    def scene(self, fish: int = 0) -> Scene:
+        """One fish as it is now, to be drawn by :mod:`fish_env.rendering` at any time."""
+        return self._viewer.scene(self.batch, fish)
 
     def _check_step(self, shape: tuple[int, ...]) -> None:
         if shape != self.action_space.shape:

@@ -59,8 +59,10 @@ def test_unknown_keywords_and_pictures_are_refused(make):
     """Nothing that a user asks for is dropped in silence."""
     with pytest.raises(TypeError, match="curent"):
         make(curent=(0.1, 0, 0))
-    with pytest.raises(ConfigError, match="render_mode 'human'"):
-        make(render_mode="human")
+    with pytest.raises(ConfigError, match="render_mode 'ansi': choose None or one of human"):
+        make(render_mode="ansi")
+    with pytest.raises(ConfigError, match="render_size"):
+        make(render_size=(0, 480))
 
 
 def test_noise_groups_and_sensors():

@@ -1,0 +1,192 @@
+"""A picture to draw on: faces, lines and discs of the water, seen by a camera through haze."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pygame
+
+from fish_env.rendering.camera import NEAR, Camera
+from fish_env.rendering.light import clearness, hazed, lit, water_colour
+from fish_env.rendering.mesh import OPAQUE, Mesh
+
+FloatArray = npt.NDArray[np.float64]
+Colour = tuple[int, int, int]
+LARGEST = 20000.0
+"""Pixels beyond which a corner is held back: the drawing library counts in small integers."""
+
+
+class Canvas:
+    """What the camera sees, drawn larger than shown so that edges come out smooth.
+
+    Attributes:
+        surface: the picture.
+        camera: where it is taken from.
+        unit: how many pixels of the picture make one that is shown.
+    """
+
+    def __init__(self, surface: pygame.Surface, camera: Camera, unit: float) -> None:
+        self.surface = surface
+        self.camera = camera
+        self.unit = unit
+
+    def mesh(self, mesh: Mesh) -> None:
+        """Draw the faces of a mesh that look at the eye, the farthest first."""
+        eye = self.camera.eye
+        middles, normals = mesh.middles, mesh.normals
+        facing = np.einsum("ij,ij->i", normals, eye - middles) > 0.0
+        facing &= self.camera.seen(mesh.corners)[..., 0].min(axis=1) > NEAR
+        if not facing.any():
+            return
+        seen, middles = mesh.chosen(facing), middles[facing]
+        colours = hazed(lit(seen.colours, middles, normals[facing], eye), middles, eye)
+        pixels, ahead = self.camera.project(seen.corners)
+        order = np.argsort(-ahead.mean(axis=1), kind="stable")
+        rows = np.column_stack([colours, seen.alphas])[order]
+        if rows[:, 3].min() >= OPAQUE:
+            _fill(self.surface, pixels[order], rows)
+        else:
+            self._glaze(pixels[order], rows)
+
+    def _glaze(self, pixels: FloatArray, rows: FloatArray) -> None:
+        """Faces that something shows through: they do not overlap, so one layer holds them."""
+        layer, low = self._layer(pixels.reshape(-1, 2))
+        if layer is not None:
+            _fill(layer, pixels - low, rows)
+            self.surface.blit(layer, low.tolist())
+
+    def _layer(self, pixels: FloatArray) -> tuple[pygame.Surface | None, npt.NDArray[np.int64]]:
+        """A clear layer around pixels (n, 2) as far as they are in the picture, and its corner."""
+        size = self.surface.get_size()
+        low = np.clip(np.floor(pixels.min(axis=0)) - 1, 0, size).astype(int)
+        high = np.clip(np.ceil(pixels.max(axis=0)) + 2, 0, size).astype(int)
+        if np.any(high <= low):
+            return None, low
+        return pygame.Surface((high - low).tolist(), pygame.SRCALPHA), low
+
+    def polygon(self, points: FloatArray, colour: npt.ArrayLike) -> None:
+        """A flat polygon (n, 3) in a colour as seen, without light or haze."""
+        pixels, ahead = self.camera.project(points)
+        if ahead.min() > NEAR:
+            pygame.draw.polygon(self.surface, _whole(np.asarray(colour)), _held(pixels).tolist())
+
+    def lines(
+        self,
+        starts: FloatArray,
+        ends: FloatArray,
+        colours: FloatArray,
+        widths: FloatArray,
+        ground: npt.ArrayLike | None = None,
+    ) -> None:
+        """Straight lines in the water.
+
+        Args:
+            starts: (n, 3) (m).
+            ends: (n, 3) (m).
+            colours: (n, 3), or (n, 4) with the strength that is left of them, 0 to 1.
+            widths: (n,) (m); at least a pixel is drawn.
+            ground: (3,) colour that faint lines fade to; None: that of the water.
+        """
+        if not len(starts):
+            return
+        starts, ends, kept = self._clipped(starts, ends)
+        if not kept.any():
+            return
+        middles = 0.5 * (starts + ends)[kept]
+        mixed = self.faded(colours[kept], middles, ground)
+        (first, near), (last, _) = (self.camera.project(points[kept]) for points in (starts, ends))
+        pixels = self.camera.scale * widths[kept] / near
+        thick = np.maximum(np.rint(pixels), max(1.0, round(0.7 * self.unit))).astype(int)
+        line, surface = pygame.draw.line, self.surface
+        pairs = zip(_whole(mixed), first.tolist(), last.tolist(), thick.tolist(), strict=True)
+        for colour, a, b, width in pairs:
+            line(surface, colour, a, b, width)
+
+    def faded(
+        self, colours: FloatArray, points: FloatArray, ground: npt.ArrayLike | None = None
+    ) -> FloatArray:
+        """Colours (n, 3) at points seen through haze; a fourth column (n, 4) thins them."""
+        eye = self.camera.eye
+        if colours.shape[1] == 3:
+            return hazed(colours, points, eye)
+        own, left = colours[:, :3], colours[:, 3:]
+        if ground is not None:
+            return hazed(left * own + (1.0 - left) * np.asarray(ground), points, eye)
+        ray = points - eye
+        down = ray[:, 2] / np.linalg.norm(ray, axis=1)
+        return left * hazed(own, points, eye) + (1.0 - left) * water_colour(down)
+
+    def _clipped(
+        self, starts: FloatArray, ends: FloatArray
+    ) -> tuple[FloatArray, FloatArray, npt.NDArray[np.bool_]]:
+        """Lines cut off where they come too near to the eye, and which are left."""
+        ahead = [self.camera.seen(points)[:, 0] for points in (starts, ends)]
+        kept = np.maximum(*ahead) > NEAR
+        span = np.where(np.abs(ahead[1] - ahead[0]) > 1e-9, ahead[1] - ahead[0], 1.0)
+        share = ((NEAR - ahead[0]) / span)[:, None]
+        cut = starts + share * (ends - starts)
+        first = np.where((ahead[0] < NEAR)[:, None], cut, starts)
+        last = np.where((ahead[1] < NEAR)[:, None], cut, ends)
+        return first, last, kept
+
+    def discs(self, points: FloatArray, radii: FloatArray, colours: FloatArray) -> None:
+        """Small round things (n, 3) with radii (n,) (m) and colours (n, 3 or 4)."""
+        pixels, ahead = self.camera.project(points)
+        width, height = self.surface.get_size()
+        inside = (ahead > 3.0 * NEAR) & np.all((pixels > 0) & (pixels < (width, height)), axis=1)
+        size = self.camera.scale * radii[inside] / ahead[inside]
+        mixed = self.faded(colours[inside], points[inside])
+        circle, surface = pygame.draw.circle, self.surface
+        for colour, at, radius in zip(
+            _whole(mixed), pixels[inside].tolist(), size.tolist(), strict=True
+        ):
+            circle(surface, colour, at, max(radius, 0.6 * self.unit))
+
+    def sheet(self, outline: FloatArray, colour: Colour, alpha: float) -> None:
+        """A flat outline (n, 3) filled with a colour that lets things through (alpha 0 to 1)."""
+        corners = self._in_front(outline)
+        if len(corners) < 3:
+            return
+        pixels, _ = self.camera.project(corners)
+        layer, low = self._layer(_held(pixels))
+        if layer is None:
+            return
+        distance = float(np.linalg.norm(corners.mean(axis=0) - self.camera.eye))
+        strength = round(255 * alpha * float(clearness(0.5 * distance)))
+        pygame.draw.polygon(layer, (*colour, strength), (_held(pixels) - low).tolist())
+        self.surface.blit(layer, low.tolist())
+
+    def _in_front(self, outline: FloatArray) -> FloatArray:
+        """The outline without what is behind the eye (Sutherland and Hodgman)."""
+        ahead = self.camera.seen(outline)[:, 0] - 1.01 * NEAR
+        if ahead.min() > 0.0:
+            return outline
+        kept: list[FloatArray] = []
+        for i in range(len(outline)):
+            j = (i + 1) % len(outline)
+            if ahead[i] > 0.0:
+                kept.append(outline[i])
+            if (ahead[i] > 0.0) != (ahead[j] > 0.0):
+                share = ahead[i] / (ahead[i] - ahead[j])
+                kept.append(outline[i] + share * (outline[j] - outline[i]))
+        return np.array(kept).reshape(-1, 3)
+
+
+def _fill(surface: pygame.Surface, pixels: FloatArray, rows: FloatArray) -> None:
+    """Fill four-cornered faces (n, 4, 2) with colours and alphas (n, 4)."""
+    polygon = pygame.draw.polygon
+    # Columns: a list for each face would keep the garbage collector busy.
+    columns = (*_whole(rows.T), *_held(pixels).reshape(-1, 8).T.tolist())
+    for red, green, blue, alpha, ax, ay, bx, by, cx, cy, dx, dy in zip(*columns, strict=True):
+        polygon(surface, (red, green, blue, alpha), ((ax, ay), (bx, by), (cx, cy), (dx, dy)))
+
+
+def _whole(colours: FloatArray) -> list[Any]:
+    rows: list[Any] = np.clip(colours, 0.0, 255.0).astype(int).tolist()
+    return rows
+
+
+def _held(pixels: FloatArray) -> FloatArray:
+    return np.clip(pixels, -LARGEST, LARGEST)

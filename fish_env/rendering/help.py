@@ -1,0 +1,37 @@
+"""What the keys and the mouse do, over the picture of a window."""
+
+from __future__ import annotations
+
+import pygame
+
+from fish_env.rendering.gauges import INK, panel
+from fish_env.rendering.light import GOAL
+from fish_env.rendering.type import write
+
+KEYS = (
+    ("drag, arrows", "turn the camera"),
+    ("wheel, + −", "nearer, farther"),
+    ("space", "pause, go on"),
+    (".", "one step"),
+    ("R", "first view"),
+    ("H", "this help"),
+    ("Esc, Q", "close the window"),
+)
+ROW, WIDTH = 20, 270
+
+
+def draw_help(surface: pygame.Surface, whole: bool) -> None:
+    """The list of keys, or only that the picture is paused."""
+    width, height = surface.get_size()
+    if not whole:
+        panel(surface, (width / 2 - 118, 6, 236, 22), 7)
+        write(surface, "paused: space goes on, H helps", (width / 2, 17), 12, INK, "middle")
+        return
+    unit = min(1.0, width / (WIDTH + 20), height / (ROW * (len(KEYS) + 1)))
+    row, wide = ROW * unit, WIDTH * unit
+    x, y = (width - wide) / 2, (height - row * (len(KEYS) + 0.8)) / 2
+    panel(surface, (x, y, wide, row * (len(KEYS) + 0.8)), 8)
+    for i, (key, what) in enumerate(KEYS):
+        middle = y + (i + 0.9) * row
+        write(surface, key, (x + 14 * unit, middle), max(8, round(12 * unit)), GOAL)
+        write(surface, what, (x + 120 * unit, middle), max(8, round(12 * unit)), INK)

@@ -1,0 +1,107 @@
+"""What is drawn to be read: the goal's depth and heading, the way the fish came, its shadow."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from fish_env.rendering.canvas import Canvas
+from fish_env.rendering.light import FISH, GOAL
+from fish_env.rendering.scene import Goal, Scene, Tank
+
+FloatArray = npt.NDArray[np.float64]
+PLANE_HALF_M, PLANE_STEP_M = 0.5, 0.125
+WAKE_S_SHOWN = 300
+FAINTEST = 0.10
+
+
+def draw_goal_plane(canvas: Canvas, scene: Scene, goal: Goal) -> None:
+    """A level square at the goal's depth around the fish, with a grid that stands still."""
+    north, east = scene.position[:2]
+    corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * PLANE_HALF_M + (north, east)
+    canvas.sheet(np.column_stack([corners, np.full(4, goal.depth)]), GOAL, 0.14)
+    steps = np.arange(-PLANE_HALF_M, PLANE_HALF_M + 1e-9, PLANE_STEP_M)
+    starts, ends = [], []
+    for axis in (0, 1):
+        middle = scene.position[axis]
+        inside = np.round(middle / PLANE_STEP_M) * PLANE_STEP_M + steps
+        inside = inside[np.abs(inside - middle) < PLANE_HALF_M]
+        for value in [middle - PLANE_HALF_M, *inside, middle + PLANE_HALF_M]:
+            line = np.full((2, 3), goal.depth)
+            line[:, axis] = value
+            line[:, 1 - axis] = scene.position[1 - axis] + np.array([-1.0, 1.0]) * PLANE_HALF_M
+            starts.append(line[0])
+            ends.append(line[1])
+    colours = np.tile(0.75 * np.array(GOAL), (len(starts), 1))
+    canvas.lines(np.array(starts), np.array(ends), colours, np.full(len(starts), 0.0008))
+
+
+def draw_goal_heading(canvas: Canvas, scene: Scene, goal: Goal, length: float) -> None:
+    """An arrow in the plane of the goal that points where the fish is to head."""
+    ahead = np.array([np.cos(goal.heading), np.sin(goal.heading)])
+    aside = np.array([-ahead[1], ahead[0]])
+    start, neck, tip = 0.75 * length, 1.75 * length, 2.15 * length
+    shaft, head = 0.045 * length, 0.16 * length
+    outline = [
+        (start, -shaft),
+        (neck, -shaft),
+        (neck, -head),
+        (tip, 0.0),
+        (neck, head),
+        (neck, shaft),
+        (start, shaft),
+    ]
+    flat = scene.position[:2] + np.array([x * ahead + y * aside for x, y in outline])
+    points = np.column_stack([flat, np.full(len(flat), goal.depth)])
+    canvas.sheet(points, GOAL, 0.95)
+    canvas.lines(
+        points, np.roll(points, -1, axis=0), np.tile([20.0, 90.0, 70.0], (7, 1)), np.full(7, 0.002)
+    )
+
+
+def draw_plumb_line(canvas: Canvas, scene: Scene, goal: Goal) -> None:
+    """Dashes straight from the fish to the plane of its goal."""
+    count = int(min(60, abs(goal.depth - scene.position[2]) / 0.02)) // 2 * 2
+    if count < 2:
+        return
+    depths = np.linspace(scene.position[2], goal.depth, count + 1)
+    points = np.column_stack([np.tile(scene.position[:2], (count + 1, 1)), depths])
+    colours = np.tile([*GOAL, 0.8], (count // 2, 1))
+    canvas.lines(points[0:-1:2], points[1::2], colours, np.full(count // 2, 0.003))
+
+
+def wake_points(scene: Scene, stern: FloatArray) -> FloatArray:
+    """(n, 3) the way the fish came, to its stern; the last positions under the fish left out."""
+    past = scene.wake[-WAKE_S_SHOWN:]
+    if not len(past):
+        return past
+    gap = np.linalg.norm(stern - scene.position)
+    past = past[np.linalg.norm(past - scene.position, axis=1) > gap]
+    return np.vstack([past, stern]) if len(past) else past
+
+
+def draw_wake(canvas: Canvas, points: FloatArray, which: npt.NDArray[np.bool_]) -> None:
+    """The way the fish came, fading with age; ``which`` (n - 1,) of its pieces."""
+    if not which.any():
+        return
+    share = np.linspace(FAINTEST, 1.0, len(points) - 1)[which]
+    colours = np.column_stack(
+        [np.tile(np.array(FISH) * 0.6 + 100.0, (len(share), 1)), 0.85 * share]
+    )
+    canvas.lines(points[:-1][which], points[1:][which], colours, 0.003 + 0.006 * share)
+
+
+def draw_shadow(canvas: Canvas, outline: FloatArray, tank: Tank) -> None:
+    """A soft shadow of the fish on the floor; the higher it swims, the larger and fainter.
+
+    Args:
+        canvas: what is drawn on.
+        outline: (n, 3) points around the fish seen from above, in order (m).
+        tank: whose floor.
+    """
+    height = max(0.0, tank.bottom - float(outline[:, 2].mean()))
+    flat = outline.copy()
+    flat[:, 2] = tank.bottom
+    middle = flat.mean(axis=0)
+    for size in (1.0 + 0.9 * height, 1.0 + 0.5 * height, 1.0 + 0.15 * height, 0.8):
+        canvas.sheet(middle + size * (flat - middle), (16, 30, 34), 0.22 / (1.0 + 1.2 * height))

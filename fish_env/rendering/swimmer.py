@@ -1,0 +1,120 @@
+"""The fish of a scene with the way it came, in the order in which its parts cover each other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fish_env.rendering import markers
+from fish_env.rendering.body import EYE, PUPIL, Fish, eyes
+from fish_env.rendering.canvas import Canvas
+from fish_env.rendering.light import hazed
+from fish_env.rendering.mesh import Mesh, attitude
+from fish_env.rendering.scene import Scene
+from fish_env.rendering.shape import hull_profile
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+CIRCLE = np.linspace(0.0, 2.0 * np.pi, 17)[:-1]
+
+
+@dataclass(frozen=True)
+class Side:
+    """What lies above or below a depth."""
+
+    depth: float
+    above: bool
+
+    def holds(self, points: FloatArray) -> BoolArray:
+        """Which of the points (n, 3) lie on this side; (n,)."""
+        return np.asarray((points[:, 2] < self.depth) == self.above)
+
+    @property
+    def other(self) -> Side:
+        """The rest of the water."""
+        return Side(self.depth, not self.above)
+
+
+class Swimmer:
+    """One fish, placed where a scene has it.
+
+    Attributes:
+        scene: the moment.
+        rotation: (3, 3) takes body vectors to the inertial frame.
+    """
+
+    def __init__(self, canvas: Canvas, fish: Fish, scene: Scene) -> None:
+        self.canvas = canvas
+        self.scene = scene
+        self.shape = fish.shape
+        self.rotation = attitude(scene.quaternion)
+        self.eye = self.rotation.T @ (canvas.camera.eye - scene.position)
+        behind, before = self._outer_parts(fish)
+        block = fish.block(float(scene.actuators[3]), float(scene.actuators[4]))
+        hull = [fish.lining, fish.inside, block, fish.window, fish.hull]
+        self._before = [self._placed(mesh) for mesh in before]
+        self._behind = [self._placed(mesh) for mesh in (*behind, *hull)]
+        stern = self.at(np.array(self.shape.tail_root) - (0.6 * self.shape.tail_length, 0.0, 0.0))
+        self._wake = markers.wake_points(scene, stern)
+
+    def at(self, body: FloatArray) -> FloatArray:
+        """Inertial points (..., 3) of body points."""
+        return np.asarray(body @ self.rotation.T + self.scene.position)
+
+    def _placed(self, mesh: Mesh) -> Mesh:
+        return mesh.placed(self.rotation, self.scene.position)
+
+    def _outer_parts(self, fish: Fish) -> tuple[list[Mesh], list[Mesh]]:
+        """Tail and fins: those that the hull may cover, and those that may cover it."""
+        behind: list[Mesh] = []
+        before: list[Mesh] = []
+        for mesh, foot, outward in fish.fins:
+            (before if (self.eye - foot) @ outward > 0.0 else behind).append(mesh)
+        tail_in_front = self.eye[0] < self.shape.tail_root[0]
+        (before if tail_in_front else behind).append(fish.swung_tail(self.scene.tail_angle))
+        return behind, before
+
+    def draw(self, side: Side | None = None) -> None:
+        """Draw all, or what of it lies on one side of a depth."""
+        middles = 0.5 * (self._wake[1:] + self._wake[:-1])
+        camera = self.canvas.camera
+        farther = camera.seen(middles)[:, 0] > camera.seen(self.scene.position)[0]
+        chosen = np.ones(len(middles), bool) if side is None else side.holds(middles)
+        markers.draw_wake(self.canvas, self._wake, chosen & farther)
+        for mesh in self._behind:
+            self._draw(mesh, side)
+        self._draw_eyes(side)
+        for mesh in self._before:
+            self._draw(mesh, side)
+        markers.draw_wake(self.canvas, self._wake, chosen & ~farther)
+
+    def _draw(self, mesh: Mesh, side: Side | None) -> None:
+        if side is None:
+            self.canvas.mesh(mesh)
+            return
+        chosen = side.holds(mesh.middles)
+        if chosen.any():
+            self.canvas.mesh(mesh if chosen.all() else mesh.chosen(chosen))
+
+    def _draw_eyes(self, side: Side | None) -> None:
+        circle = np.stack([np.cos(CIRCLE), np.sin(CIRCLE)], axis=1)
+        for middle, outward, axes in eyes(self.shape):
+            at = self.at(middle)
+            if (self.eye - middle) @ outward < 0.0 or (side and not side.holds(at[None])[0]):
+                continue
+            for colour, size in ((EYE, 1.0), (PUPIL, 0.62)):
+                shade = hazed(colour, at, self.canvas.camera.eye)
+                self.canvas.polygon(self.at(middle + size * circle @ axes), shade)
+
+    def outline(self) -> FloatArray:
+        """(n, 3) points around the hull and the tail, at their widest (m, inertial)."""
+        along = np.linspace(0.0, 1.0, 14)
+        half = 0.5 * self.shape.width * hull_profile(along)
+        x = self.shape.nose - along * self.shape.length
+        port = np.column_stack([x, -half, np.zeros_like(x)])
+        starboard = np.column_stack([x, half, np.zeros_like(x)])[::-1]
+        angle = self.scene.tail_angle
+        fin = self.shape.tail_length * np.array([np.cos(angle), np.sin(angle), 0.0])
+        return self.at(np.vstack([port, np.array(self.shape.tail_root) - fin, starboard]))

@@ -1,0 +1,67 @@
+"""Films of scenes, through the ffmpeg that comes with imageio-ffmpeg."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from fish_env.errors import ConfigError, missing_extra
+from fish_env.rendering.scene import Scene, Setting, between
+from fish_env.rendering.view import View
+
+QUALITY = 7
+"""Of imageio-ffmpeg, 0 to 10."""
+
+
+def write(
+    path: Path,
+    scenes: Sequence[Scene],
+    setting: Setting,
+    fps: float,
+    size: tuple[int, int],
+    report: Callable[[], object],
+) -> Path:
+    """As :func:`fish_env.rendering.write_video`."""
+    try:
+        from imageio_ffmpeg import write_frames
+    except ImportError:
+        raise missing_extra("Writing a video", "imageio-ffmpeg", "render") from None
+    if size[0] % 2 or size[1] % 2:
+        raise ConfigError(f"a video of {size[0]} x {size[1]} pixels: both must be even")
+    moments = in_between(scenes, fps)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    view = View(setting, size)
+    writer = write_frames(str(path), size, fps=fps, quality=QUALITY, macro_block_size=2)
+    writer.send(None)
+    try:
+        for scene in moments:
+            writer.send(view.frame(scene))
+            report()
+    finally:
+        writer.close()
+    return path
+
+
+def in_between(scenes: Sequence[Scene], fps: float) -> Iterator[Scene]:
+    """Scenes ``fps`` times a second, from the first to the last.
+
+    Raises:
+        ConfigError: fewer than two scenes, times that do not increase, or no frame rate.
+    """
+    times = np.array([scene.time_s for scene in scenes])
+    if len(times) < 2 or np.any(np.diff(times) <= 0.0):
+        raise ConfigError("a video needs at least two scenes whose times increase")
+    if not 0.0 < fps <= 240.0:
+        raise ConfigError(f"fps = {fps}: choose a frame rate up to 240")
+    return _moments(scenes, times, fps)
+
+
+def _moments(scenes: Sequence[Scene], times: np.ndarray, fps: float) -> Iterator[Scene]:
+    count = int(np.floor((times[-1] - times[0]) * fps + 1e-9)) + 1
+    for moment in times[0] + np.arange(count) / fps:
+        after = int(np.clip(np.searchsorted(times, moment), 1, len(times) - 1))
+        first, last = scenes[after - 1], scenes[after]
+        share = (moment - first.time_s) / (last.time_s - first.time_s)
+        yield between(first, last, float(np.clip(share, 0.0, 1.0)))

@@ -1,0 +1,84 @@
+"""From a scene to a picture."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+import pygame
+
+from fish_env.rendering import markers, surroundings
+from fish_env.rendering.body import Fish
+from fish_env.rendering.camera import Follower
+from fish_env.rendering.canvas import Canvas
+from fish_env.rendering.instruments import Instruments
+from fish_env.rendering.scene import Scene, Setting
+from fish_env.rendering.swimmer import Side, Swimmer
+from fish_env.rendering.water import paint
+
+Frame = npt.NDArray[np.uint8]
+SIZE = (640, 480)
+FULL_SAMPLING = 1_000_000
+"""Pixels up to which a picture is drawn at twice its size; a larger one is smooth enough."""
+
+
+class View:
+    """Draws scenes of one fish, its camera following smoothly from scene to scene.
+
+    Args:
+        setting: the fish's shape and its tank.
+        size: width and height of the pictures (pixels).
+        instruments: whether to draw gauges over the picture.
+    """
+
+    def __init__(
+        self, setting: Setting, size: tuple[int, int] = SIZE, instruments: bool = True
+    ) -> None:
+        self.setting = setting
+        self.fish = Fish.built(setting.shape)
+        self.follower = Follower(setting.shape.length + setting.shape.tail_length)
+        self.instruments = Instruments(setting) if instruments else None
+        self.size = size
+
+    def frame(self, scene: Scene) -> Frame:
+        """The picture of a scene: (height, width, 3), uint8."""
+        pixels = np.frombuffer(pygame.image.tobytes(self.surface(scene), "RGB"), np.uint8)
+        return pixels.reshape(self.size[1], self.size[0], 3).copy()
+
+    def surface(self, scene: Scene) -> pygame.Surface:
+        """The picture of a scene as a surface of the drawing library."""
+        self.follower.follow(scene.time_s, scene.position, float(scene.euler[2]))
+        shown = self._water_and_fish(scene)
+        if self.instruments is not None:
+            self.instruments.draw(shown, scene)
+        return shown
+
+    def _water_and_fish(self, scene: Scene) -> pygame.Surface:
+        width, height = self.size
+        unit = 2 if width * height <= FULL_SAMPLING else 1
+        large = (unit * width, unit * height)
+        tank = self.setting.tank
+        camera = self.follower.camera(large, tank.top, tank.bottom)
+        coarse = (max(2, width // 2), max(2, height // 2))
+        water = paint(camera, coarse, scene.time_s, tank.top, tank.bottom)
+        canvas = Canvas(pygame.transform.smoothscale(water, large), camera, unit)
+        self._draw(canvas, scene)
+        return (
+            pygame.transform.smoothscale(canvas.surface, self.size) if unit > 1 else canvas.surface
+        )
+
+    def _draw(self, canvas: Canvas, scene: Scene) -> None:
+        tank = self.setting.tank
+        swimmer = Swimmer(canvas, self.fish, scene)
+        surroundings.draw_floor_grid(canvas, tank)
+        markers.draw_shadow(canvas, swimmer.outline(), tank)
+        surroundings.draw_walls(canvas, tank)
+        surroundings.draw_specks(canvas, scene.position, tank)
+        if scene.goal is None:
+            swimmer.draw()
+            return
+        near = Side(scene.goal.depth, bool(canvas.camera.eye[2] < scene.goal.depth))
+        swimmer.draw(near.other)
+        markers.draw_goal_plane(canvas, scene, scene.goal)
+        markers.draw_goal_heading(canvas, scene, scene.goal, self.follower.length)
+        markers.draw_plumb_line(canvas, scene, scene.goal)
+        swimmer.draw(near)

@@ -1,0 +1,175 @@
+"""A window that shows swimming fish in real time, with a camera to move."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+import pygame
+
+from fish_env.errors import ConfigError
+from fish_env.rendering.help import draw_help
+from fish_env.rendering.mosaic import Mosaic
+from fish_env.rendering.scene import Scene, Setting, between
+from fish_env.rendering.view import SIZE
+
+TITLE = "robotic fish"
+SMALLEST = (160, 120)
+FRAMES_S = 30
+"""Frames a second, where the machine can; scenes that come slower are filled in."""
+TURN, ZOOM = 0.008, 0.9
+"""Radians for a pixel dragged, distance for a click of the wheel."""
+KEY_TURN = 0.12
+TURNS = {
+    pygame.K_LEFT: (-KEY_TURN, 0.0),
+    pygame.K_RIGHT: (KEY_TURN, 0.0),
+    pygame.K_UP: (0.0, KEY_TURN),
+    pygame.K_DOWN: (0.0, -KEY_TURN),
+}
+ZOOMS = {pygame.K_PLUS: ZOOM, pygame.K_EQUALS: ZOOM, pygame.K_KP_PLUS: ZOOM}
+ZOOMS |= {pygame.K_MINUS: 1 / ZOOM, pygame.K_KP_MINUS: 1 / ZOOM}
+
+_open: dict[int, Window] = {}
+"""Windows of this process by their number: there is one queue of events for all of them."""
+
+
+class Window:
+    """Shows scenes as they come; each takes as long as it lasted.
+
+    Args:
+        setting: of all fish.
+        count: how many fish are shown side by side.
+        size: width and height at the start (pixels); the window can be resized.
+
+    Attributes:
+        paused: whether it stands still until the space bar is pressed.
+
+    Raises:
+        ConfigError: no window can be opened, for want of a screen.
+    """
+
+    def __init__(self, setting: Setting, count: int = 1, size: tuple[int, int] = SIZE) -> None:
+        try:
+            pygame.display.init()
+            self._window: pygame.Window | None = pygame.Window(TITLE, size, resizable=True)
+        except pygame.error as error:
+            raise ConfigError(
+                f"no window can be opened ({error}): use render_mode='rgb_array' where there is "
+                "no screen"
+            ) from None
+        self._window.minimum_size = SMALLEST
+        self._mosaic = Mosaic(setting, count, size)
+        self._last: Sequence[Scene] | None = None
+        self._due = 0.0
+        self._helped = False
+        self._stepping = False
+        self.paused = False
+        _open[self._window.id] = self
+
+    @property
+    def is_open(self) -> bool:
+        """Whether it has been closed, by its button, by a key or by :meth:`close`."""
+        return self._window is not None
+
+    def show(self, scenes: Sequence[Scene]) -> None:
+        """Move from the scenes shown last to these, in the time between them.
+
+        Does nothing once the window is closed. Waits while it is paused.
+        """
+        before, self._last = self._last, scenes
+        period = scenes[0].time_s - before[0].time_s if before else 0.0
+        if before is None or not 0.0 < period <= 1.0:
+            before, period = scenes, 0.0
+        now = time.monotonic()
+        start = self._due if now - self._due < period else now
+        self._due = start + period
+        share = 0.0
+        while self.is_open and share < 1.0:
+            share = (
+                min(1.0, (time.monotonic() - start + 1.0 / FRAMES_S) / period) if period else 1.0
+            )
+            self._draw([between(a, b, share) for a, b in zip(before, scenes, strict=True)])
+            self._wait(1.0 / FRAMES_S if share < 1.0 else self._due - time.monotonic())
+        self._hold(scenes)
+
+    def _hold(self, scenes: Sequence[Scene]) -> None:
+        """Stand still while paused; the camera can be moved."""
+        held = self.paused
+        while self.is_open and self.paused and not self._stepping:
+            self._draw(scenes)
+            self._wait(1.0 / FRAMES_S)
+        self._stepping = False
+        if held:
+            self._due = time.monotonic()
+
+    def _wait(self, seconds: float) -> None:
+        poll()
+        if seconds > 0.0 and self.is_open:
+            time.sleep(min(seconds, 1.0 / FRAMES_S))
+
+    def _draw(self, scenes: Sequence[Scene]) -> None:
+        if self._window is None:
+            return
+        size = self._window.size
+        if size != self._mosaic.size:
+            self._mosaic.resize(size)
+        picture = self._mosaic.surface(scenes)
+        if self._helped or self.paused:
+            draw_help(picture, self._helped)
+        self._window.get_surface().blit(picture, (0, 0))
+        self._window.flip()
+
+    def close(self) -> None:
+        """Close the window; a second time does nothing."""
+        if self._window is not None:
+            del _open[self._window.id]
+            self._window.destroy()
+            self._window = None
+
+    def handle(self, event: pygame.Event) -> None:
+        """React to the mouse, the keyboard or the window's button."""
+        if event.type == pygame.WINDOWCLOSE:
+            self.close()
+        elif event.type == pygame.MOUSEMOTION and event.buttons[0]:
+            self._orbit(-TURN * event.rel[0], TURN * event.rel[1])
+        elif event.type == pygame.MOUSEWHEEL:
+            self._zoom(ZOOM**event.y)
+        elif event.type == pygame.KEYDOWN:
+            self._key(event.key)
+
+    def _key(self, key: int) -> None:
+        if key in (pygame.K_ESCAPE, pygame.K_q):
+            self.close()
+        elif key == pygame.K_SPACE:
+            self.paused = not self.paused
+        elif key == pygame.K_PERIOD:
+            self.paused = self._stepping = True
+        elif key == pygame.K_r:
+            for view in self._mosaic.views:
+                view.follower.reset()
+        elif key == pygame.K_h:
+            self._helped = not self._helped
+        elif key in TURNS:
+            self._orbit(*TURNS[key])
+        elif key in ZOOMS:
+            self._zoom(ZOOMS[key])
+
+    def _orbit(self, azimuth: float, elevation: float) -> None:
+        for view in self._mosaic.views:
+            view.follower.orbit(azimuth, elevation)
+
+    def _zoom(self, factor: float) -> None:
+        for view in self._mosaic.views:
+            view.follower.zoom(factor)
+
+
+def poll() -> None:
+    """Hand the waiting events to the windows they belong to."""
+    for event in pygame.event.get():
+        if event.type == pygame.QUIT:
+            for window in list(_open.values()):
+                window.close()
+            continue
+        named = getattr(event, "window", None)
+        if named is not None and named.id in _open:
+            _open[named.id].handle(event)

@@ -20,6 +20,7 @@ from fish_env.diagnosis.extended_file import extended_fish
 from fish_env.diagnosis.gain import Gain, Pair, measure_gain, misfit_of
 from fish_env.diagnosis.next_experiment import Proposal, propose
 from fish_env.diagnosis.preconditions import Precondition, preconditions
+from fish_env.diagnosis.steady.pipeline import diagnose_steady
 from fish_env.diagnosis.suitability import check_runs
 from fish_env.diagnosis.verdict import Verdict, decide
 from fish_env.errors import DatasetError
@@ -101,7 +102,11 @@ def diagnose(
     """
     chosen = fish if isinstance(fish, FishParams) or fish is None else load_fish(fish)
     tell = progress or (lambda step: None)
-    diagnosis = diagnose_runs(load_runs(folder), chosen, seed, quick, tell)
+    dataset = load_dataset(folder)
+    if not isinstance(dataset, Dataset):
+        where = Path(out) if out is not None else None
+        return diagnose_steady(dataset, chosen, seed=seed, quick=quick, progress=tell, out=where)
+    diagnosis = diagnose_runs(dataset, chosen, seed, quick, tell)
     answer = as_dict(diagnosis)
     if out is not None:
         write(diagnosis, answer, Path(out))

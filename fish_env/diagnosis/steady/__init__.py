@@ -1,0 +1,1 @@
+"""Diagnosis of tables of steady motion: averages under held commands instead of runs over time."""

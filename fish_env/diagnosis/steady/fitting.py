@@ -1,0 +1,327 @@
+"""Fit of coefficients and effects to a table of steady motion, priors included."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import least_squares
+
+from fish_env.diagnosis.steady.orbit import Orbits
+from fish_env.diagnosis.steady.problem import SteadyProblem
+from fish_env.diagnosis.steady.scatter import (
+    Scatter,
+    estimate_scatter,
+    first_guess,
+    linear_changes,
+    push_variances,
+    response,
+    scatter_of,
+)
+from fish_env.effects.extended import PREFIX
+from fish_env.errors import DatasetError
+from fish_env.identification.problem import Point
+
+FloatArray = npt.NDArray[np.float64]
+RELEASED = 0.1
+"""Weight of the prior of a coefficient that was set free: its standard deviation, ten times."""
+Z_STEP = 0.05
+REACH = 3.0
+"""How many times its plausible departure an effect may be off."""
+
+
+@dataclass(frozen=True)
+class Freedom:
+    """A free number of a fit, in units of its own.
+
+    Attributes:
+        path: of a coefficient, or ``effects.<name>.<parameter>``.
+        lower, upper: bounds.
+        unit: natural size of a change.
+    """
+
+    path: str
+    lower: float
+    upper: float
+    unit: float
+
+
+@dataclass(frozen=True, eq=False)
+class SteadyFit:
+    """Estimates with everything needed to judge them.
+
+    Attributes:
+        problem: what was fitted.
+        effects: names of effects whose parameters are free.
+        released: coefficients without their prior.
+        point: estimates.
+        orbits: steady motion under each condition.
+        means: averages, shape (C, K).
+        scatter: noise of single averages.
+        slopes: derivative of the whitened averages, then of the priors, shape (N, n).
+        residuals: measured less simulated, whitened, then what the priors hold, shape (N,).
+    """
+
+    problem: SteadyProblem
+    effects: tuple[str, ...]
+    released: tuple[str, ...]
+    point: Point
+    orbits: Orbits
+    means: FloatArray
+    scatter: Scatter
+    slopes: FloatArray
+    residuals: FloatArray
+
+    @property
+    def objective(self) -> float:
+        """-2 log posterior up to a constant that the noise alone decides."""
+        return float(self.residuals @ self.residuals)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Paths of all estimates: coefficients, then effects."""
+        return (*self.problem.baseline.paths, *self.point.effects)
+
+    @property
+    def estimates(self) -> FloatArray:
+        """In the order of the names."""
+        values = self.problem.baseline.values(self.point.z[:, None])[:, 0]
+        return np.asarray(np.r_[values, list(self.point.effects.values())])
+
+    @cached_property
+    def covariance(self) -> FloatArray:
+        """Of the estimates in their own units, shape (n, n).
+
+        The noise behind it is that of the residuals, so what the model misses from one condition
+        to the next widens it.
+        """
+        inverse = np.linalg.inv(self.slopes.T @ self.slopes + 1e-9 * np.eye(self.slopes.shape[1]))
+        count = len(self.problem.baseline)
+        turn = np.eye(len(inverse))
+        turn[:count, :count] = self.problem.baseline.factor
+        for i, freedom in enumerate(freedoms_of(self.problem, self.effects)):
+            turn[count + i, count + i] = freedom.unit
+        return np.asarray(turn @ inverse @ turn.T)
+
+    def interval(self, path: str) -> tuple[float, float]:
+        """95 % interval within the bounds."""
+        i = self.names.index(path)
+        middle, half = self.estimates[i], 1.96 * float(np.sqrt(self.covariance[i, i]))
+        lower, upper = self.bounds(path)
+        return float(max(middle - half, lower)), float(min(middle + half, upper))
+
+    def bounds(self, path: str) -> tuple[float, float]:
+        """Bounds of an estimate: physical ones, for effects what a fit may reach."""
+        for freedom in freedoms_of(self.problem, self.effects):
+            if freedom.path == path:
+                return freedom.lower, freedom.upper
+        info = self.problem.fish.info(path)
+        return info.lower, info.upper
+
+
+def freedoms_of(problem: SteadyProblem, effects: Sequence[str]) -> list[Freedom]:
+    """Free numbers of effects: within physical bounds and some times what is plausible."""
+    found = []
+    for name in effects:
+        effect = problem.known[name]
+        for p in effect.parameters:
+            low, high = p.plausible
+            if np.isfinite(p.neutral):
+                away = REACH * max(abs(low - p.neutral), abs(high - p.neutral))
+                lower, upper = max(p.lower, p.neutral - away), min(p.upper, p.neutral + away)
+            else:
+                lower, upper = max(p.lower, low / REACH), min(p.upper, high * REACH)
+            if effect.time_scale is not None and p.unit == "s":
+                lower = max(lower, 0.9 * problem.dt)
+            found.append(Freedom(f"{PREFIX}{name}.{p.name}", lower, upper, 0.25 * (high - low)))
+    return found
+
+
+def lines(problem: SteadyProblem, values: FloatArray, scatter: Scatter) -> FloatArray:
+    """Averages (..., C, K) as whitened rows of the table, (..., D)."""
+    table = problem.table
+    row, column = np.nonzero(table.present)
+    condition = table.condition_of[row]
+    return np.asarray(values[..., condition, column] / scatter.sd[condition, column])
+
+
+def measured(problem: SteadyProblem, scatter: Scatter) -> FloatArray:
+    """Whitened measurements, (D,)."""
+    table = problem.table
+    row, column = np.nonzero(table.present)
+    return np.asarray(table.values[row, column] / scatter.sd[table.condition_of[row], column])
+
+
+def prior_weights(problem: SteadyProblem, released: Sequence[str]) -> FloatArray:
+    """One over the standard deviation of each normalised coefficient."""
+    return np.array([RELEASED if p in released else 1.0 for p in problem.baseline.paths])
+
+
+def fit(
+    problem: SteadyProblem,
+    effects: Sequence[str] = (),
+    start: Point | None = None,
+    near: Orbits | None = None,
+    scatter: Scatter | None = None,
+    released: Sequence[str] = (),
+    rounds: int = 2,
+    steps: int = 12,
+) -> SteadyFit:
+    """Gauss-Newton within bounds; the noise is estimated along with the rest.
+
+    Args:
+        problem: table and fish.
+        effects: effects whose parameters are free.
+        start: where to begin; default: nominal.
+        near: steady motion at the start, if known.
+        scatter: noise to keep; estimated if absent.
+        released: coefficients without their prior.
+        rounds: fits, with the noise of the residuals estimated between them.
+        steps: most Gauss-Newton steps of a fit.
+
+    Raises:
+        DatasetError: the fish does not reach steady motion at the start.
+    """
+    point = start or problem.start
+    point = Point(point.z, {**problem.neutral(effects), **point.effects})
+    orbits = problem.orbits([point], near)
+    if not orbits.found.all():
+        lost = problem.table.conditions[int(np.argmin(orbits.found))]
+        raise DatasetError(
+            f"{problem.table.name}: {problem.fish.name} does not come to steady motion under the "
+            f"commands of condition '{lost}'; check that fish, units and frame are those of the "
+            "data, or leave the condition out"
+        )
+    if scatter is not None:
+        return _fit_once(problem, effects, point, orbits, scatter, released, steps)
+    pushes = push_variances(response(problem, point, orbits))
+    known = scatter_of(first_guess(problem.table), 0.0, 0.0, pushes, False)
+    current = _fit_once(problem, effects, point, orbits, known, released, steps)
+    for _ in range(rounds - 1):
+        pushes = push_variances(response(problem, current.point, current.orbits))
+        known = noise_of(current, pushes)
+        current = _fit_once(problem, effects, current.point, current.orbits, known, released, steps)
+    return with_scatter(current, noise_of(current, pushes))
+
+
+def noise_of(current: SteadyFit, pushes: FloatArray) -> Scatter:
+    """Noise that the residuals of a fit show, each counted by the freedom the fit left it."""
+    table = current.problem.table
+    row, column = np.nonzero(table.present)
+    count = len(row)
+    left = 1.0 - leverage(current.slopes)[:count]
+    shape = current.scatter.sd.shape
+    squares, freedom = np.zeros(shape), np.zeros(shape)
+    condition = table.condition_of[row]
+    own = (current.residuals[:count] * current.scatter.sd[condition, column]) ** 2
+    np.add.at(squares, (condition, column), own)
+    np.add.at(freedom, (condition, column), left)
+    return estimate_scatter(table, squares, freedom, pushes)
+
+
+def leverage(slopes: FloatArray) -> FloatArray:
+    """Share of each line that the fit follows, the diagonal of the hat matrix."""
+    basis, _ = np.linalg.qr(slopes)
+    return np.asarray(np.einsum("ij,ij->i", basis, basis))
+
+
+def with_scatter(current: SteadyFit, scatter: Scatter) -> SteadyFit:
+    """The same estimates judged by another noise."""
+    problem = current.problem
+    table = problem.table
+    row, column = np.nonzero(table.present)
+    condition = table.condition_of[row]
+    ratio = np.ones(len(current.residuals))
+    ratio[: len(row)] = current.scatter.sd[condition, column] / scatter.sd[condition, column]
+    return SteadyFit(
+        problem, current.effects, current.released, current.point, current.orbits, current.means,
+        scatter, current.slopes * ratio[:, None], current.residuals * ratio,
+    )  # fmt: skip
+
+
+class _Work:
+    """Residuals and their slopes as functions of the free numbers, steady motion kept warm."""
+
+    def __init__(
+        self,
+        problem: SteadyProblem,
+        effects: Sequence[str],
+        point: Point,
+        orbits: Orbits,
+        scatter: Scatter,
+        released: Sequence[str],
+    ) -> None:
+        self.problem, self.scatter = problem, scatter
+        self.free = freedoms_of(problem, effects)
+        self.kept = {p: v for p, v in point.effects.items() if p not in {f.path for f in self.free}}
+        self.orbits, self.size = orbits, len(problem.baseline)
+        self.prior = prior_weights(problem, released)
+        self.measured = measured(problem, scatter)
+        self.start = np.r_[point.z, [point.effects[f.path] / f.unit for f in self.free]]
+        self.at, self.means = self.start, problem.means(orbits)[0]
+
+    def point(self, x: FloatArray) -> Point:
+        own = {f.path: float(v * f.unit) for f, v in zip(self.free, x[self.size :], strict=True)}
+        return Point(x[: self.size], {**self.kept, **own})
+
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        baseline = self.problem.baseline
+        low, high = ((b - baseline.mean) / np.diag(baseline.factor) for b in baseline.bounds)
+        low, high = np.maximum(low, -12.0) + 1e-3, np.minimum(high, 12.0) - 1e-3
+        lower = np.r_[low, [f.lower / f.unit for f in self.free]]
+        upper = np.r_[high, [f.upper / f.unit for f in self.free]]
+        return lower, upper
+
+    def residuals(self, x: FloatArray) -> FloatArray:
+        if not np.array_equal(x, self.at):
+            orbits = self.problem.orbits([self.point(x)], self.orbits)
+            means = self.problem.means(orbits)[0]
+            if not np.isfinite(means).all():
+                return np.full(len(self.measured) + self.size, np.inf)
+            self.at, self.orbits, self.means = x.copy(), orbits, means
+        seen = self.measured - lines(self.problem, self.means, self.scatter)
+        return np.asarray(np.r_[seen, -self.prior * x[: self.size]])
+
+    def jacobian(self, x: FloatArray) -> FloatArray:
+        """Derivative of the residuals."""
+        self.residuals(x)
+        _, upper = self.bounds()
+        step = np.full(len(x), Z_STEP)
+        step[x + step > upper] *= -1.0
+        nudged = [self.point(x + step[i] * np.eye(len(x))[i]) for i in range(len(x))]
+        coefficients, effects = nudged[: self.size], nudged[self.size :]
+        change = linear_changes(self.problem, self.point(x), self.orbits, coefficients)
+        if effects:
+            means = self.problem.means(self.problem.orbits(effects, self.orbits))
+            change = np.concatenate([change, means - self.means])
+        whitened = lines(self.problem, change, self.scatter).T / step
+        whitened = np.where(np.isfinite(whitened), whitened, 0.0)
+        prior = np.zeros((self.size, len(x)))
+        prior[:, : self.size] = np.diag(self.prior)
+        return -np.concatenate([whitened, prior])
+
+
+def _fit_once(
+    problem: SteadyProblem,
+    effects: Sequence[str],
+    point: Point,
+    orbits: Orbits,
+    scatter: Scatter,
+    released: Sequence[str],
+    steps: int,
+) -> SteadyFit:
+    work = _Work(problem, effects, point, orbits, scatter, released)
+    lower, upper = work.bounds()
+    start = np.clip(work.start, lower + 1e-6, upper - 1e-6)
+    found = least_squares(
+        work.residuals, start, work.jacobian, (lower, upper), ftol=1e-4, xtol=1e-5, max_nfev=steps
+    )
+    slopes = -work.jacobian(found.x)
+    residuals = work.residuals(found.x)
+    return SteadyFit(
+        problem, tuple(effects), tuple(released), work.point(found.x), work.orbits, work.means,
+        scatter, slopes, residuals,
+    )  # fmt: skip

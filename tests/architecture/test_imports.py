@@ -11,7 +11,15 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 LINTER = Path(sys.executable).with_name("lint-imports")
 # What agents act on; and the one style of pictures, so that theirs look alike.
-OPEN_TO_AGENTS = {"errors", "params", "trajectory", "simulator", "envs", "plotting"}
+OPEN_TO_AGENTS = {
+    "errors",
+    "params",
+    "trajectory",
+    "simulator",
+    "envs",
+    "plotting",
+    "rendering",
+}
 NOT_ON_IMPORT = ("torch", "matplotlib", "pandas", "stable_baselines3", "pyarrow", "pygame")
 
 

@@ -1,8 +1,8 @@
-"""Every piece of code in the README and the pages runs as it stands."""
+"""Every piece of code in the README and the pages runs as it stands, page by page, in order."""
 
+import json
 import re
 import shutil
-import warnings
 from pathlib import Path
 
 import pytest
@@ -10,10 +10,8 @@ from typer.main import get_command
 
 from fish_env.cli import app
 from fish_env.data import load_dataset
-from tests.docs.pages import ROOT, Block, all_blocks, blocks
+from tests.docs.pages import PAGES, ROOT, SHELL, Block, all_blocks, blocks, fences, run_page
 
-PYTHON = all_blocks("python")
-SHELL = all_blocks("sh")
 TARGETS = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M))
 COMMANDS = set(get_command(app).commands)  # type: ignore[attr-defined]
 EXTRAS = set(
@@ -33,11 +31,45 @@ def folder(tmp_path, monkeypatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("block", PYTHON, ids=lambda block: block.name)
-def test_python_runs(block: Block, folder):
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        exec(compile(block.text, block.name, "exec"), {"__name__": "__main__"})
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_the_code_of_a_page_runs(page: Path, folder):
+    run_page(page, folder)
+    if page.name == "tutorial.md":
+        answer = json.loads((folder / "out/trials/diagnosis.json").read_text())
+        assert answer["verdict"] == "cause"
+        assert [cause["name"] for cause in answer["causes"]] == ["servo_lag"]
+
+
+@pytest.mark.parametrize(
+    ("code", "what"),
+    [
+        ("```python\nx = 1\n```\n\n```python\nassert x == 2\n```\n", AssertionError),
+        ("```python\nimport warnings\n\nwarnings.warn('old', stacklevel=1)\n```\n", UserWarning),
+        ("```sh\nrobofish info --fish no-such-fish\n```\n", AssertionError),
+        ("```sh\nfalse\ntrue\n```\n", AssertionError),
+        ("* a list\n\n    ```python\n    1 / 0\n    ```\n", ZeroDivisionError),
+    ],
+)
+def test_broken_code_on_a_page_is_noticed(code, what, folder):
+    page = folder / "page.md"
+    page.write_text(code)
+    with pytest.raises(what):
+        run_page(page, folder)
+
+
+def test_a_page_writes_its_titled_files_and_leaves_out_what_is_marked(folder):
+    page = folder / "page.md"
+    page.write_text(
+        '```yaml title="data/a.yaml"\na: 1\n```\n\n'
+        '```{.sh .no-run data-reason="never"}\nfalse\n```\n\n'
+        "```sh\ngrep -q 1 data/a.yaml\n```\n\n```python\nopen('data/a.yaml').close()\n```\n"
+    )
+    run_page(page, folder)
+    assert [block.not_run for block in fences(page)] == [None, "never", None, None]
+
+
+def test_what_is_not_run_says_why():
+    assert [block.name for page in PAGES for block in fences(page) if block.not_run == ""] == []
 
 
 def test_the_readme_runs_the_simulator_and_the_environment():
@@ -57,8 +89,9 @@ def unknown(line: str) -> str:
     return next((extra for extra in extras if extra not in EXTRAS), "")
 
 
-@pytest.mark.parametrize("block", SHELL, ids=lambda block: block.name)
+@pytest.mark.parametrize("block", all_blocks(*SHELL), ids=lambda block: block.name)
 def test_shell_commands_exist(block: Block):
+    """Also where a block is not run."""
     assert [line for line in block.text.splitlines() if unknown(line)] == []
 
 

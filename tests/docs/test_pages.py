@@ -9,14 +9,22 @@ import pytest
 
 from fish_env.effects import catalogue
 from fish_env.envs.robotic_fish_3d import RoboticFish3DEnv
-from scripts import make_effects_page, make_environment_page, update_readme
+from scripts import (
+    make_benchmarks_page,
+    make_effects_page,
+    make_environment_page,
+    update_readme,
+)
 from tests.docs.pages import PAGES, ROOT
 
 REMEDY = "run `make docs`"
 EXAMPLES = ("examples/my-fish.yaml", "examples/cable_drag.py")
 
 
-@pytest.mark.parametrize("module", [make_effects_page, make_environment_page])
+GENERATED = [make_benchmarks_page, make_effects_page, make_environment_page]
+
+
+@pytest.mark.parametrize("module", GENERATED)
 def test_a_generated_page_is_up_to_date(module):
     assert module.PAGE.read_text(encoding="utf-8") == module.page(), REMEDY
 
@@ -24,6 +32,18 @@ def test_a_generated_page_is_up_to_date(module):
 def test_the_generated_parts_of_the_readme_are_up_to_date():
     text = update_readme.README.read_text(encoding="utf-8")
     assert text == update_readme.updated(text, update_readme.BLOCKS), REMEDY
+
+
+def test_the_benchmarks_page_takes_the_latest_reports(tmp_path):
+    for name, text in (
+        ("speed-2026-01-02", "# New\n\n## Judged\n- met"),
+        ("speed-2026-01-01", "Old"),
+    ):
+        (tmp_path / f"{name}.md").write_text(text)
+    page = make_benchmarks_page.page(tmp_path, tmp_path)
+    assert "### New\n\n#### Judged\n\n- met\n" in page
+    assert "Old" not in page
+    assert "No full run is published yet." in page
 
 
 def test_every_effect_has_an_entry_with_its_parameters():

@@ -147,7 +147,8 @@ class TrainConfig:
         task: ``hold`` or ``track``.
         seed: of networks, episodes and exploration.
         num_envs: fish side by side.
-        disturbances: suite whose conditions (not episodes) are trained under.
+        disturbances: suites whose conditions (not episodes) are trained under; the fish are
+            shared out evenly, and a name may stand there twice.
         environment: further keyword arguments of the environment; they replace those of the suite.
         reward: changes of ``reward`` in the environment's settings that hold in training alone.
         history: what the policy sees of the past.
@@ -166,7 +167,7 @@ class TrainConfig:
     total_steps: int
     seed: int = 0
     num_envs: int = 64
-    disturbances: str = "calm"
+    disturbances: tuple[str, ...] = ("calm",)
     environment: Mapping[str, Any] = field(default_factory=dict)
     reward: Mapping[str, Any] = field(default_factory=dict)
     history: History = field(default_factory=History)
@@ -198,11 +199,21 @@ class TrainConfig:
         known = inspect.signature(env_options).parameters
         for key in self.environment:
             _check(key in known, f"environment: unknown key '{key}'; known: {', '.join(known)}")
-        self.history_spec(env_options(**self.options(training=True)).config.control_period)
+        names = self.disturbances
+        _check(bool(names), "disturbances: at least one suite")
+        _check(self.num_envs % len(names) == 0, "num_envs: the same number for each disturbance")
+        for name in names:
+            checked = env_options(**self.options(name, training=True))
+        self.history_spec(checked.config.control_period)
 
-    def options(self, training: bool) -> dict[str, Any]:
-        """Keyword arguments of the environment; the reward of the training only if asked for."""
-        suite = dict(load_suite(self.disturbances).environment)
+    def options(self, name: str, training: bool) -> dict[str, Any]:
+        """Keyword arguments of the environment, with the reward of the training if asked for.
+
+        Args:
+            name: one of the disturbances.
+            training: whether it is trained in.
+        """
+        suite = dict(load_suite(name).environment)
         options: dict[str, Any] = {"task": self.task} | suite | dict(self.environment)
         if training and self.reward:
             options["config"] = {"reward": dict(self.reward)}

@@ -19,13 +19,19 @@ LOOKED_AT = ("success_rate", "depth_rmse_m", "heading_rmse_rad", "mean_power_w",
 def try_policy(config: TrainConfig, agent: Agent) -> dict[str, float]:
     """Means of the metrics LOOKED_AT over episodes from random starts.
 
-    The conditions are those of the training, the reward is that of the environment.
+    The conditions are those of the training, each taken once and with as many episodes; the
+    reward is that of the environment. ``worst_success_rate`` is that of the worst of them.
     """
-    options = config.options(training=False)
+    names = list(dict.fromkeys(config.disturbances))
+    rows = [_under(name, config, agent) for name in names]
+    means = {key: float(np.mean([row[key] for row in rows])) for key in LOOKED_AT}
+    return means | {"worst_success_rate": min(row["success_rate"] for row in rows)}
+
+
+def _under(name: str, config: TrainConfig, agent: Agent) -> dict[str, float]:
+    options = config.options(name, training=False)
     task = options.pop("task")
     episodes = config.evaluation.episodes
-    suite = Suite(
-        "side", 1, "evaluation on the side", FIRST_SEED, episodes, MAX_EPISODE_STEPS, options, {}
-    )
+    suite = Suite(name, 1, "on the side", FIRST_SEED, episodes, MAX_EPISODE_STEPS, options, {})
     record = swim_suite(suite, task, agent, threads=config.threads.environment)
-    return {name: float(np.mean(METRICS[name](record))) for name in LOOKED_AT}
+    return {key: float(np.mean(METRICS[key](record))) for key in LOOKED_AT}

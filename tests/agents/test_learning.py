@@ -14,7 +14,7 @@ import pytest
 from agents.policies import PretrainedPolicy
 from agents.training.config import Evaluation, LearningRate, TrainConfig, load_train_config
 from agents.training.run import train
-from agents.training.stack import TimedFish
+from agents.training.stack import Shoal
 from agents.training.trial import try_policy
 
 LEARNT = 270.0
@@ -48,13 +48,13 @@ def test_ppo_learns_to_hold(tmp_path):
 
 @pytest.mark.slow
 def test_learning_from_negated_rewards_is_noticed(tmp_path, monkeypatch):
-    step = TimedFish.step_wait
+    step = Shoal.step_wait
 
     def negated(fish):
         observations, rewards, dones, infos = step(fish)
         return observations, -rewards, dones, infos
 
-    monkeypatch.setattr(TimedFish, "step_wait", negated)
+    monkeypatch.setattr(Shoal, "step_wait", negated)
     assert final_return(short(), tmp_path) < LEARNT - 50.0
 
 
@@ -67,11 +67,11 @@ def test_learning_without_gradients_is_noticed(tmp_path):
 
 @pytest.mark.slow
 def test_observations_that_say_nothing_are_noticed(tmp_path, monkeypatch):
-    step = TimedFish.step_wait
+    step = Shoal.step_wait
 
     def blind(fish):
         observations, rewards, dones, infos = step(fish)
         return np.zeros_like(observations), rewards, dones, infos
 
-    monkeypatch.setattr(TimedFish, "step_wait", blind)
+    monkeypatch.setattr(Shoal, "step_wait", blind)
     assert final_return(short(), tmp_path) < LEARNT - 50.0

@@ -56,7 +56,10 @@ def test_a_shipped_configuration_reads_and_writes(name, tmp_path):
         ({"environment": {"current": [0, 0]}}, "three speeds"),
         ({"environment": {"task": "hold"}}, "task"),
         ({"reward": {"weights": {"depht": 1.0}}}, "depht"),
-        ({"disturbances": "storm"}, "storm"),
+        ({"disturbances": ["storm"]}, "storm"),
+        ({"disturbances": "calm"}, "must be a list"),
+        ({"disturbances": []}, "at least one"),
+        ({"disturbances": ["calm", "hard", "noisy"]}, "the same number"),
         ({"normalise_reward": 1}, "true or false"),
         ({"threads": {"torch": 0}}, "threads"),
     ],
@@ -86,11 +89,11 @@ def test_changes_replace_what_the_file_says(tmp_path):
 
 
 def test_a_training_knows_the_conditions_of_its_suite_but_not_its_reward_on_the_side(tmp_path):
-    path = written(tmp_path, disturbances="noisy", reward={"margins": {"depth": 0.05}})
+    path = written(tmp_path, disturbances=["noisy"], reward={"margins": {"depth": 0.05}})
     config = load_train_config(path)
-    assert config.options(training=True)["config"]["reward"]["margins"]["depth"] == 0.05
-    assert "config" not in config.options(training=False)
-    assert config.options(training=False)["observation_delay_s"] > 0
+    assert config.options("noisy", training=True)["config"]["reward"]["margins"]["depth"] == 0.05
+    assert "config" not in config.options("noisy", training=False)
+    assert config.options("noisy", training=False)["observation_delay_s"] > 0
 
 
 def test_trainings_evaluations_and_suites_share_no_seed():

@@ -20,7 +20,7 @@ from fish_env.errors import ConfigError
 
 ROOT = Path(__file__).resolve().parents[2]
 PPO = TrainConfig(
-    "tiny", "ppo", "hold", 2048, num_envs=8, disturbances="noisy",
+    "tiny", "ppo", "hold", 2048, num_envs=8, disturbances=("calm", "noisy"),
     ppo=Ppo(n_steps=16, batch_size=128, n_epochs=1), history=History(2, (0.5,)),
     evaluation=Evaluation(every=700, episodes=2), checkpoint_every=300,
 )  # fmt: skip

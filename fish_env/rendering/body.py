@@ -23,13 +23,12 @@ FloatArray = npt.NDArray[np.float64]
 BACK, SIDE, BELLY = (
     np.array(colour, float) for colour in ((226, 96, 22), (255, 150, 48), (255, 232, 196))
 )
-FRAME, GLASS, FIN, SERVO, RAIL, BLOCK, EYE, PUPIL = (
+FRAME, GLASS, FIN, RAIL, BLOCK, EYE, PUPIL = (
     np.array(colour, float)
     for colour in (
         (66, 72, 84),
         (186, 226, 236),
         (236, 112, 30),
-        (52, 58, 68),
         (150, 160, 170),
         (255, 214, 92),
         (246, 246, 240),
@@ -52,7 +51,7 @@ class Fish:
         window: the half transparent part of the hull.
         lining: the inside of the hull near the window.
         fins: name -> fin on the hull, and the point and direction (3,) where it stands out.
-        inside: what does not move: rail and servo.
+        rail: what the weight block slides along.
         tail: at rest, its joint at the origin.
     """
 
@@ -61,7 +60,7 @@ class Fish:
     window: Mesh
     lining: Mesh
     fins: tuple[tuple[Mesh, FloatArray, FloatArray], ...]
-    inside: Mesh
+    rail: Mesh
     tail: Mesh
 
     @classmethod
@@ -70,8 +69,8 @@ class Fish:
         hull = _hull(shape)
         glass = hull.alphas < OPAQUE
         lining = _lining(hull, shape)
-        moving = _fins(shape), _inside(shape), _tail(shape)
-        return cls(shape, hull.chosen(~glass), hull.chosen(glass), lining, *moving)
+        others = _fins(shape), _rail(shape), _tail(shape)
+        return cls(shape, hull.chosen(~glass), hull.chosen(glass), lining, *others)
 
     def swung_tail(self, angle: float) -> Mesh:
         """The tail at an angle (rad), positive with the fin to port."""
@@ -219,13 +218,9 @@ def _pectoral(shape: FishShape, side: float) -> tuple[Mesh, FloatArray, FloatArr
     return plate(tip, foot, FIN * np.linspace(0.9, 1.05, 8)[:, None]), root, out
 
 
-def _inside(shape: FishShape) -> Mesh:
-    """The rail along which the block slides, and the servo of the tail at the stern."""
-    x, y, z = shape.block_rest
-    rail = box((shape.block[0] + 0.05, 0.006, 0.006), RAIL).placed(np.eye(3), (x, y, z))
-    size = (0.11 * shape.length, 0.30 * shape.width, 0.30 * shape.height)
-    servo_x = shape.tail_root[0] + 0.16 * shape.length
-    return rail + box(size, SERVO).placed(np.eye(3), (servo_x, 0.0, 0.0))
+def _rail(shape: FishShape) -> Mesh:
+    """What the block slides along and swings about."""
+    return box((shape.block[0] + 0.05, 0.006, 0.006), RAIL).placed(np.eye(3), shape.block_rest)
 
 
 def eyes(shape: FishShape) -> list[tuple[FloatArray, FloatArray, FloatArray]]:

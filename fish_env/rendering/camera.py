@@ -66,7 +66,8 @@ class Follower:
         distance: of the eye from the fish (m).
     """
 
-    AZIMUTH, ELEVATION, LENGTHS = np.radians(60.0), np.radians(18.0), 2.8
+    AZIMUTH, ELEVATION, LENGTHS = np.radians(60.0), np.radians(18.0), 3.0
+    AHEAD, BELOW = 0.30, 0.16
     POSITION_LAG, HEADING_LAG, LONGEST_GAP = 0.25, 2.5, 2.0
 
     def __init__(self, length: float) -> None:
@@ -110,7 +111,11 @@ class Follower:
         direction = self._heading + np.pi - self.azimuth
         level, up = np.cos(self.elevation), np.sin(self.elevation)
         offset = np.array([level * np.cos(direction), level * np.sin(direction), -up])
-        eye = self._target + self.distance * offset
+        # Looking ahead of the fish leaves room for where it goes, and below it for instruments.
+        bow = np.array([np.cos(self._heading), np.sin(self._heading), 0.0])
+        shift = self.AHEAD * bow + np.array([0.0, 0.0, self.BELOW])
+        target = self._target + self.length * shift
+        eye = target + self.distance * offset
         if not self.held:
             eye[2] = np.clip(eye[2], top + CLEARANCE, bottom - CLEARANCE)
-        return Camera.looking(eye, self._target, size)
+        return Camera.looking(eye, target, size)

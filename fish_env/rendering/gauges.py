@@ -12,7 +12,7 @@ from fish_env.rendering.light import FISH, GOAL
 from fish_env.rendering.type import Colour, write
 
 FloatArray = npt.NDArray[np.float64]
-PANEL = (6, 22, 36, 165)
+PANEL = (6, 24, 38, 150)
 INK: Colour = (228, 240, 244)
 DIM: Colour = (128, 160, 174)
 SKY: Colour = (70, 140, 176)

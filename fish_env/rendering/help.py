@@ -20,13 +20,18 @@ KEYS = (
 ROW, WIDTH = 20, 270
 
 
-def draw_help(surface: pygame.Surface, whole: bool) -> None:
-    """The list of keys, or only that the picture is paused."""
+def draw_note(surface: pygame.Surface, text: str) -> None:
+    """A few words at the head of the picture, small enough to fit."""
+    width = surface.get_width()
+    size = 12 if width > 440 else 9
+    room = 0.62 * size * len(text) + 16
+    panel(surface, (width / 2 - room / 2, 6, room, 2 * size - 2), 7)
+    write(surface, text, (width / 2, 5 + size), size, INK, "middle")
+
+
+def draw_help(surface: pygame.Surface) -> None:
+    """The list of keys."""
     width, height = surface.get_size()
-    if not whole:
-        panel(surface, (width / 2 - 118, 6, 236, 22), 7)
-        write(surface, "paused: space goes on, H helps", (width / 2, 17), 12, INK, "middle")
-        return
     unit = min(1.0, width / (WIDTH + 20), height / (ROW * (len(KEYS) + 1)))
     row, wide = ROW * unit, WIDTH * unit
     x, y = (width - wide) / 2, (height - row * (len(KEYS) + 0.8)) / 2

@@ -47,12 +47,12 @@ class Instruments:
         """A scale of the whole depth at the right, with the fish's and the goal's."""
         width, height = surface.get_size()
         tank = self.setting.tank
-        top, bottom = 34.0 * unit, height - (128.0 if width >= NARROW else 44.0) * unit
-        x = width - 26.0 * unit
+        top, bottom = 34.0 * unit, height - (128.0 if width >= NARROW else 24.0) * unit
+        x = width - 22.0 * unit
         panel(
-            surface, (x - 38 * unit, top - 24 * unit, 56 * unit, bottom - top + 34 * unit), 8 * unit
+            surface, (x - 13 * unit, top - 28 * unit, 30 * unit, bottom - top + 38 * unit), 8 * unit
         )
-        write(surface, "depth m", (x - 10 * unit, top - 14 * unit), round(10 * unit), DIM, "middle")
+        write(surface, "depth", (x + 2 * unit, top - 17 * unit), round(9 * unit), DIM, "middle")
 
         def level(depth: float) -> float:
             share = (depth - tank.top) / (tank.bottom - tank.top)
@@ -68,10 +68,11 @@ class Instruments:
             pygame.draw.line(surface, GOAL, (x - 8 * unit, y), (x + 10 * unit, y), round(2 * unit))
         depth = float(scene.position[2])
         y = level(depth)
-        arrow = [(x, y), (x - 9 * unit, y - 5 * unit), (x - 9 * unit, y + 5 * unit)]
+        arrow = [(x, y), (x - 10 * unit, y - 5 * unit), (x - 10 * unit, y + 5 * unit)]
+        panel(surface, (x - 62 * unit, y - 9 * unit, 48 * unit, 18 * unit), 5 * unit)
         pygame.draw.polygon(surface, FISH, arrow)
-        text = (x - 11 * unit, y)
-        write(surface, f"{depth:.2f}", text, round(11 * unit), INK, "right", bold=True)
+        text = (x - 18 * unit, y)
+        write(surface, f"{_number(depth, 2)} m", text, round(10.5 * unit), INK, "right", bold=True)
 
     def _draw_actuators(self, surface: pygame.Surface, scene: Scene, unit: float) -> None:
         """Bars of the five actuators over their ranges, at the lower right."""

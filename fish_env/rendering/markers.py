@@ -6,12 +6,15 @@ import numpy as np
 import numpy.typing as npt
 
 from fish_env.rendering.canvas import Canvas
-from fish_env.rendering.light import FISH, GOAL
+from fish_env.rendering.light import GOAL
 from fish_env.rendering.scene import Goal, Scene, Tank
 
 FloatArray = npt.NDArray[np.float64]
 PLANE_HALF_M, PLANE_STEP_M = 0.5, 0.125
-WAKE_S_SHOWN = 300
+LONGEST = 400
+"""Pieces of the wake that are drawn."""
+BUBBLES_M = 0.03
+FOAM = np.array([206.0, 240.0, 240.0])
 FAINTEST = 0.10
 
 
@@ -40,8 +43,8 @@ def draw_goal_heading(canvas: Canvas, scene: Scene, goal: Goal, length: float) -
     """An arrow in the plane of the goal that points where the fish is to head."""
     ahead = np.array([np.cos(goal.heading), np.sin(goal.heading)])
     aside = np.array([-ahead[1], ahead[0]])
-    start, neck, tip = 0.75 * length, 1.75 * length, 2.15 * length
-    shaft, head = 0.045 * length, 0.16 * length
+    start, neck, tip = 0.62 * length, 1.22 * length, 1.52 * length
+    shaft, head = 0.05 * length, 0.15 * length
     outline = [
         (start, -shaft),
         (neck, -shaft),
@@ -70,25 +73,24 @@ def draw_plumb_line(canvas: Canvas, scene: Scene, goal: Goal) -> None:
     canvas.lines(points[0:-1:2], points[1::2], colours, np.full(count // 2, 0.003))
 
 
-def wake_points(scene: Scene, stern: FloatArray) -> FloatArray:
-    """(n, 3) the way the fish came, to its stern; the last positions under the fish left out."""
-    past = scene.wake[-WAKE_S_SHOWN:]
-    if not len(past):
-        return past
-    gap = np.linalg.norm(stern - scene.position)
-    past = past[np.linalg.norm(past - scene.position, axis=1) > gap]
-    return np.vstack([past, stern]) if len(past) else past
+def wake_points(scene: Scene, clear: float) -> FloatArray:
+    """(n, 3) the way the fish came (m), but for what is nearer to its middle than ``clear``."""
+    past = scene.wake[-LONGEST:]
+    return past[np.linalg.norm(past - scene.position, axis=1) > clear]
 
 
 def draw_wake(canvas: Canvas, points: FloatArray, which: npt.NDArray[np.bool_]) -> None:
-    """The way the fish came, fading with age; ``which`` (n - 1,) of its pieces."""
+    """The way the fish came, a line with bubbles that fade with age; ``which`` (n - 1,) of it."""
     if not which.any():
         return
     share = np.linspace(FAINTEST, 1.0, len(points) - 1)[which]
-    colours = np.column_stack(
-        [np.tile(np.array(FISH) * 0.6 + 100.0, (len(share), 1)), 0.85 * share]
-    )
-    canvas.lines(points[:-1][which], points[1:][which], colours, 0.003 + 0.006 * share)
+    first, last = points[:-1][which], points[1:][which]
+    colours = np.column_stack([np.tile(FOAM, (len(share), 1)), 0.75 * share])
+    canvas.lines(first, last, colours, 0.0012 + 0.0018 * share)
+    # Bubbles stand where the way crosses cells of a grid, so that they stay where they are.
+    crossing = np.any(np.floor(first / BUBBLES_M) != np.floor(last / BUBBLES_M), axis=1)
+    colours[:, 3] = 0.15 + 0.85 * share
+    canvas.discs(last[crossing], 0.0015 + 0.0022 * share[crossing], colours[crossing])
 
 
 def draw_shadow(canvas: Canvas, outline: FloatArray, tank: Tank) -> None:

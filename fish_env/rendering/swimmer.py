@@ -53,11 +53,12 @@ class Swimmer:
         self.eye = self.rotation.T @ (canvas.camera.eye - scene.position)
         behind, before = self._outer_parts(fish)
         block = fish.block(float(scene.actuators[3]), float(scene.actuators[4]))
-        hull = [fish.lining, fish.inside, block, fish.window, fish.hull]
+        hull = [fish.lining, fish.rail, block, fish.window, fish.hull]
         self._before = [self._placed(mesh) for mesh in before]
         self._behind = [self._placed(mesh) for mesh in (*behind, *hull)]
-        stern = self.at(np.array(self.shape.tail_root) - (0.6 * self.shape.tail_length, 0.0, 0.0))
-        self._wake = markers.wake_points(scene, stern)
+        self._wake = markers.wake_points(
+            scene, 1.15 * self.shape.tail_length - fish.shape.tail_root[0]
+        )
 
     def at(self, body: FloatArray) -> FloatArray:
         """Inertial points (..., 3) of body points."""

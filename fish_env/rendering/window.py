@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Sequence
 
 import pygame
 
 from fish_env.errors import ConfigError
-from fish_env.rendering.help import draw_help
+from fish_env.rendering.help import draw_help, draw_note
 from fish_env.rendering.mosaic import Mosaic
 from fish_env.rendering.scene import Scene, Setting, between
 from fish_env.rendering.view import SIZE
@@ -17,6 +18,9 @@ TITLE = "robotic fish"
 SMALLEST = (160, 120)
 FRAMES_S = 30
 """Frames a second, where the machine can; scenes that come slower are filled in."""
+UNSEEN = ("offscreen", "dummy")
+"""Drivers of the library that show nothing."""
+NOTE_S = 5.0
 TURN, ZOOM = 0.008, 0.9
 """Radians for a pixel dragged, distance for a click of the wheel."""
 KEY_TURN = 0.12
@@ -49,20 +53,15 @@ class Window:
     """
 
     def __init__(self, setting: Setting, count: int = 1, size: tuple[int, int] = SIZE) -> None:
-        try:
-            pygame.display.init()
-            self._window: pygame.Window | None = pygame.Window(TITLE, size, resizable=True)
-        except pygame.error as error:
-            raise ConfigError(
-                f"no window can be opened ({error}): use render_mode='rgb_array' where there is "
-                "no screen"
-            ) from None
+        _find_screen()
+        self._window: pygame.Window | None = pygame.Window(TITLE, size, resizable=True)
         self._window.minimum_size = SMALLEST
         self._mosaic = Mosaic(setting, count, size)
         self._last: Sequence[Scene] | None = None
         self._due = 0.0
         self._helped = False
         self._stepping = False
+        self._noted_until = time.monotonic() + NOTE_S
         self.paused = False
         _open[self._window.id] = self
 
@@ -114,8 +113,12 @@ class Window:
         if size != self._mosaic.size:
             self._mosaic.resize(size)
         picture = self._mosaic.surface(scenes)
-        if self._helped or self.paused:
-            draw_help(picture, self._helped)
+        if self._helped:
+            draw_help(picture)
+        elif self.paused:
+            draw_note(picture, "paused: space goes on")
+        elif time.monotonic() < self._noted_until:
+            draw_note(picture, "H: what keys and mouse do")
         self._window.get_surface().blit(picture, (0, 0))
         self._window.flip()
 
@@ -161,6 +164,23 @@ class Window:
     def _zoom(self, factor: float) -> None:
         for view in self._mosaic.views:
             view.follower.zoom(factor)
+
+
+def _find_screen() -> None:
+    """Start the part of the library that shows windows.
+
+    Without a screen it would draw where nobody sees it, which is right only if asked for.
+    """
+    try:
+        pygame.display.init()
+        driver = pygame.display.get_driver()
+    except pygame.error as error:
+        driver = str(error)
+    if not pygame.display.get_init() or (driver in UNSEEN and "SDL_VIDEODRIVER" not in os.environ):
+        pygame.display.quit()
+        raise ConfigError(
+            f"no window can be opened, there is no screen ({driver}): use render_mode='rgb_array'"
+        )
 
 
 def poll() -> None:

@@ -170,6 +170,29 @@ def info(
 
 
 @app.command()
+def plot(
+    kind: Annotated[
+        str, typer.Argument(help="motions, polar, forces, trim, or all.", metavar="KIND")
+    ],
+    fish: Annotated[str, typer.Option(help="A preset's name, or a parameter file.")] = (
+        "zheng-2021-a"
+    ),
+    out: Annotated[Path, typer.Option(help="Folder for pictures.")] = Path("out/plots"),
+    format: Annotated[
+        list[str] | None,
+        typer.Option(help="png, svg or pdf; may be given more than once.", show_default="png"),
+    ] = None,
+) -> None:
+    """Draw a fish for a paper: the four motions, polar diagrams, forces over a beat, trim curves.
+
+    **Example:** `robofish plot forces --fish zheng-2021-b --format pdf --format png`
+    """
+    from fish_env.commands.plot import plot_fish
+
+    plot_fish(Console(), kind, fish, out, format or ["png"])
+
+
+@app.command()
 def paper(
     out: Annotated[Path, typer.Option(help="Folder for tables and pictures.")] = Path("out/paper"),
 ) -> None:

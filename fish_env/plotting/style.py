@@ -21,6 +21,8 @@ MEASURED, SIMULATED = BLACK, VERMILION
 COLOUR_MAP = "viridis"
 FORMATS = ("png", "pdf")
 DOTS_PER_INCH = 150
+PALE = 0.35
+"""Opacity of what lies behind a mean."""
 
 _STYLE: dict[Any, Any] = {
     "font.size": 9.0,
@@ -65,6 +67,13 @@ def colours(count: int) -> list[Any]:
     from matplotlib import colormaps
 
     return [colormaps[COLOUR_MAP](i / (count - 1)) for i in range(count)]
+
+
+def shades(count: int) -> list[Any]:
+    """Steps of the colour map, dark to light, for values that have an order."""
+    from matplotlib import colormaps
+
+    return [colormaps[COLOUR_MAP](0.85 * i / max(1, count - 1)) for i in range(count)]
 
 
 def save(figure: Figure, folder: Path, name: str, formats: tuple[str, ...] | None = None) -> Path:

@@ -15,7 +15,6 @@ import numpy as np
 import numpy.typing as npt
 from scipy import sparse
 from scipy.interpolate import CubicSpline
-from scipy.spatial.transform import Rotation
 
 from fish_env.data.schema import Run
 
@@ -220,7 +219,10 @@ def integrator(t_in: FloatArray, t_out: FloatArray, breaks: FloatArray) -> spars
         inside = (t_out > knots[0]) & (t_out <= knots[-1])
         result[inside, first : last + 1] += curve(t_out[inside])
         result[t_out > knots[-1], first : last + 1] += curve(knots[-1])
-    return sparse.csr_array(np.diff(result, axis=0))
+    weights = np.diff(result, axis=0)
+    # A spline forgets what is far away.
+    weights[np.abs(weights) < 1e-14 * np.abs(weights).max()] = 0.0
+    return sparse.csr_array(weights)
 
 
 def euler_rates(euler: FloatArray) -> FloatArray:
@@ -233,8 +235,13 @@ def euler_rates(euler: FloatArray) -> FloatArray:
 
 def rotations(euler: FloatArray) -> FloatArray:
     """Rotation matrices, body to inertial, of Z-Y-X Euler angles, (n, 3, 3)."""
-    matrices: FloatArray = Rotation.from_euler("ZYX", euler[:, ::-1]).as_matrix()
-    return matrices
+    (sr, sp, sy), (cr, cp, cy) = np.sin(euler.T), np.cos(euler.T)
+    rows = [
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ]
+    return np.moveaxis(np.array(rows), 2, 0)
 
 
 def _turned(angle: float) -> FloatArray:

@@ -45,7 +45,8 @@ def draw_motions(swims: Sequence[Swim], folder: Path, formats: tuple[str, ...]) 
         formats: endings.
     """
     with drawing(1.85 * len(swims) + 0.3, 7.6) as figure:
-        axes = figure.subplots(5, len(swims), squeeze=False, height_ratios=(1.25, 1, 1, 1, 1))
+        room = {"height_ratios": (1.25, 1, 1, 1, 1), "wspace": 0.12}
+        axes = figure.subplots(5, len(swims), squeeze=False, gridspec_kw=room)
         for row in (DEPTH, SPEED, ATTITUDE, TURNING):
             for ax in axes[row, 1:]:
                 ax.sharey(axes[row, 0])

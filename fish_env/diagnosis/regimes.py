@@ -157,18 +157,19 @@ class Localisation:
         )
 
     def words(self) -> str:
-        """Where the misfit sits, in a sentence."""
-        if self.sits_in is None:
-            worst = max(self.overall, key=lambda name: self.overall[name])
-            return (
-                f"No regime stands out: the misfit, largest in {worst} "
-                f"({np.sqrt(self.overall[worst]):.2f} times the noise), is spread evenly."
-            )
+        """Where the misfit sits, in two sentences."""
+        worst = max(self.overall, key=lambda name: self.overall[name])
+        said = (
+            f"Over all samples the misfit is largest in {worst}: "
+            f"{np.sqrt(self.overall[worst]):.2f} times the noise."
+        )
         place = self.sits_in
+        if place is None:
+            return f"{said} It is spread evenly: no regime stands out."
         return (
-            f"The misfit sits in {place.channel} at {place.regime.replace('_', ' ')} {place.bin}: "
-            f"{np.sqrt(place.energy):.2f} times the noise, against "
-            f"{np.sqrt(self.overall[place.channel]):.2f} in {place.channel} overall "
+            f"{said} It is most bound to its place in {place.channel} at "
+            f"{place.regime.replace('_', ' ')} {place.bin}: {np.sqrt(place.energy):.2f} times the "
+            f"noise, against {np.sqrt(self.overall[place.channel]):.2f} in {place.channel} overall "
             f"(p = {place.p:.2g} over the whole table)."
         )
 
@@ -266,8 +267,8 @@ def localise(
 
 def _regimes(runs: Sequence[RunResiduals]) -> tuple[Regime, ...]:
     def values(name: str) -> FloatArray:
-        series = np.concatenate([run.regimes[name] for run in runs])
-        return series[np.isfinite(series)]
+        series: FloatArray = np.concatenate([run.regimes[name] for run in runs])
+        return np.asarray(series[np.isfinite(series)])
 
     planned = [_widened(regime, values(regime.name)) for regime in PLANNED]
     spanned = [_spanning(values(name), name, unit, bins) for name, unit, bins in SPANNED]
@@ -300,7 +301,8 @@ def _membership(regimes: Sequence[Regime], run: RunResiduals) -> FloatArray:
         # The last bin holds its upper edge; its computed value may differ in the last digit.
         index = np.where(np.isfinite(values), np.clip(index, 0, bins - 1), bins)
         columns.append((index[:, None] == np.arange(bins)).astype(float))
-    return np.hstack(columns)
+    members: FloatArray = np.hstack(columns)
+    return members
 
 
 def _means(membership: FloatArray, energy: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -321,7 +323,7 @@ def _shuffled(energies: Sequence[FloatArray], rng: np.random.Generator) -> Float
 
 def _family_wise(energy: FloatArray, null: FloatArray, judged: npt.NDArray[np.bool_]) -> FloatArray:
     """P-value of each cell against the largest departure of all cells in each shuffle."""
-    p_values = np.full(energy.shape, np.nan)
+    p_values: FloatArray = np.full(energy.shape, np.nan)
     centre, spread = null.mean(axis=0), null.std(axis=0)
     used = judged & np.isfinite(centre) & (spread > 0.0)
     if not used.any():

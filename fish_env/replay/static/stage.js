@@ -166,7 +166,7 @@ Robofish.Stage = class {
     const target = this.outside(centre);
     // Narrow windows need more distance for the same width.
     const narrow = Math.max(1, 1.3 / this.camera.aspect);
-    const distance = narrow * (this.follow ? 6 * this.shape.length : 0.95 * this.extent + 0.4);
+    const distance = narrow * (this.follow ? 6 * this.shape.length : 0.95 * this.extent + 2.5 * this.shape.length);
     const from = { follow: [-0.62, 0.42, 0.66], overview: [-0.55, 0.6, 0.6] };
     from.top = [-0.001, 1, 0];
     from.side = [0, 0.08, 1];

@@ -1,0 +1,258 @@
+"""Figures of the report: each a PNG and an SVG, in the project's style."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fish_env.comparison.words import shown_unit
+from fish_env.data.vocabulary import COMMANDS
+from fish_env.diagnosis.causes import PARAMETER
+from fish_env.diagnosis.regimes import LEVEL, Localisation
+from fish_env.diagnosis.report.series import RunSeries, SteadySeries
+from fish_env.plotting.comparison import COMMAND_UNITS, label
+from fish_env.plotting.style import BLUE, DOTS_PER_INCH, MEASURED, VERMILION, drawing
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+FloatArray = npt.NDArray[np.float64]
+BASELINE, EXTENDED = VERMILION, BLUE
+Plain = Mapping[str, Any]
+
+
+@contextmanager
+def _page(width: float, height: float) -> Iterator[Figure]:
+    """A figure whose SVG keeps its words as text and gets the same names every time."""
+    import matplotlib
+
+    with (
+        matplotlib.rc_context({"svg.fonttype": "none", "svg.hashsalt": "robofish"}),
+        drawing(width, height) as figure,
+    ):
+        yield figure
+
+
+def _saved(figure: Figure, folder: Path, name: str) -> Path:
+    """Writes both formats and returns the path of the SVG."""
+    folder.mkdir(parents=True, exist_ok=True)
+    vector = folder / f"{name}.svg"
+    figure.savefig(vector)
+    # What was laid out stays; finding it again takes as long as drawing.
+    figure.set_layout_engine("none")
+    figure.savefig(vector.with_suffix(".png"), dpi=DOTS_PER_INCH)
+    return vector
+
+
+def draw_run(run: RunSeries, window_s: float, folder: Path) -> Path:
+    """Channels of a run over time: measured, and predicted over windows."""
+    names = list(run.measured)
+    columns = 2 if len(names) > 4 else 1
+    rows = -(-len(names) // columns)
+    with _page(8.6 if columns == 2 else 7.0, 0.6 + 1.3 * rows) as figure:
+        axes = figure.subplots(rows, columns, squeeze=False, sharex=True)
+        for ax, name in zip(axes.T.ravel(), names, strict=False):
+            _draw_channel(ax, run, name, window_s)
+        for ax in axes.T.ravel()[len(names) :]:
+            ax.set_axis_off()
+        for last in (rows - 1, *([len(names) - 1] if columns == 2 else [])):
+            bottom = axes.T.ravel()[last]
+            bottom.set_xlabel("time (s)")
+            bottom.tick_params(labelbottom=True)
+        handles, words = axes[0, 0].get_legend_handles_labels()
+        figure.legend(handles, words, loc="outside upper center", ncols=3)
+        return _saved(figure, folder, f"run_{run.id}")
+
+
+def _draw_channel(ax: Axes, run: RunSeries, name: str, window_s: float) -> None:
+    factor = shown_unit(name)[1]
+    # A gap where a window begins, so that no line joins two predictions.
+    begins = np.diff(np.floor(run.time_s / window_s + 1e-9), prepend=-1.0) > 0.0
+    ax.plot(
+        run.time_s, factor * run.measured[name], color=MEASURED, lw=3.5, alpha=0.3, label="measured"
+    )
+    before = np.where(begins, np.nan, factor * run.baseline[name])
+    ax.plot(run.time_s, before, "--", color=BASELINE, label="baseline")
+    if name in run.extended:
+        after = np.where(begins, np.nan, factor * run.extended[name])
+        ax.plot(run.time_s, after, color=EXTENDED, label="extended")
+    ax.set_ylabel(label(name))
+    if name == "z":
+        ax.invert_yaxis()
+
+
+def draw_regimes(found: Localisation, folder: Path) -> Path:
+    """Residual energy by channel, one map for each regime; cells that stand out are framed."""
+    count = len(found.regimes)
+    columns = 4
+    rows = -(-count // columns)
+    top = max(float(np.nanmax(table)) for table in found.energy.values())
+    with _page(9.4, (0.9 + 0.2 * len(found.channels)) * rows + 0.8) as figure:
+        axes = figure.subplots(rows, columns, squeeze=False)
+        for ax in axes.ravel()[count:]:
+            ax.set_axis_off()
+        for i, (ax, regime) in enumerate(zip(axes.ravel(), found.regimes, strict=False)):
+            image = _draw_map(ax, found, regime.name, top)
+            title = f"{regime.name.replace('_', ' ')} ({regime.unit})"
+            edges = [f"{regime.factor * e:.3g}" for e in regime.edges]
+            ax.set_xticks(np.arange(len(edges)), edges, fontsize=7, rotation=45)
+            ax.set_title(title, loc="left", fontsize=8.5)
+            names = found.channels if i % columns == 0 else [""] * len(found.channels)
+            ax.set_yticks(np.arange(len(found.channels)) + 0.5, names, fontsize=8)
+            ax.tick_params(axis="y", length=0)
+        bar = figure.colorbar(image, ax=axes, shrink=0.8, pad=0.01)
+        bar.set_label("error of the refitted baseline\n(1: noise alone)")
+        ticks = [tick for tick in (1, 2, 3, 5, 10, 20, 30, 50, 100) if tick <= np.sqrt(top)]
+        bar.set_ticks(ticks or [1], labels=[str(tick) for tick in ticks or [1]])
+        bar.minorticks_off()
+        return _saved(figure, folder, "regimes")
+
+
+def _draw_map(ax: Axes, found: Localisation, name: str, top: float) -> Any:
+    from matplotlib.colors import LogNorm
+    from matplotlib.patches import Rectangle
+
+    size = np.sqrt(found.energy[name])
+    norm = LogNorm(0.7, max(float(np.sqrt(top)), 1.5))
+    image = ax.pcolormesh(size, cmap="cividis", norm=norm)
+    ax.invert_yaxis()
+    ax.grid(False)
+    for c, b in np.argwhere(np.isnan(size)):
+        ax.add_patch(Rectangle((b, c), 1, 1, fc="none", ec="#999999", hatch="////", lw=0))
+    for c, b in np.argwhere(found.p_values[name] < LEVEL):
+        ax.add_patch(Rectangle((b + 0.04, c + 0.06), 0.92, 0.88, fill=False, ec=VERMILION, lw=1.8))
+    return image
+
+
+def draw_ranking(answer: Plain, folder: Path) -> Path:
+    """How much each cause improves the fit, in -2 log likelihood, with intervals where known."""
+    rows = list(answer["ranking"])[::-1]
+    accepted = {cause["name"] for cause in answer["causes"]}
+    with _page(7.0, 0.9 + 0.32 * len(rows)) as figure:
+        ax = figure.subplots()
+        for i, row in enumerate(rows):
+            colour = EXTENDED if row["name"] in accepted else "#8a8a8a"
+            ax.barh(i, -row["score"], color=colour, height=0.66)
+            if row.get("ci95"):
+                ends = [-end for end in row["ci95"]]
+                ax.plot(ends, [i, i], color=MEASURED, lw=1.4, marker="|")
+        names = [row["name"].removeprefix(PARAMETER) for row in rows]
+        ax.set_yticks(range(len(rows)), names)
+        gains = [-row["score"] for row in rows]
+        if min(gains) > 0 and max(gains) / min(gains) > 30:
+            ax.set_xscale("log")
+        ax.set_xlabel("gain in -2 log likelihood over the refitted baseline (larger is better)")
+        ax.grid(axis="y", visible=False)
+        return _saved(figure, folder, "ranking")
+
+
+def draw_confusability(names: Sequence[str], cosines: FloatArray, folder: Path) -> Path:
+    """Cosine between the signals of every two causes, after a refit of the baseline."""
+    side = 1.6 + 0.2 * len(names)
+    with _page(side + 1.2, side) as figure:
+        ax = figure.subplots()
+        image = ax.imshow(np.abs(cosines), cmap="cividis", vmin=0.0, vmax=1.0)
+        ax.grid(False)
+        ax.set_xticks(range(len(names)), names, rotation=90, fontsize=7)
+        ax.set_yticks(range(len(names)), names, fontsize=7)
+        figure.colorbar(image, ax=ax, shrink=0.7).set_label("likeness (1: the same signal)")
+        return _saved(figure, folder, "confusability")
+
+
+def draw_misfit(answer: Plain, folder: Path) -> Path:
+    """One-step errors by channel in units of the noise, baseline and extended."""
+    names = list(answer["misfit"])
+    pairs = [answer["misfit"][name] for name in names]
+    extended = bool(answer["causes"])
+    with _page(7.0, 2.6) as figure:
+        ax = figure.subplots()
+        place = np.arange(len(names))
+        width = 0.38 if extended else 0.6
+        shift = width / 2 if extended else 0.0
+        before = [pair["baseline"] for pair in pairs]
+        ax.bar(place - shift, before, width, color=BASELINE, hatch="//", ec="white", lw=0,
+               label="refitted baseline")  # fmt: skip
+        if extended:
+            after = [pair["extended"] for pair in pairs]
+            ax.bar(place + shift, after, width, color=EXTENDED, label="extended")
+        ax.axhline(1.0, color=MEASURED, lw=1.0, ls=":", label="noise alone")
+        ax.set_xticks(place, [name.replace("_", " ") for name in names])
+        ax.set_ylabel("one-step error (noise sd)")
+        ax.grid(axis="x", visible=False)
+        ax.legend(loc="upper right", ncols=3)
+        ax.set_ylim(0.0, 1.25 * max([*before, 1.0]))
+        return _saved(figure, folder, "misfit")
+
+
+def draw_gain(runs: Mapping[str, tuple[float, float]], folder: Path) -> Path:
+    """Fit percent of each final run: from the refitted baseline to the extended model."""
+    with _page(7.0, 1.0 + 0.34 * len(runs)) as figure:
+        ax = figure.subplots()
+        for i, (before, after) in enumerate(runs.values()):
+            ax.annotate(
+                "", (after, i), (before, i),
+                arrowprops={"arrowstyle": "-|>", "color": "#8a8a8a", "lw": 1.2, "shrinkB": 5},
+            )  # fmt: skip
+            ax.plot(before, i, "s", ms=7, color=BASELINE, label="" if i else "refitted baseline")
+            ax.plot(after, i, "o", ms=8, color=EXTENDED, label="" if i else "extended")
+        ax.set_yticks(range(len(runs)), list(runs))
+        ax.set_ylim(len(runs) - 0.5, -0.5)
+        ax.axvline(100.0, color=MEASURED, lw=1.0, ls=":")
+        ax.set_xlabel("fit of predictions over windows (%, 100: perfect)")
+        figure.legend(loc="outside upper center", ncols=2)
+        return _saved(figure, folder, "gain")
+
+
+def draw_schedule(schedule: Sequence[Mapping[str, float]], folder: Path) -> Path:
+    """Commands of the next experiment over time."""
+    varied = [n for n in COMMANDS if len({row.get(n, 0.0) for row in schedule}) > 1]
+    shown = varied or ["tail_amplitude", "tail_frequency"]
+    times = np.array([row["t"] for row in schedule])
+    hold = float(np.median(np.diff(times))) if len(times) > 1 else 5.0
+    with _page(7.0, 0.5 + 1.15 * len(shown)) as figure:
+        axes = figure.subplots(len(shown), 1, squeeze=False, sharex=True).ravel()
+        for ax, name in zip(axes, shown, strict=True):
+            unit, factor = COMMAND_UNITS[name]
+            values = factor * np.array([row.get(name, 0.0) for row in schedule])
+            ax.step(np.r_[times, times[-1] + hold], np.r_[values, values[-1:]], where="post",
+                    color=EXTENDED, lw=1.8)  # fmt: skip
+            ax.set_ylabel(f"{name.replace('_', ' ')}\n({unit})", fontsize=8)
+            ax.margins(y=0.15)
+        axes[-1].set_xlabel("time (s)")
+        figure.align_ylabels()
+        return _saved(figure, folder, "next_experiment")
+
+
+def draw_steady(series: SteadySeries, folder: Path) -> Path:
+    """Predicted over measured values; rows kept for judging are filled."""
+    names = list(series.measured)
+    models = {"baseline": (series.baseline, BASELINE, "s")}
+    if series.extended:
+        models["extended"] = (series.extended, EXTENDED, "o")
+    kept = series.left_out if series.left_out.size else np.zeros(len(series.conditions), bool)
+    with _page(3.1 * len(names) + 0.4, 3.6) as figure:
+        axes = figure.subplots(1, len(names), squeeze=False).ravel()
+        for ax, name in zip(axes, names, strict=True):
+            factor = shown_unit(name)[1]
+            measured = factor * series.measured[name]
+            for word, (values, colour, mark) in models.items():
+                for rows, filled in ((~kept, False), (kept, True)):
+                    if rows.any():
+                        ax.plot(
+                            measured[rows], factor * values[name][rows], mark, ms=5, color=colour,
+                            mfc=colour if filled else "none",
+                            label=f"{word}, {'left out' if filled else 'fitted'}",
+                        )  # fmt: skip
+            ends = [float(np.nanmin(measured)), float(np.nanmax(measured))]
+            ax.plot(ends, ends, color=MEASURED, lw=1.0)
+            ax.set_xlabel(f"measured {label(name)}")
+            ax.set_ylabel(f"predicted {label(name)}")
+        handles, words = axes[0].get_legend_handles_labels()
+        figure.legend(handles, words, loc="outside upper center", ncols=4)
+        return _saved(figure, folder, "steady")

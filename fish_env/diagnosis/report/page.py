@@ -1,0 +1,67 @@
+"""The report: sections from the answer, drawings and the replay, put into one file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from fish_env.diagnosis.report import sections
+from fish_env.diagnosis.report.html import text
+from fish_env.diagnosis.report.series import ReportSeries, SteadySeries
+from fish_env.replay import component_scripts, component_style
+
+Answer = Mapping[str, Any]
+Series = ReportSeries | SteadySeries | None
+Part = Callable[[Answer, Series, Path], str]
+STYLE = Path(__file__).with_name("report.css")
+PARTS: tuple[Part, ...] = (
+    sections.verdict,
+    sections.cause_values,
+    sections.swimming,
+    sections.channels,
+    sections.steady,
+    sections.gain,
+    sections.where,
+    sections.ranking,
+    sections.unseen,
+    sections.experiment,
+    sections.coefficients,
+    sections.about,
+)
+"""In the order of the page; a part that has nothing to say is empty."""
+
+
+def write_report(answer: Answer, series: Series, out: str | Path) -> Path:
+    """Writes ``report.html`` and its figures, as SVG and PNG, into a folder.
+
+    Args:
+        answer: Content of ``diagnosis.json``; what it lacks is left out of the page.
+        series: What to draw of the runs, or of a table of steady motion; None: only the answer.
+        out: The folder; figures go to its folder ``figures``.
+
+    Returns:
+        The path of the page.
+    """
+    folder = Path(out)
+    figures = folder / "figures"
+    figures.mkdir(parents=True, exist_ok=True)
+    for old in (*figures.glob("*.svg"), *figures.glob("*.png")):
+        old.unlink()  # figures of an earlier diagnosis would contradict this one
+    body = "\n".join(filter(None, (part(answer, series, figures) for part in PARTS)))
+    page = folder / "report.html"
+    page.write_text(_page(answer, body), encoding="utf-8")
+    return page
+
+
+def _page(answer: Answer, body: str) -> str:
+    title = text(f"Diagnosis of {answer.get('dataset', 'measured runs')}")
+    scripts = component_scripts() if "rf-replay" in body else ""
+    return (
+        '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        '<meta name="color-scheme" content="light dark">\n<link rel="icon" href="data:,">\n'
+        f"<title>{title}</title>\n{component_style()}\n"
+        f"<style>\n{STYLE.read_text(encoding='utf-8')}</style>\n</head>\n"
+        f'<body class="rf-page rp-page">\n<main>\n{body}\n</main>\n{scripts}\n</body>\n</html>\n'
+    )

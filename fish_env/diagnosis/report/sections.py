@@ -1,0 +1,368 @@
+"""Sections of the report, each from the answer and, where it draws, from the series."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fish_env.comparison.words import shown_unit
+from fish_env.diagnosis.answer import words
+from fish_env.diagnosis.causes import PARAMETER
+from fish_env.diagnosis.report import figures as draw
+from fish_env.diagnosis.report.html import (
+    figure,
+    folded,
+    number,
+    paragraph,
+    section,
+    table,
+    text,
+)
+from fish_env.diagnosis.report.series import SETTLED_S, ReportSeries, SteadySeries
+from fish_env.plotting.comparison import COMMAND_UNITS
+from fish_env.replay import Scene, component
+
+Answer = Mapping[str, Any]
+Series = ReportSeries | SteadySeries | None
+FloatArray = npt.NDArray[np.float64]
+MOST_DRAWN = 3
+"""Runs with a drawing of their own; the replay has them all."""
+VERDICTS = {
+    "no_misfit": "Nothing is wrong that these runs could show",
+    "parameters": "Right structure, wrong numbers",
+    "cause": "A cause is found",
+    "ambiguous": "Several explanations fit alike",
+    "outside_library": "Something no known cause explains",
+    "not_excited": "These runs cannot show it",
+}
+
+
+def verdict(answer: Answer, series: Series, folder: Path) -> str:
+    """Heading: the verdict in two sentences."""
+    name = str(answer["verdict"])
+    facts = [f"dataset {answer.get('dataset', '?')}", f"fish {answer.get('fish', '?')}"]
+    if answer.get("quick"):
+        facts.append("a first look: only the likeliest causes were refitted")
+    return (
+        f'<header class="rp-verdict rp-{text(name)}"><p class="rp-facts">{text(" · ".join(facts))}'
+        f"</p><h1>{text(VERDICTS.get(name, name))}</h1>"
+        f'<p class="rp-words">{text(words(dict(answer)))}</p></header>'
+    )
+
+
+def cause_values(answer: Answer, series: Series, folder: Path) -> str:
+    """What was found, and its rivals, with intervals."""
+    rows = []
+    sets = [("accepted", answer.get("causes", []))]
+    sets += [(f"or else {i}", rival) for i, rival in enumerate(answer.get("alternatives", []), 1)]
+    for word, causes in sets:
+        for cause in causes:
+            name = text(cause["name"].removeprefix(PARAMETER))
+            for key, p in cause["parameters"].items():
+                low, high = p["ci95"]
+                interval = f"{number(low)} to {number(high)}"
+                shown = (text(key), number(p["estimate"]), interval, text(p["unit"]))
+                rows.append((name, *shown, word))
+    heads = ("cause", "parameter", "estimate", "95 % interval", "unit", "standing")
+    return section("What was found", table(heads, rows))
+
+
+def swimming(answer: Answer, series: Series, folder: Path) -> str:
+    """The replay: measured, baseline and extended fish in three dimensions."""
+    if not isinstance(series, ReportSeries) or not series.runs:
+        return ""
+    scenes = [Scene(_run_name(r.id, r.final), r.motions) for r in series.runs]
+    notes = [f"{run.id}: {note}" for run in series.runs for note in run.notes]
+    return section(
+        "How it swims",
+        paragraph(
+            "Measured fish, and the models swimming alone over the whole run, from the state that "
+            f"the filter knows {SETTLED_S:g} s after the start. Small errors add up here; the "
+            "predictions further down start afresh every few seconds."
+        ),
+        component(scenes, series.fish, "runs"),
+        *(paragraph(note, "rp-note") for note in notes),
+        key="replay",
+    )
+
+
+def _run_name(id: str, final: bool) -> str:
+    return f"{id} (kept for judging)" if final else id
+
+
+def channels(answer: Answer, series: Series, folder: Path) -> str:
+    """One-step misfit, and each channel over time."""
+    parts = []
+    if answer.get("misfit"):
+        picture = draw.draw_misfit(answer, folder)
+        parts.append(figure(picture, "One-step prediction errors in units of the noise."))
+    if isinstance(series, ReportSeries):
+        window = series.window_s
+        for i, run in enumerate(series.runs[: 1 if answer.get("quick") else MOST_DRAWN]):
+            caption = (
+                f"{_run_name(run.id, run.final)}: measured, and predicted over windows of "
+                f"{window:g} s."
+            )
+            drawn = figure(draw.draw_run(run, window, folder), caption)
+            parts.append(drawn if i == 0 else folded(_run_name(run.id, run.final), drawn))
+    return section("Channel by channel", *parts, key="channels")
+
+
+def steady(answer: Answer, series: Series, folder: Path) -> str:
+    """A table of steady motion: predicted against measured, condition by condition."""
+    if not isinstance(series, SteadySeries):
+        return ""
+    picture = figure(draw.draw_steady(series, folder), "Predicted against measured steady motion.")
+    return section(
+        "Condition by condition",
+        picture,
+        folded("All conditions", _steady_table(series)),
+        key="conditions",
+    )
+
+
+def _steady_table(series: SteadySeries) -> str:
+    heads, columns = ["condition"], []
+    for name, measured in series.measured.items():
+        unit, factor = shown_unit(name)
+        models = {"measured": measured, "baseline": series.baseline[name]}
+        if series.extended:
+            models["extended"] = series.extended[name]
+        for word, values in models.items():
+            heads.append(f"{name.replace('_', ' ')}, {word} ({unit})")
+            columns.append(factor * values)
+    kept = series.left_out if series.left_out.size else np.zeros(len(series.conditions), bool)
+    rows = [
+        (text(_run_name(name, bool(kept[i]))), *(_cell(column[i]) for column in columns))
+        for i, name in enumerate(series.conditions)
+    ]
+    return table(heads, rows)
+
+
+def _cell(value: float) -> str:
+    return number(float(value)) if np.isfinite(value) else "–"
+
+
+def gain(answer: Answer, series: Series, folder: Path) -> str:
+    """How much better the extended model predicts runs that chose nothing."""
+    found = answer.get("gain")
+    if not found:
+        return ""
+    parts = [_gain_words(found)]
+    runs = _fit_by_run(found, series)
+    if runs:
+        caption = "Fit of each run kept for judging, mean over its channels."
+        parts.append(figure(draw.draw_gain(runs, folder), caption))
+        rows = [(text(run), number(a), number(b), number(b - a)) for run, (a, b) in runs.items()]
+        heads = ("final run", "baseline fit (%)", "extended fit (%)", "gained")
+        parts.append(table(heads, rows))
+    parts.append(_errors(found))
+    return section("What the extension gains", *parts, key="gain")
+
+
+def _gain_words(found: Answer) -> str:
+    fit, share = found.get("fit_percent"), found.get("share_of_reachable")
+    said = []
+    if fit:
+        said.append(
+            f"On {_counted(len(found.get('final_runs', ())))} kept for judging, predictions fit "
+            f"{fit['extended']:.0f} % with the extension and {fit['baseline']:.0f} % with the "
+            "refitted baseline."
+        )
+    if share:
+        low, high = share["ci95"]
+        said.append(
+            f"It closes {100 * share['estimate']:.0f} % of the gap between the refitted baseline "
+            f"and the noise (95 %: {100 * low:.0f} to {100 * high:.0f} %)."
+        )
+    return paragraph(" ".join(said))
+
+
+def _counted(runs: int) -> str:
+    return "the run" if runs == 1 else f"{runs} runs"
+
+
+def _fit_by_run(found: Answer, series: Series) -> dict[str, tuple[float, float]]:
+    """Final run -> fit percent before and after; from the answer, else from the series."""
+    fits = {run: item["fit_percent"] for run, item in found.get("runs", {}).items()}
+    if not fits and isinstance(series, ReportSeries):
+        fits = {run.id: run.fit_percent for run in series.runs if run.final and run.extended}
+    return {run: (pair["baseline"], pair["extended"]) for run, pair in fits.items()}
+
+
+def _errors(found: Answer) -> str:
+    rows = []
+    for name, pair in found.get("rmse", {}).items():
+        unit, factor = shown_unit(name)
+        before, after = factor * pair["baseline"], factor * pair["extended"]
+        rows.append((text(name), number(before), number(after), unit))
+    heads = ("channel", "baseline RMSE", "extended RMSE", "unit")
+    return folded("Error by channel", table(heads, rows))
+
+
+def where(answer: Answer, series: Series, folder: Path) -> str:
+    """Where in the regime the misfit sits, and what was never visited."""
+    parts = []
+    found = series.localisation if isinstance(series, ReportSeries) else None
+    if found is not None:
+        parts.append(paragraph(found.words()))
+        parts.append(
+            figure(
+                draw.draw_regimes(found, folder),
+                "Error of the refitted baseline in each channel and regime. Framed: more than "
+                "chance gives anywhere in the table. Hatched: never visited.",
+            )
+        )
+        by_regime: dict[str, list[str]] = {}
+        for regime, label in found.never_visited:
+            by_regime.setdefault(regime.replace("_", " "), []).append(label)
+        rows = [(text(regime), text(", ".join(bins))) for regime, bins in by_regime.items()]
+        parts.append(table(("never visited", "bins"), rows))
+    parts.append(_asked_for(answer))
+    return section("Where the misfit sits", *parts, key="where")
+
+
+def _asked_for(answer: Answer) -> str:
+    rows = []
+    for item in answer.get("unexplained", []):
+        unit = "N" if item["direction"] in ("surge", "sway", "heave") else "N m"
+        size = f"{number(item['rms'])} {unit}"
+        rows.append((text(item["direction"]), text(item["depends_on"]), size))
+    caption = "What the data still ask for, over and above the best explanation"
+    return table(("force or moment in", "depends on", "rms"), rows, caption)
+
+
+def ranking(answer: Answer, series: Series, folder: Path) -> str:
+    """The refitted causes by how much each explains."""
+    if not answer.get("ranking"):
+        return ""
+    caption = "Gain of each refitted cause; blue: accepted."
+    return section("Ranking", figure(draw.draw_ranking(answer, folder), caption), key="ranking")
+
+
+def unseen(answer: Answer, series: Series, folder: Path) -> str:
+    """What these runs could have shown of each effect, and what they confuse it with."""
+    found = answer.get("preconditions", [])
+    if not found:
+        return ""
+    blind = [p["name"] for p in found if not p["excited"]]
+    said = (
+        f"These runs could not have shown: {', '.join(blind)}."
+        if blind
+        else "Every known effect of a plausible size would have been seen."
+    )
+    heads = (
+        "effect", "would be seen", "smallest size seen (power 0.8)", "a plausible robot has",
+        "swallowed by a refit", "looks most like",
+    )  # fmt: skip
+    order = sorted(found, key=lambda p: (p["excited"], p["name"]))
+    parts = [paragraph(said), table(heads, [_seen(p) for p in order])]
+    if all(p.get("confusability") for p in found):
+        names = [p["name"] for p in found]
+        cosines = np.array([[_cosine(p, name) for name in names] for p in found])
+        caption = "How alike the signals of two effects are, after a refit of the baseline."
+        parts.append(figure(draw.draw_confusability(names, cosines, folder), caption))
+    return section("What could not have been seen", *parts, key="unseen")
+
+
+def _cosine(precondition: Answer, other: str) -> float:
+    own = precondition["name"] == other
+    return 1.0 if own else float(precondition["confusability"].get(other, 0.0))
+
+
+def _seen(p: Answer) -> tuple[str, ...]:
+    sizes, plausible = [], []
+    known = _known_parameters(p["name"])
+    for name, size in p["smallest_detectable"].items():
+        unit, around = "", ""
+        if name in known:
+            parameter = known[name]
+            unit = "" if parameter.unit == "-" else f" {parameter.unit}"
+            neutral = parameter.neutral
+            around = f" from {neutral:g}" if neutral not in (0.0, float("inf")) else ""
+            low, high = parameter.plausible
+            plausible.append(text(f"{low:g} to {high:g}{unit}"))
+        sizes.append(text(f"{name} {number(size)}{unit}{around}"))
+    near = p.get("most_confusable")
+    return (
+        text(p["name"]),
+        "yes" if p["excited"] else '<strong class="rp-no">no</strong>',
+        "<br>".join(sizes) or "–",
+        "<br>".join(plausible) or "–",
+        f"{100 * p['absorbed_share']:.0f} %",
+        text(f"{near[0]} ({near[1]:.2f})") if near else "–",
+    )
+
+
+def _known_parameters(name: str) -> dict[str, Any]:
+    from fish_env.effects import catalogue
+
+    effect = catalogue().get(name)
+    return {p.name: p for p in effect.parameters} if effect else {}
+
+
+def experiment(answer: Answer, series: Series, folder: Path) -> str:
+    """The next experiment as a schedule to fly."""
+    proposal = answer.get("next_experiment") or {}
+    schedule = proposal.get("schedule")
+    if not schedule:
+        return ""
+    aim = ", ".join(proposal.get("separates", []))
+    units = {name: COMMAND_UNITS[name] for name in schedule[0] if name in COMMAND_UNITS}
+    heads = ["from (s)", *(f"{n.replace('_', ' ')} ({unit})" for n, (unit, _) in units.items())]
+    rows = [
+        (number(row["t"]), *(number(factor * row.get(n, 0.0)) for n, (_, factor) in units.items()))
+        for row in schedule
+    ]
+    name = str(proposal.get("manoeuvre", "the schedule below"))
+    return section(
+        "Next experiment",
+        paragraph(
+            f"Fly “{name}” from rest" + (f", to tell apart or to see: {aim}." if aim else ".")
+        ),
+        figure(draw.draw_schedule(schedule, folder), f"Commands of “{name}”."),
+        table(heads, rows, "Each row holds until the next"),
+        key="next",
+    )
+
+
+def coefficients(answer: Answer, series: Series, folder: Path) -> str:
+    """Every coefficient: before, after, and how surprising the move is."""
+    rows = []
+    found = answer.get("parameters", [])
+    for p in sorted(found, key=lambda p: -abs(p.get("prior_sds_off", 0.0))):
+        low, high = p["ci95"]
+        moved = p.get("prior_sds_off")
+        rows.append(
+            (
+                text(p["name"].removeprefix(PARAMETER)), number(p["nominal"]),
+                number(p["estimate"]), f"{number(low)} to {number(high)}", text(p.get("unit", "")),
+                "–" if moved is None else f"{moved:+.1f}",
+            )
+        )  # fmt: skip
+    heads = ("coefficient", "before", "found", "95 % interval", "unit", "moved (prior sd)")
+    return section(
+        "Coefficients",
+        folded(f"All {len(rows)}, most moved first", table(heads, rows)) if rows else "",
+    )
+
+
+def about(answer: Answer, series: Series, folder: Path) -> str:
+    """Noise, notes, and how this was made."""
+    lines = [str(note) for note in answer.get("notes", [])]
+    noise = answer.get("noise")
+    if noise and "disturbance" in noise:
+        d = noise["disturbance"]
+        lines.append(
+            f"Disturbance found: {1e3 * d['force_sd']:.3g} mN and {1e3 * d['moment_sd']:.3g} mN m, "
+            f"correlated over {d['correlation_s']:.2g} s."
+        )
+    lines.append(
+        f"Seed {answer.get('seed', '?')}; {answer.get('runtime_s', 0.0):.0f} s. Numbers: "
+        "diagnosis.json; figures as files: folder figures."
+    )
+    return section("About these numbers", *(paragraph(line) for line in lines))

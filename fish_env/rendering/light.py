@@ -10,8 +10,8 @@ UP, LEVEL, DOWN = (
     np.array(colour, float) for colour in ((88, 186, 200), (30, 112, 142), (7, 42, 74))
 )
 """Colour of endless water seen upwards, level and downwards."""
-VISIBILITY = 3.2
-"""m. Distance over which contrast falls to 1/e."""
+VISIBILITY, CLEAR = 3.0, 0.6
+"""m. Distance over which contrast falls to 1/e, and up to which it does not fall at all."""
 SUN = np.array([0.25, -0.35, -0.90])
 """Where light comes from (unit, inertial; up is -z)."""
 AMBIENT, SKY, DIRECT, SHINE = 0.46, 0.26, 0.46, 0.35
@@ -30,7 +30,8 @@ def water_colour(down: npt.ArrayLike) -> FloatArray:
 
 def clearness(distance: npt.ArrayLike) -> FloatArray:
     """How much of an object's own colour is left at distances (...,) (m)."""
-    return np.asarray(np.exp(-np.asarray(distance) / VISIBILITY))
+    hazy = np.maximum(np.asarray(distance) - CLEAR, 0.0)
+    return np.asarray(np.exp(-hazy / VISIBILITY))
 
 
 def hazed(colours: FloatArray, points: FloatArray, eye: FloatArray) -> FloatArray:

@@ -76,7 +76,7 @@ def draw_plumb_line(canvas: Canvas, scene: Scene, goal: Goal) -> None:
 def wake_points(scene: Scene, clear: float) -> FloatArray:
     """(n, 3) the way the fish came (m), but for what is nearer to its middle than ``clear``."""
     past = scene.wake[-LONGEST:]
-    return past[np.linalg.norm(past - scene.position, axis=1) > clear]
+    return np.asarray(past[np.linalg.norm(past - scene.position, axis=1) > clear])
 
 
 def draw_wake(canvas: Canvas, points: FloatArray, which: npt.NDArray[np.bool_]) -> None:
@@ -105,5 +105,5 @@ def draw_shadow(canvas: Canvas, outline: FloatArray, tank: Tank) -> None:
     flat = outline.copy()
     flat[:, 2] = tank.bottom
     middle = flat.mean(axis=0)
-    for size in (1.0 + 0.9 * height, 1.0 + 0.5 * height, 1.0 + 0.15 * height, 0.8):
-        canvas.sheet(middle + size * (flat - middle), (16, 30, 34), 0.22 / (1.0 + 1.2 * height))
+    for size in np.linspace(1.0 + 0.9 * height, 0.8, 7):
+        canvas.sheet(middle + size * (flat - middle), (16, 30, 34), 0.13 / (1.0 + 1.2 * height))

@@ -109,10 +109,11 @@ def between(first: Scene, second: Scene, share: float) -> Scene:
 
     Args:
         first: earlier scene.
-        second: later scene; its wake, goal and label are those of the moment.
+        second: later scene; its goal and label are those of the moment. One that is not later,
+            the start of another episode, is returned as it is.
         share: 0 at the first, 1 at the second.
     """
-    if share >= 1.0:
+    if share >= 1.0 or second.time_s <= first.time_s:
         return second
 
     def mixed(a: npt.ArrayLike, b: npt.ArrayLike) -> FloatArray:

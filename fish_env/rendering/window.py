@@ -21,6 +21,9 @@ FRAMES_S = 30
 UNSEEN = ("offscreen", "dummy")
 """Drivers of the library that show nothing."""
 NOTE_S = 5.0
+"""For how long a new window says that there is help."""
+LONGEST_S = 1.0
+"""Scenes further apart are shown one after the other."""
 TURN, ZOOM = 0.008, 0.9
 """Radians for a pixel dragged, distance for a click of the wheel."""
 KEY_TURN = 0.12
@@ -59,6 +62,7 @@ class Window:
         self._mosaic = Mosaic(setting, count, size)
         self._last: Sequence[Scene] | None = None
         self._due = 0.0
+        self._clock = pygame.time.Clock()
         self._helped = False
         self._stepping = False
         self._noted_until = time.monotonic() + NOTE_S
@@ -75,36 +79,42 @@ class Window:
 
         Does nothing once the window is closed. Waits while it is paused.
         """
-        before, self._last = self._last, scenes
-        period = scenes[0].time_s - before[0].time_s if before else 0.0
-        if before is None or not 0.0 < period <= 1.0:
-            before, period = scenes, 0.0
+        before, self._last = self._last or scenes, scenes
+        pairs = list(zip(before, scenes, strict=True))
+        period = max(0.0, *(b.time_s - a.time_s for a, b in pairs), 0.0)
         now = time.monotonic()
-        start = self._due if now - self._due < period else now
+        start = self._due if abs(now - self._due) <= period else now
         self._due = start + period
         share = 0.0
         while self.is_open and share < 1.0:
-            share = (
-                min(1.0, (time.monotonic() - start + 1.0 / FRAMES_S) / period) if period else 1.0
-            )
-            self._draw([between(a, b, share) for a, b in zip(before, scenes, strict=True)])
-            self._wait(1.0 / FRAMES_S if share < 1.0 else self._due - time.monotonic())
+            share = self._share(start, period)
+            self._draw([between(a, b, share) for a, b in pairs])
+            self._wait()
         self._hold(scenes)
+
+    @staticmethod
+    def _share(start: float, period: float) -> float:
+        """How far the picture that appears next is on its way from scene to scene."""
+        if not 0.0 < period <= LONGEST_S:
+            return 1.0
+        ahead = time.monotonic() + 1.0 / FRAMES_S - start
+        return min(1.0, max(0.0, ahead / period))
 
     def _hold(self, scenes: Sequence[Scene]) -> None:
         """Stand still while paused; the camera can be moved."""
         held = self.paused
         while self.is_open and self.paused and not self._stepping:
             self._draw(scenes)
-            self._wait(1.0 / FRAMES_S)
+            self._wait()
         self._stepping = False
         if held:
             self._due = time.monotonic()
 
-    def _wait(self, seconds: float) -> None:
+    def _wait(self) -> None:
+        """Let the user act, until the next frame is due."""
         poll()
-        if seconds > 0.0 and self.is_open:
-            time.sleep(min(seconds, 1.0 / FRAMES_S))
+        if self.is_open:
+            self._clock.tick(FRAMES_S)
 
     def _draw(self, scenes: Sequence[Scene]) -> None:
         if self._window is None:

@@ -38,8 +38,8 @@ def in_words(row: dict[str, float]) -> str:
     """One evaluation in a line."""
     return (
         f"{row['steps']:>10,.0f} steps, {row['cpu_s']:6.1f} s of processor: "
-        f"success {100 * row['success_rate']:3.0f} % (worst {100 * row['worst_success_rate']:.0f}), "
-        f"return {row['episode_return']:6.1f}, "
+        f"success {100 * row['success_rate']:3.0f} % "
+        f"(worst {100 * row['worst_success_rate']:.0f}), return {row['episode_return']:6.1f}, "
         f"depth {100 * row['depth_rmse_m']:.1f} cm, "
         f"heading {np.degrees(row['heading_rmse_rad']):.1f} degrees rms, "
         f"{1000 * row['mean_power_w']:.0f} mW"

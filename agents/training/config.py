@@ -150,7 +150,8 @@ class TrainConfig:
         disturbances: suites whose conditions (not episodes) are trained under; the fish are
             shared out evenly, and a name may stand there twice.
         environment: further keyword arguments of the environment; they replace those of the suite.
-        reward: changes of ``reward`` in the environment's settings that hold in training alone.
+        settings: changes of the environment's settings (configs/env) that hold in training alone,
+            such as sharper rewards or faster goals; evaluations go without.
         history: what the policy sees of the past.
         network: see :class:`NetworkSettings`.
         ppo: see :class:`Ppo`.
@@ -169,7 +170,7 @@ class TrainConfig:
     num_envs: int = 64
     disturbances: tuple[str, ...] = ("calm",)
     environment: Mapping[str, Any] = field(default_factory=dict)
-    reward: Mapping[str, Any] = field(default_factory=dict)
+    settings: Mapping[str, Any] = field(default_factory=dict)
     history: History = field(default_factory=History)
     network: NetworkSettings = field(default_factory=NetworkSettings)
     ppo: Ppo = field(default_factory=Ppo)
@@ -194,8 +195,11 @@ class TrainConfig:
             self.algorithm != "ppo" or rollout % self.ppo.batch_size == 0,
             f"ppo.batch_size must divide n_steps x num_envs, {rollout}",
         )
-        for key in ("task", *(("config",) if self.reward else ())):
-            _check(key not in self.environment, f"environment.{key}: not together with {key}")
+        for key, own in {"task": "task", "config": "settings"}.items():
+            _check(
+                key not in self.environment or not getattr(self, own),
+                f"environment.{key}: not together with '{own}'",
+            )
         known = inspect.signature(env_options).parameters
         for key in self.environment:
             _check(key in known, f"environment: unknown key '{key}'; known: {', '.join(known)}")
@@ -207,7 +211,7 @@ class TrainConfig:
         self.history_spec(checked.config.control_period)
 
     def options(self, name: str, training: bool) -> dict[str, Any]:
-        """Keyword arguments of the environment, with the reward of the training if asked for.
+        """Keyword arguments of the environment, with the settings of the training if asked for.
 
         Args:
             name: one of the disturbances.
@@ -215,8 +219,8 @@ class TrainConfig:
         """
         suite = dict(load_suite(name).environment)
         options: dict[str, Any] = {"task": self.task} | suite | dict(self.environment)
-        if training and self.reward:
-            options["config"] = {"reward": dict(self.reward)}
+        if training and self.settings:
+            options["config"] = dict(self.settings)
         return options
 
     def history_spec(self, period_s: float) -> HistorySpec:

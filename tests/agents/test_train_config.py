@@ -55,7 +55,7 @@ def test_a_shipped_configuration_reads_and_writes(name, tmp_path):
         ({"environment": {"curent": [0, 0, 0]}}, "unknown key 'curent'"),
         ({"environment": {"current": [0, 0]}}, "three speeds"),
         ({"environment": {"task": "hold"}}, "task"),
-        ({"reward": {"weights": {"depht": 1.0}}}, "depht"),
+        ({"settings": {"reward": {"weights": {"depht": 1.0}}}}, "depht"),
         ({"disturbances": ["storm"]}, "storm"),
         ({"disturbances": "calm"}, "must be a list"),
         ({"disturbances": []}, "at least one"),
@@ -88,8 +88,10 @@ def test_changes_replace_what_the_file_says(tmp_path):
     assert (config.name, config.seed, config.total_steps) == ("mine", 3, 1000)
 
 
-def test_a_training_knows_the_conditions_of_its_suite_but_not_its_reward_on_the_side(tmp_path):
-    path = written(tmp_path, disturbances=["noisy"], reward={"margins": {"depth": 0.05}})
+def test_settings_of_a_training_do_not_hold_on_the_side(tmp_path):
+    path = written(
+        tmp_path, disturbances=["noisy"], settings={"reward": {"margins": {"depth": 0.05}}}
+    )
     config = load_train_config(path)
     assert config.options("noisy", training=True)["config"]["reward"]["margins"]["depth"] == 0.05
     assert "config" not in config.options("noisy", training=False)

@@ -278,15 +278,16 @@ def _seen(p: Answer) -> tuple[str, ...]:
     sizes, plausible = [], []
     known = _known_parameters(p["name"])
     for name, size in p["smallest_detectable"].items():
-        unit, around = "", ""
+        unit, around, upto = "", "", ""
         if name in known:
             parameter = known[name]
-            unit = "" if parameter.unit == "-" else f" {parameter.unit}"
+            unit = "" if parameter.unit == "-" else f" {parameter.unit.replace('^2', '²')}"
             neutral = parameter.neutral
-            around = f" from {neutral:g}" if neutral not in (0.0, float("inf")) else ""
+            around = f" from {neutral:g}" if np.isfinite(neutral) and neutral else ""
+            upto = "up to " if np.isposinf(neutral) else ""
             low, high = parameter.plausible
             plausible.append(text(f"{low:g} to {high:g}{unit}"))
-        sizes.append(text(f"{name} {number(size)}{unit}{around}"))
+        sizes.append(text(f"{name} {upto}{number(size)}{unit}{around}"))
     near = p.get("most_confusable")
     return (
         text(p["name"]),
@@ -311,7 +312,8 @@ def experiment(answer: Answer, series: Series, folder: Path) -> str:
     schedule = proposal.get("schedule")
     if not schedule:
         return ""
-    aim = ", ".join(proposal.get("separates", []))
+    aim = "to separate" if answer["verdict"] == "ambiguous" else "to show"
+    goal = f", {aim}: {', '.join(proposal['separates'])}" if proposal.get("separates") else ""
     units = {name: COMMAND_UNITS[name] for name in schedule[0] if name in COMMAND_UNITS}
     heads = ["from (s)", *(f"{n.replace('_', ' ')} ({unit})" for n, (unit, _) in units.items())]
     rows = [
@@ -321,9 +323,7 @@ def experiment(answer: Answer, series: Series, folder: Path) -> str:
     name = str(proposal.get("manoeuvre", "the schedule below"))
     return section(
         "Next experiment",
-        paragraph(
-            f"Fly “{name}” from rest" + (f", to tell apart or to see: {aim}." if aim else ".")
-        ),
+        paragraph(f"Fly “{name}” from rest{goal}."),
         figure(draw.draw_schedule(schedule, folder), f"Commands of “{name}”."),
         table(heads, rows, "Each row holds until the next"),
         key="next",

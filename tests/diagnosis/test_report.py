@@ -1,0 +1,131 @@
+"""The report holds what the answer says, for every verdict, with series or without."""
+
+import re
+
+import numpy as np
+import pytest
+
+from fish_env.diagnosis.answer import words
+from fish_env.diagnosis.regimes import localise_fits
+from fish_env.diagnosis.report import series_from, write_report
+from fish_env.diagnosis.report.html import inline, text
+from fish_env.diagnosis.verdict import VERDICTS
+from fish_env.identification.estimator import fit
+from fish_env.identification.problem import Point, Problem
+from tests.diagnosis.report_cases import answer, run_series, steady_series
+
+NETWORK = re.compile(r"""(src|href)=["'](?!data:|#)|@import|url\((?!['"]?(#|data:))""")
+
+
+@pytest.fixture(scope="module")
+def full(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("report")
+    return write_report(answer(), run_series(), folder).read_text(), folder
+
+
+def test_the_page_has_every_part(full):
+    page, _ = full
+    for part in (
+        "The simulation lacks servo_lag", "0.05 to 0.058", "rf-replay", "r01 (kept for judging)",
+        "Where the misfit sits", "tail phase 0 to 45 deg", "never visited", "Ranking",
+        "could not have shown: surface_drag", "tether (0.61)", "0.004 m/s", "Next experiment",
+        "mass.total", "closes 96 %", "a note about this run", "one note",
+    ):  # fmt: skip
+        assert part in page, part
+
+
+def test_nothing_is_asked_of_a_network_and_nothing_breaks_out(full):
+    page, _ = full
+    markup = re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
+    assert not NETWORK.search(markup)
+    assert "pool &lt;b&gt;" in page
+    assert "pool <b>" not in page
+    assert "three.js authors" in page
+
+
+def test_the_network_check_notices_a_link():
+    assert NETWORK.search('<img src="https://example.org/a.png">')
+    assert not NETWORK.search('<use href="#a"/><path clip-path="url(#b)"/>')
+
+
+def test_figures_are_files_too(full):
+    _, folder = full
+    names = {"misfit", "regimes", "ranking", "gain", "next_experiment", "run_r01", "run_r02"}
+    for name in names:
+        assert (folder / "figures" / f"{name}.png").read_bytes()[:4] == b"\x89PNG"
+        assert "<text" in (folder / "figures" / f"{name}.svg").read_text()
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_every_verdict_has_a_page_without_series(verdict, tmp_path):
+    said = answer(verdict)
+    page = write_report(said, None, tmp_path).read_text()
+    assert text(words(said)) in page
+    assert 'class="rf-replay"' not in page
+    assert ("What the extension gains" in page) == bool(said["gain"])
+
+
+def test_only_what_the_words_need_is_needed(tmp_path):
+    least = {"verdict": "no_misfit", "gain": None} | dict.fromkeys(
+        ("causes", "alternatives", "preconditions", "unexplained"), []
+    )
+    assert "<h1>" in write_report(least, None, tmp_path).read_text()
+
+
+def test_a_steady_table_is_shown_condition_by_condition(tmp_path):
+    page = write_report(answer(), steady_series(), tmp_path).read_text()
+    assert "Condition by condition" in page
+    assert "f (kept for judging)" in page
+    assert 'class="rf-replay"' not in page
+    assert (tmp_path / "figures" / "steady.svg").exists()
+
+
+def test_a_quick_answer_draws_fewer_runs(tmp_path):
+    write_report(answer(quick=True), run_series(), tmp_path)
+    assert (tmp_path / "figures" / "run_r01.svg").exists()
+    assert not (tmp_path / "figures" / "run_r02.svg").exists()
+
+
+def test_figures_of_an_earlier_diagnosis_go(tmp_path):
+    write_report(answer(), None, tmp_path)
+    assert (tmp_path / "figures" / "ranking.svg").exists()
+    write_report(answer(ranking=[]), None, tmp_path)
+    assert not (tmp_path / "figures" / "ranking.svg").exists()
+
+
+def test_drawings_follow_the_readers_ground():
+    svg = '<?xml version="1.0"?>\n<svg><metadata>m</metadata><path style="stroke: #222222"/></svg>'
+    assert inline(svg) == '<svg><path style="stroke: currentColor"/></svg>'
+
+
+@pytest.mark.slow
+def test_series_are_predictions_of_the_two_models(tmp_path):
+    from fish_env.data import load_dataset
+    from fish_env.diagnosis.gain import measure_gain
+    from tests.diagnosis.small_cases import small_case
+
+    truth = small_case(tmp_path / "data", {"servo_lag": 1.0}, runs=3, duration=7.0)
+    dataset = load_dataset(tmp_path / "data")
+    baseline = fit(Problem(dataset, None, ("r01", "r02")), rounds=1, iterations=2)
+    lag = {"effects.servo_lag.time_constant": truth.effects["servo_lag"]["time_constant"]}
+    start = Point(np.zeros_like(baseline.point.z), lag)
+    extended = fit(baseline.problem, ("servo_lag",), start, rounds=1, iterations=2)
+    rng = np.random.default_rng(0)
+    place = localise_fits(baseline.problem, baseline, extended, rng)
+    series = series_from(dataset, baseline, extended, ("r03",), place)
+    assert [run.id for run in series.runs] == ["r03", "r01", "r02"]
+    assert [run.final for run in series.runs] == [True, False, False]
+    judged = series.runs[0]
+    error = {
+        name: np.nanstd(judged.measured["yaw"] - predicted["yaw"])
+        for name, predicted in (("before", judged.baseline), ("after", judged.extended))
+    }
+    assert error["after"] < 0.5 * error["before"]
+    measured_gain = measure_gain(Problem(dataset, None, ("r03",)), baseline, extended, rng)
+    assert judged.fit_percent["extended"] == pytest.approx(measured_gain.fit_percent.extended)
+    assert judged.fit_percent["baseline"] == pytest.approx(measured_gain.fit_percent.baseline)
+    assert [motion.role for motion in judged.motions] == ["measured", "baseline", "extended"]
+    assert np.isfinite(judged.motions[2].frames.position).all()
+    alone = series_from(dataset, baseline, baseline)
+    assert alone.runs[0].extended == {}
+    assert len(alone.runs[0].motions) == 2

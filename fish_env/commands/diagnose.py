@@ -82,7 +82,8 @@ def _causes(answer: dict[str, Any]) -> Table:
 
 
 def _misfit(answer: dict[str, Any]) -> Table:
-    title = "One-step prediction errors in units of the noise (1: nothing left)"
+    errors = "Errors of averages" if answer.get("kind") == "steady" else "One-step prediction errors"
+    title = f"{errors} in units of the noise (1: nothing left)"
     table = _table(title, "channel", "refitted baseline", "with the causes")
     for name, pair in answer["misfit"].items():
         table.add_row(name, f"{pair['baseline']:.2f}", f"{pair['extended']:.2f}")

@@ -203,9 +203,15 @@ def _gained(answer: Plain) -> str:
         return "There were too few runs to keep some for judging the gain."
     fit = gain["fit_percent"]
     return (
-        f"On runs kept for judging, predictions over 3 s fit {fit['extended']:.0f} % with it and "
+        f"On {_judged(answer)} fit {fit['extended']:.0f} % with it and "
         f"{fit['baseline']:.0f} % without."
     )
+
+
+def _judged(answer: Plain) -> str:
+    if answer.get("kind") == "steady":
+        return "conditions kept for judging, predicted averages"
+    return "runs kept for judging, predictions over 3 s"
 
 
 def _blind(answer: Plain) -> str:

@@ -21,6 +21,8 @@ from fish_env.params.schema import FishParams
 
 FloatArray = npt.NDArray[np.float64]
 DT_S = 0.01
+SLOWEST = 0.1
+"""Share of a beat; a tail that is slower, or lost, gets the commanded time and is not steady."""
 
 
 class SteadyProblem:
@@ -142,4 +144,5 @@ def _pace(finder: OrbitFinder) -> FloatArray:
     states = finder.from_rest(everyone, 1)
     after, _ = finder.beat(states, everyone)
     turns = (after[PHASE] - states[PHASE]) / (2.0 * np.pi)
-    return np.where(finder.commands[:, FREQUENCY] > 0.0, np.round(turns, 12), 1.0)
+    beating = (finder.commands[:, FREQUENCY] > 0.0) & (turns > SLOWEST)
+    return np.where(beating, np.round(turns, 12), 1.0)

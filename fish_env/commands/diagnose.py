@@ -82,7 +82,8 @@ def _causes(answer: dict[str, Any]) -> Table:
 
 
 def _misfit(answer: dict[str, Any]) -> Table:
-    errors = "Errors of averages" if answer.get("kind") == "steady" else "One-step prediction errors"
+    steady = answer.get("kind") == "steady"
+    errors = "Errors of averages" if steady else "One-step prediction errors"
     title = f"{errors} in units of the noise (1: nothing left)"
     table = _table(title, "channel", "refitted baseline", "with the causes")
     for name, pair in answer["misfit"].items():

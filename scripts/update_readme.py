@@ -1,7 +1,8 @@
 """Writes the generated parts of README.md: `python -m scripts.update_readme`.
 
-They stand between the comments `<!-- NAME -->` and `<!-- end of NAME -->`: the latest speed
-measurement in scripts/bench/results, and how many of the paper's statements are held.
+They stand between the comments `<!-- NAME -->` and `<!-- end of NAME -->`: the headlines of the
+latest measurements of speed and of the diagnosis, and how many of the paper's statements are held.
+The tables themselves are on docs/benchmarks.md and docs/paper-statements.md.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from scripts.bench.report import short
 ROOT = Path(__file__).resolve().parents[1]
 README = ROOT / "README.md"
 RESULTS = ROOT / "scripts" / "bench" / "results"
+DIAGNOSIS = ROOT / "results"
 STATEMENTS = ROOT / "docs" / "paper-statements.md"
 
 
@@ -37,36 +39,29 @@ def updated(text: str, blocks: Mapping[str, Callable[[], str]]) -> str:
 
 
 def speed(folder: Path = RESULTS) -> str:
-    """The latest measurement as a table, with what was promised."""
+    """The latest measurement in a few lines: how fast, and what was promised."""
     files = sorted(folder.glob("speed-*.json"))
     if not files:
-        return "Not measured yet on this version: `make bench` fills in the table."
+        return "* Speed: not measured yet on this version; `make bench` does."
     record = json.loads(files[-1].read_text(encoding="utf-8"))
     machine = record["machine"]
-    versions = ", ".join(f"{n} {v}" for n, v in record["versions"].items() if v != "not installed")
+    own = [row for row in record["measured"] if row["name"].startswith(OURS)]
     return "\n".join(
         [
-            "| environment | fish | threads | env steps/s | simulated s per s |",
-            "| --- | --: | --: | --: | --: |",
-            *(_speed_row(row) for row in record["measured"]),
-            *(f"| {row['name']} | | | not measured | |" for row in record["missing"]),
-            "",
+            f"* Speed, in control steps of 0.1 s: {', '.join(map(_speed_words, own))} "
+            f"({machine['cores']} cores of {machine['cpu']}, {record['date']}).",
             *(f"* {_verdict(verdict)}" for verdict in record["verdicts"]),
-            "",
-            f"Measured {record['date']} by `make bench` on {machine['cores']} cores of "
-            f"{machine['cpu']}, Python {machine['python']}; {versions}. All in one process, in "
-            "turn; medians. Control periods and physics steps differ: the "
-            f"[full table](scripts/bench/results/{files[-1].stem}.md) has them.",
         ]
     )
 
 
-def _speed_row(row: Mapping[str, Any]) -> str:
-    rate = row["env_steps_per_s"]["median"]
-    return (
-        f"| {row['name']} | {row['envs']} | {row['threads']} | {short(rate)} "
-        f"| {short(row['simulated_s_per_s'])} |"
-    )
+OURS = "RoboticFish3D"
+
+
+def _speed_words(row: Mapping[str, Any]) -> str:
+    rate = short(row["env_steps_per_s"]["median"])
+    threads = f"{row['threads']} thread{'s' * (row['threads'] > 1)}"
+    return f"{rate}/s for {row['envs']} fish on {threads}"
 
 
 def _verdict(verdict: Mapping[str, Any]) -> str:
@@ -77,8 +72,35 @@ def _verdict(verdict: Mapping[str, Any]) -> str:
     return f"{head}times as fast is the aim; it is {ratio:.2g} times: {verdict['verdict']}."
 
 
+def diagnosis(folder: Path = DIAGNOSIS) -> str:
+    """How often the latest full run of the hidden-effect suite was right, in one line."""
+    files = sorted(folder.glob("diagnosis-[0-9]*.json"))
+    if not files:
+        return (
+            "* Diagnosis: no full run of the hidden-effect suite is published yet; "
+            "`make benchmark-diagnosis` does one."
+        )
+    record = json.loads(files[-1].read_text(encoding="utf-8"))
+    rates = {title: record["overall"][key] for key, title in HEADLINES.items()}
+    known = [f"{title} in {_share(rate)}" for title, rate in rates.items() if rate]
+    return f"* Diagnosis of {record['cases']} hidden cases, {record['date']}: {', '.join(known)}."
+
+
+HEADLINES = {
+    "name_right": "verdict and name right",
+    "wrong_single": "a wrong single name",
+    "false_alarm": "a false alarm where nothing is wrong",
+}
+"""Rates of the suite that the README quotes."""
+
+
+def _share(rate: Mapping[str, float]) -> str:
+    low, high = 100 * rate["low"], 100 * rate["high"]
+    return f"{rate['count']} of {rate['of']} ({low:.0f} to {high:.0f} %)"
+
+
 def statements(page: Path = STATEMENTS) -> str:
-    """How many of the paper's statements are held, for each motion."""
+    """How many of the paper's statements are held, in one line."""
     text = page.read_text(encoding="utf-8").partition("\n## ")[0]
     total = re.search(r"(\d+) of (\d+) statements are held", text)
     if total is None:
@@ -88,12 +110,15 @@ def statements(page: Path = STATEMENTS) -> str:
         cells = [cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]]
         if len(cells) == 5 and cells[0] != "motion" and "---" not in cells[0]:
             motions.setdefault(cells[0], []).append(cells[4].startswith("held"))
-    rows = [f"| {m} | {sum(held)} of {len(held)} |" for m, held in motions.items()]
-    head = ["| motion | statements held |", "| --- | --- |"]
-    return "\n".join([*head, *rows, f"| all | {total[1]} of {total[2]} |"])
+    parts = ", ".join(f"{m} {sum(held)} of {len(held)}" for m, held in motions.items())
+    return f"* The paper's statements that the model holds: {total[1]} of {total[2]} ({parts})."
 
 
-BLOCKS: dict[str, Callable[[], str]] = {"speed": speed, "statements": statements}
+BLOCKS: dict[str, Callable[[], str]] = {
+    "speed": speed,
+    "diagnosis": diagnosis,
+    "statements": statements,
+}
 
 if __name__ == "__main__":
     README.write_text(updated(README.read_text(encoding="utf-8"), BLOCKS), encoding="utf-8")

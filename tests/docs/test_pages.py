@@ -117,15 +117,17 @@ def test_a_block_is_written_anew_and_the_rest_is_kept():
         update_readme.updated(text, {"y": lambda: ""})
 
 
-def test_the_speed_table_takes_the_latest_measurement(tmp_path):
+def test_the_speed_headline_takes_the_latest_measurement(tmp_path):
     spread = {"median": 5.25, "low": 5.0, "high": 5.5}
-    row = {"name": "ours", "envs": 1, "threads": 1, "simulated_s_per_s": 12_000.0}
+    row = {"name": "RoboticFish3D-v0, gym.make", "envs": 1, "threads": 1}
     record = {
         "date": "2026-01-02",
-        "machine": {"cpu": "a CPU", "cores": 2, "python": "3.11.2"},
-        "versions": {"numpy": "2.1", "mujoco": "not installed"},
-        "measured": [row | {"env_steps_per_s": spread | {"median": 120_000.0}}],
-        "missing": [{"name": "theirs", "reason": "no module"}],
+        "machine": {"cpu": "a CPU", "cores": 2},
+        "measured": [
+            row | {"env_steps_per_s": spread | {"median": 120_000.0}},
+            row | {"envs": 64, "threads": 2, "env_steps_per_s": spread | {"median": 2e6}},
+            row | {"name": "theirs", "env_steps_per_s": spread},
+        ],
         "verdicts": [
             {"claim": "one", "against": "p", "target": 4.0, "ratio": spread, "verdict": "met"},
             {"claim": "two", "against": "p", "target": 6.0, "ratio": None, "verdict": "-"},
@@ -133,10 +135,21 @@ def test_the_speed_table_takes_the_latest_measurement(tmp_path):
     }
     (tmp_path / "speed-2026-01-01.json").write_text("{}")
     (tmp_path / "speed-2026-01-02.json").write_text(json.dumps(record))
-    table = update_readme.speed(tmp_path)
-    assert "| ours | 1 | 1 | 120k | 12k |" in table
-    assert "| theirs | | | not measured | |" in table
-    assert "* One: at least 4 times as fast is the aim; it is 5.2 times: met." in table
-    assert "* Two: at least 6 times as fast is the aim; not measured." in table
-    assert "mujoco" not in table
-    assert "Not measured" in update_readme.speed(tmp_path / "none")
+    lines = update_readme.speed(tmp_path)
+    assert "120k/s for 1 fish on 1 thread, 2M/s for 64 fish on 2 threads (2 cores of a" in lines
+    assert "* One: at least 4 times as fast is the aim; it is 5.2 times: met." in lines
+    assert "* Two: at least 6 times as fast is the aim; not measured." in lines
+    assert "not measured" in update_readme.speed(tmp_path / "none")
+
+
+def test_the_headline_of_the_diagnosis_gives_rates_with_intervals(tmp_path):
+    rate = {"count": 9, "of": 10, "rate": 0.9, "low": 0.555, "high": 0.997}
+    overall = {"name_right": rate, "wrong_single": rate | {"count": 0}, "false_alarm": None}
+    record = {"date": "2026-01-02", "cases": 10, "overall": overall}
+    (tmp_path / "diagnosis-2026-01-02.json").write_text(json.dumps(record))
+    (tmp_path / "diagnosis-quick-2026-01-03.json").write_text("{}")
+    assert update_readme.diagnosis(tmp_path) == (
+        "* Diagnosis of 10 hidden cases, 2026-01-02: verdict and name right in 9 of 10 "
+        "(56 to 100 %), a wrong single name in 0 of 10 (56 to 100 %)."
+    )
+    assert "no full run" in update_readme.diagnosis(tmp_path / "none")

@@ -11,6 +11,7 @@ from typing import Any
 import yaml
 
 from agents.evaluation.suites import load_suite
+from agents.policies.files import ACTIONS
 from agents.policies.history import HistorySpec
 from agents.policies.network import ACTIVATIONS
 from agents.training.schema import build
@@ -44,16 +45,23 @@ class NetworkSettings:
         layers: widths of the hidden layers.
         activation: ``tanh`` or ``relu``.
         log_std_init: logarithm of the first standard deviation of actions (PPO).
+        first_action: mean action before anything is learnt (PPO); zeros if empty.
     """
 
     layers: tuple[int, ...] = (64, 64)
     activation: str = "tanh"
     log_std_init: float = -0.5
+    first_action: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         _check(bool(self.layers) and min(self.layers) > 0, "network.layers: positive widths")
         names = ", ".join(ACTIVATIONS)
         _check(self.activation in ACTIVATIONS, f"network.activation: one of {names}")
+        first = self.first_action
+        _check(
+            not first or (len(first) == ACTIONS and max(map(abs, first)) <= 1.0),
+            f"network.first_action: {ACTIONS} numbers from -1 to 1",
+        )
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
+import torch
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.utils import LinearSchedule
 from torch import nn
@@ -26,7 +27,11 @@ def make_model(config: TrainConfig, stack: Stack) -> Model:
     common: dict[str, Any] = {"device": "cpu", "seed": config.seed}
     if config.algorithm == "ppo":
         policy["log_std_init"] = network.log_std_init
-        return PPO("MlpPolicy", stack.outside, policy_kwargs=policy, **_of(config.ppo), **common)
+        learner = PPO("MlpPolicy", stack.outside, policy_kwargs=policy, **_of(config.ppo), **common)
+        if network.first_action:
+            bias = learner.policy.action_net.get_parameter("bias")
+            bias.data = torch.tensor(network.first_action)
+        return learner
     settings = _of(config.sac)
     return SAC("MlpPolicy", stack.outside, policy_kwargs=policy, **settings, **common)
 

@@ -207,3 +207,12 @@ def test_a_network_that_cannot_be_is_refused(policy_file, tmp_path, broken):
 def test_an_unknown_task_has_no_shipped_policy():
     with pytest.raises(ConfigError, match="juggle"):
         shipped("juggle")
+
+
+def test_an_untrained_policy_begins_with_the_first_action():
+    first = (0.0, 0.8, -0.2, 0.1, 0.0)
+    config = tiny()
+    config = replace(config, network=replace(config.network, first_action=first))
+    network = exported(config)[2].network
+    seen = np.random.default_rng(4).normal(size=(10, len(network.mean))).astype(np.float32)
+    np.testing.assert_allclose(network(seen), np.tile(first, (10, 1)), atol=0.05)

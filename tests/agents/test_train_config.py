@@ -50,6 +50,8 @@ def test_a_shipped_configuration_reads_and_writes(name, tmp_path):
         ({"network": {"layers": []}}, "layers"),
         ({"network": {"layers": 64}}, "must be a list"),
         ({"network": {"activation": "gelu"}}, "activation"),
+        ({"network": {"first_action": [0.0, 2.0, 0.0, 0.0, 0.0]}}, "first_action"),
+        ({"network": {"first_action": [0.5]}}, "first_action"),
         ({"history": {"frames": 0}}, "frames"),
         ({"history": {"low_pass_s": [0.01]}}, "low_pass_s"),
         ({"environment": {"curent": [0, 0, 0]}}, "unknown key 'curent'"),

@@ -11,7 +11,7 @@ from fish_env.commands.case import Case, read_case
 from fish_env.comparison import RunsComparison
 from fish_env.data import Dataset
 from fish_env.params import FishParams, load_fish
-from fish_env.replay import Scene, motion_from_run, motion_from_trajectory, write_replay
+from fish_env.replay import Group, motion_from_run, motion_from_trajectory, write_replay
 from fish_env.replay.reading import read_replay_file
 from fish_env.simulator import Simulator
 
@@ -41,8 +41,8 @@ def replay_files(
     named = fish or next((item.fish for item in read if item.fish), None)
     shown = load_fish(named) if named else case.fish if case else load_fish(DEFAULT_FISH)
     title = ", ".join(item.motion.name for item in read)
-    scene = Scene(title, tuple(item.motion for item in read))
-    return _written(console, [scene], shown, out, f"Replay of {title}")
+    group = Group(title, tuple(item.motion for item in read))
+    return _written(console, [group], shown, out, f"Replay of {title}")
 
 
 def replay_case(console: Console, case: Case, dt: float, name: str, out: Path) -> Path:
@@ -58,8 +58,8 @@ def replay_case(console: Console, case: Case, dt: float, name: str, out: Path) -
     simulator = Simulator(case.fish, dt, case.effects)
     trajectory = simulator.run(case.commands, case.duration_s, case.initial, RATE_HZ)
     tail = simulator.outputs(trajectory)["tail_angle"]
-    scene = Scene(name, (motion_from_trajectory(trajectory, name, tail_angle=tail),))
-    return _written(console, [scene], case.fish, out, f"{name}: {case.fish.name}")
+    group = Group(name, (motion_from_trajectory(trajectory, name, tail_angle=tail),))
+    return _written(console, [group], case.fish, out, f"{name}: {case.fish.name}")
 
 
 def replay_comparison(
@@ -80,21 +80,21 @@ def replay_comparison(
         dt: Longest physics step, s.
         out: The page.
     """
-    simulator, scenes = Simulator(fish, dt), []
+    simulator, groups = Simulator(fish, dt), []
     for compared in comparison.runs:
         run = dataset.run(compared.id)
         trajectory = simulator.run(run.commands, initial=compared.start, sample_times_s=run.time_s)
         tail = simulator.outputs(trajectory)["tail_angle"]
         channels = dict(trajectory.channels) | dict(compared.simulated)
         simulated = motion_from_trajectory(trajectory, "simulated", "baseline", tail, channels)
-        scenes.append(Scene(run.id, (motion_from_run(run), simulated)))
-    return _written(console, scenes, fish, out, f"{comparison.dataset}: measured and simulated")
+        groups.append(Group(run.id, (motion_from_run(run), simulated)))
+    return _written(console, groups, fish, out, f"{comparison.dataset}: measured and simulated")
 
 
 def _written(
-    console: Console, scenes: Sequence[Scene], fish: FishParams, out: Path, title: str
+    console: Console, groups: Sequence[Group], fish: FishParams, out: Path, title: str
 ) -> Path:
-    page = write_replay(scenes, fish, out, title)
+    page = write_replay(groups, fish, out, title)
     size = page.stat().st_size / 1e6
     console.print(f"replay: {page} ({size:.1f} MB), open it in a browser", soft_wrap=True)
     return page

@@ -1,17 +1,17 @@
 """Replay: a page that opens offline, with fish swimming in three dimensions beside time plots."""
 
 from fish_env.replay.motion import (
+    Group,
     Motion,
     motion_from_channels,
     motion_from_run,
     motion_from_trajectory,
 )
 from fish_env.replay.page import component, component_scripts, component_style, write_replay
-from fish_env.replay.scene import Scene
 
 __all__ = [
+    "Group",
     "Motion",
-    "Scene",
     "component",
     "component_scripts",
     "component_style",

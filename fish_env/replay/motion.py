@@ -44,6 +44,19 @@ class Motion:
     notes: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Motions that are shown together.
+
+    Attributes:
+        name: Shown in the list of what can be chosen.
+        motions: They share one clock.
+    """
+
+    name: str
+    motions: tuple[Motion, ...]
+
+
 def motion_from_trajectory(
     trajectory: Trajectory,
     name: str,

@@ -9,7 +9,8 @@ from functools import cache
 from pathlib import Path
 
 from fish_env.params import FishParams
-from fish_env.replay.scene import Scene, page_data
+from fish_env.replay.motion import Group
+from fish_env.replay.packing import page_data
 
 STATIC = Path(__file__).with_name("static")
 VENDOR = ("vendor/three.min.js", "vendor/uplot.min.js")
@@ -18,12 +19,12 @@ SCRIPTS = ("data.js", "fish.js", "stage.js", "plots.js", "clock.js", "keys.js", 
 
 
 def write_replay(
-    scenes: Sequence[Scene], fish: FishParams, out: str | Path, title: str = "Replay"
+    groups: Sequence[Group], fish: FishParams, out: str | Path, title: str = "Replay"
 ) -> Path:
     """Writes a page with fish swimming in three dimensions beside linked time plots.
 
     Args:
-        scenes: What can be chosen; the motions of a scene are shown together.
+        groups: What can be chosen; the motions of a group are shown together.
         fish: Its size is drawn.
         out: The HTML file.
         title: Heading of the page.
@@ -37,7 +38,7 @@ def write_replay(
     parts = {
         "title": html.escape(title),
         "style": component_style(),
-        "body": component(scenes, fish, whole_page=True),
+        "body": component(groups, fish, whole_page=True),
         "scripts": component_scripts(),
     }
     for name, text in parts.items():
@@ -47,18 +48,18 @@ def write_replay(
 
 
 def component(
-    scenes: Sequence[Scene], fish: FishParams, name: str = "replay", whole_page: bool = False
+    groups: Sequence[Group], fish: FishParams, name: str = "replay", whole_page: bool = False
 ) -> str:
     """HTML of one replay, to be put anywhere in a page that has the style and the scripts.
 
     Args:
-        scenes: What can be chosen.
+        groups: What can be chosen.
         fish: Its size is drawn.
         name: Unique in the page.
         whole_page: Keys work everywhere in the page, and it plays from the start.
     """
     # "<" could end the script element that holds the data.
-    data = json.dumps(page_data(scenes, fish), separators=(",", ":"), allow_nan=False)
+    data = json.dumps(page_data(groups, fish), separators=(",", ":"), allow_nan=False)
     data = data.replace("<", "\\u003c")
     key = html.escape(name, quote=True)
     flag = ' data-whole-page="yes"' if whole_page else ""

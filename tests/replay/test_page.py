@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from fish_env.params import load_fish
-from fish_env.replay import Scene, motion_from_channels, motion_from_trajectory, write_replay
+from fish_env.replay import Group, motion_from_channels, motion_from_trajectory, write_replay
 from fish_env.simulator import InitialState, Simulator
 from tests.replay.browser import Browser
 
@@ -44,8 +44,8 @@ def page(tmp_path_factory):
     )
     few = {name: truth.channels[name] for name in ("x", "y", "yaw")}
     camera = motion_from_channels(truth.time_s, few, "camera", "measured")
-    scenes = [Scene("both", motions), Scene("camera only", (camera,))]
-    return write_replay(scenes, FISH, tmp_path_factory.mktemp("page") / "replay.html")
+    groups = [Group("both", motions), Group("camera only", (camera,))]
+    return write_replay(groups, FISH, tmp_path_factory.mktemp("page") / "replay.html")
 
 
 @pytest.fixture(scope="module")

@@ -24,7 +24,7 @@ from fish_env.diagnosis.report.html import (
 )
 from fish_env.diagnosis.report.series import SETTLED_S, ReportSeries, SteadySeries
 from fish_env.plotting.comparison import COMMAND_UNITS
-from fish_env.replay import Scene, component
+from fish_env.replay import Group, component
 
 Answer = Mapping[str, Any]
 Series = ReportSeries | SteadySeries | None
@@ -75,7 +75,7 @@ def swimming(answer: Answer, series: Series, folder: Path) -> str:
     """The replay: measured, baseline and extended fish in three dimensions."""
     if not isinstance(series, ReportSeries) or not series.runs:
         return ""
-    scenes = [Scene(_run_name(r.id, r.final), r.motions) for r in series.runs]
+    groups = [Group(_run_name(r.id, r.final), r.motions) for r in series.runs]
     notes = [f"{run.id}: {note}" for run in series.runs for note in run.notes]
     return section(
         "How it swims",
@@ -84,7 +84,7 @@ def swimming(answer: Answer, series: Series, folder: Path) -> str:
             f"the filter knows {SETTLED_S:g} s after the start. Small errors add up here; the "
             "predictions further down start afresh every few seconds."
         ),
-        component(scenes, series.fish, "runs"),
+        component(groups, series.fish, "runs"),
         *(paragraph(note, "rp-note") for note in notes),
         key="replay",
     )

@@ -5,18 +5,16 @@ Robofish.Fish = class {
     this.group = new THREE.Group();
     this.shape = shape;
     this.skin = [];
-    const centre = shape.tailRoot[0] + 0.97 * (shape.length / 2);
     const hull = new THREE.Group();
-    hull.position.x = centre;
+    hull.position.x = shape.nose - shape.length / 2;
     hull.add(this.mesh(Robofish.hullGeometry(shape), { opacity: 0.5, vertexColors: true }));
     this.addFins(hull);
     this.addEyes(hull);
     this.tail = new THREE.Group();
     this.tail.position.fromArray(shape.tailRoot);
     this.tail.add(this.mesh(Robofish.tailGeometry(shape), { opacity: 0.95, vertexColors: true }));
-    const side = shape.block;
     this.block = new THREE.Mesh(
-      new THREE.BoxGeometry(side, side, side),
+      new THREE.BoxGeometry(...shape.block),
       new THREE.MeshStandardMaterial({ color: 0xf5c400, roughness: 0.45, metalness: 0.3 }),
     );
     this.group.add(this.block, this.tail, hull);
@@ -36,7 +34,7 @@ Robofish.Fish = class {
     const { length, height, width } = this.shape;
     const back = [
       [0.12 * length, 0, -0.47 * height], [-0.05 * length, 0, -0.74 * height],
-      [-0.22 * length, 0, -0.68 * height], [-0.26 * length, 0, -0.38 * height],
+      [-0.22 * length, 0, -0.62 * height], [-0.26 * length, 0, -0.28 * height],
     ];
     hull.add(this.mesh(Robofish.fan(back), { opacity: 0.95 }));
     for (const side of [-1, 1]) {
@@ -60,7 +58,7 @@ Robofish.Fish = class {
       const pupil = new THREE.Mesh(new THREE.SphereGeometry(0.02 * length, 12, 10), black);
       pupil.position.set(0.006 * length, side * 0.015 * length, 0);
       eye.add(ball, pupil);
-      eye.position.set(0.33 * length, side * 0.35 * width, -0.12 * height);
+      eye.position.set(0.33 * length, side * 0.365 * width, -0.12 * height);
       hull.add(eye);
     }
   }
@@ -79,8 +77,8 @@ Robofish.Fish = class {
   }
 };
 
-// A smooth body: elliptic sections, blunt at the nose and slender where the tail begins.
-Robofish.hullGeometry = ({ length, height, width }) => {
+// A smooth body of elliptic sections; `profile` is its outline from the nose to the tail.
+Robofish.hullGeometry = ({ length, height, width, profile }) => {
   const rings = 40;
   const sectors = 32;
   const points = [];
@@ -88,8 +86,9 @@ Robofish.hullGeometry = ({ length, height, width }) => {
   const faces = [];
   for (let i = 0; i <= rings; i += 1) {
     const along = Math.cos((Math.PI * i) / rings);
-    const round = Math.sqrt(Math.max(0, 1 - along * along));
-    const radius = along < 0 ? Math.max(round, 0.2 * Math.min(1, (1 + along) * 30 + 0.6)) : round;
+    const place = ((1 - along) / 2) * (profile.length - 1);
+    const index = Math.min(Math.floor(place), profile.length - 2);
+    const radius = profile[index] + (place - index) * (profile[index + 1] - profile[index]);
     for (let j = 0; j < sectors; j += 1) {
       const angle = (2 * Math.PI * j) / sectors;
       const down = Math.cos(angle);
@@ -109,11 +108,11 @@ Robofish.hullGeometry = ({ length, height, width }) => {
 };
 
 // Stalk and crescent fin, upright behind the root; seen from both sides.
-Robofish.tailGeometry = ({ tailLength, tailHeight, height }) => {
+Robofish.tailGeometry = ({ tailLength, tailSpan, height }) => {
   const outline = [
-    [0.02, -0.1 * height], [-0.45, -0.055 * height], [-0.72, -0.42 * tailHeight],
-    [-1.0, -0.5 * tailHeight], [-0.86, -0.16 * tailHeight], [-0.82, 0],
-    [-0.86, 0.16 * tailHeight], [-1.0, 0.5 * tailHeight], [-0.72, 0.42 * tailHeight],
+    [0.02, -0.1 * height], [-0.45, -0.055 * height], [-0.72, -0.42 * tailSpan],
+    [-1.0, -0.5 * tailSpan], [-0.86, -0.16 * tailSpan], [-0.82, 0],
+    [-0.86, 0.16 * tailSpan], [-1.0, 0.5 * tailSpan], [-0.72, 0.42 * tailSpan],
     [-0.45, 0.055 * height], [0.02, 0.1 * height],
   ];
   const points = [];

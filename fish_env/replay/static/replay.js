@@ -35,11 +35,11 @@ Robofish.Replay = class {
   build() {
     const make = Robofish.element;
     const parts = {};
-    parts.scenes = make("select", { "aria-label": "run" });
-    for (const [i, scene] of this.content.scenes.entries()) {
-      parts.scenes.append(make("option", { value: i }, scene.name));
+    parts.groups = make("select", { "aria-label": "run" });
+    for (const [i, group] of this.content.groups.entries()) {
+      parts.groups.append(make("option", { value: i }, group.name));
     }
-    parts.scenes.addEventListener("change", () => this.show(Number(parts.scenes.value)));
+    parts.groups.addEventListener("change", () => this.show(Number(parts.groups.value)));
     parts.tracks = make("div", { class: "rf-tracks", role: "group", "aria-label": "fish shown" });
     parts.caption = make("div", { class: "rf-caption" });
     parts.views = make("div", { class: "rf-views", role: "group", "aria-label": "views" });
@@ -56,8 +56,8 @@ Robofish.Replay = class {
     for (const [key, meaning] of Robofish.KEYS) {
       keys.append(make("dt", {}, key), make("dd", {}, meaning));
     }
-    const runs = make("label", { class: "rf-run" }, "Run ", parts.scenes);
-    runs.hidden = this.content.scenes.length < 2;
+    const runs = make("label", { class: "rf-run" }, "Run ", parts.groups);
+    runs.hidden = this.content.groups.length < 2;
     const top = make("div", { class: "rf-top" }, runs, parts.tracks);
     const more = make(
       "div", { class: "rf-more" },
@@ -90,9 +90,9 @@ Robofish.Replay = class {
     parts.bar = make("div", { class: "rf-bar" }, parts.play, parts.slider, parts.time, parts.speed);
   }
 
-  // Shows a scene; `again` keeps time, camera and what is hidden, for a change of colours.
+  // Shows a group; `again` keeps time, camera and what is hidden, for a change of colours.
   show(index, again = false) {
-    const packed = this.content.scenes[index];
+    const packed = this.content.groups[index];
     const moment = this.clock.time;
     const dark = Robofish.darkQuery.matches;
     if (!again) {

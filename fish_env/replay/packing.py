@@ -1,10 +1,9 @@
-"""Scenes of a replay, and their compact form inside a page."""
+"""The compact form of a replay inside its page."""
 
 from __future__ import annotations
 
 import base64
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -12,13 +11,15 @@ import numpy.typing as npt
 
 from fish_env.data.vocabulary import CHANNELS, Quantity
 from fish_env.params import FishParams
-from fish_env.replay.motion import Motion
-from fish_env.replay.shape import block_position, shape_of
+from fish_env.rendering.shape import FishShape, hull_profile
+from fish_env.replay.motion import Group, Motion
 
 FloatArray = npt.NDArray[np.float64]
 Plain = dict[str, Any]
 MOST_SAMPLES = 6000
 """A plot a thousand pixels wide shows no more."""
+OUTLINE = 61
+"""Points along the hull."""
 COLOURS: dict[str, tuple[str, str]] = {
     "measured": ("#222222", "#f0f0f0"),
     "baseline": ("#D55E00", "#F08A3C"),
@@ -49,28 +50,31 @@ _ORDER = ("z", "speed", "yaw", "pitch", "roll", "x", "y", "u", "v", "w", "p", "q
 _FIRST = ("z", "speed", "u", "yaw", "pitch", "roll")
 
 
-@dataclass(frozen=True, eq=False)
-class Scene:
-    """Motions that are shown together.
-
-    Attributes:
-        name: Shown in the list of scenes.
-        motions: They share one clock.
-    """
-
-    name: str
-    motions: tuple[Motion, ...]
-
-
-def page_data(scenes: Sequence[Scene], fish: FishParams) -> Plain:
+def page_data(groups: Sequence[Group], fish: FishParams) -> Plain:
     """Everything the page needs, ready for JSON; arrays as base64 of little-endian float32."""
+    shape = FishShape.of(fish)
     return {
         "format": "robofish-replay/1",
-        "shape": shape_of(fish),
-        "scenes": [
-            {"name": scene.name, "tracks": _tracks(scene, fish), "plots": _plots(scene)}
-            for scene in scenes
+        "shape": _sizes(shape),
+        "groups": [
+            {"name": group.name, "tracks": _tracks(group, shape), "plots": _plots(group)}
+            for group in groups
         ],
+    }
+
+
+def _sizes(shape: FishShape) -> Plain:
+    """Sizes that the page draws (m, body), and the hull's outline from nose to tail."""
+    return {
+        "nose": shape.nose,
+        "length": shape.length,
+        "width": shape.width,
+        "height": shape.height,
+        "profile": hull_profile(np.linspace(0.0, 1.0, OUTLINE)).round(4).tolist(),
+        "tailRoot": list(shape.tail_root),
+        "tailLength": shape.tail_length,
+        "tailSpan": shape.tail_span,
+        "block": list(shape.block),
     }
 
 
@@ -88,14 +92,15 @@ def colours_of(motions: Sequence[Motion]) -> list[tuple[str, str]]:
     return result
 
 
-def _tracks(scene: Scene, fish: FishParams) -> list[Plain]:
-    colours = colours_of(scene.motions)
-    return [_track(m, c, fish) for m, c in zip(scene.motions, colours, strict=True)]
+def _tracks(group: Group, shape: FishShape) -> list[Plain]:
+    colours = colours_of(group.motions)
+    return [_track(m, c, shape) for m, c in zip(group.motions, colours, strict=True)]
 
 
-def _track(motion: Motion, colours: tuple[str, str], fish: FishParams) -> Plain:
+def _track(motion: Motion, colours: tuple[str, str], shape: FishShape) -> Plain:
     frames, chosen = motion.frames, _thinned(len(motion.time_s))
-    block = np.column_stack([block_position(fish, frames.block), frames.block[:, 1]])
+    centres = [shape.block_centre(moved, angle) for moved, angle in frames.block]
+    block = np.column_stack([centres, frames.block[:, 1]])
     return {
         "name": motion.name,
         "role": motion.role,
@@ -119,9 +124,9 @@ def _thinned(count: int) -> slice:
     return slice(None, None, -(-count // MOST_SAMPLES))
 
 
-def _plots(scene: Scene) -> list[Plain]:
+def _plots(group: Group) -> list[Plain]:
     """Channels to plot, those that say most first and shown from the start."""
-    present = {name for motion in scene.motions for name in motion.channels}
+    present = {name for motion in group.motions for name in motion.channels}
     order = [name for name in (*_ORDER, "tail_angle") if name in present]
     first = [
         name for name in _FIRST if name in present and not (name == "u" and "speed" in present)

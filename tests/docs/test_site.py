@@ -1,4 +1,4 @@
-"""The site builds without a warning, and its pages fetch nothing from elsewhere."""
+"""The site builds without a warning, fetches nothing from elsewhere, and works in opened files."""
 
 import os
 import re
@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.docs.pages import ROOT
+from tests.replay.browser import Browser
 
 LOADED = {("script", "src"), ("link", "href"), ("img", "src"), ("iframe", "src"), ("source", "src")}
 
@@ -89,3 +90,71 @@ def test_formulas_are_left_to_katex(site):
 def test_docstrings_leave_no_roles_of_sphinx(site):
     page = (site / "api.html").read_text(encoding="utf-8")
     assert re.findall(r":(?:class|func|mod|meth):", page) == []
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    opened = Browser(tmp_path_factory.mktemp("profile"))
+    yield opened
+    opened.close()
+
+
+def pages_of(site: Path) -> list[Path]:
+    return sorted(page for page in site.glob("*.html") if page.name != "404.html")
+
+
+@pytest.mark.slow
+def test_every_page_opens_without_a_complaint_or_a_request(site, browser):
+    browser.complaints.clear()
+    browser.requests.clear()
+    for page in pages_of(site):
+        browser.open(page)
+        assert browser.complaints == [], page.name
+    assert {url.partition(":")[0] for url in browser.requests} <= {"file", "data", "blob"}
+
+
+UNDRAWN = (
+    "[...document.querySelectorAll('.arithmatex')].filter(e => !e.querySelector('.katex')).length"
+)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", ["model.html", "diagnosis.html"])
+def test_every_formula_is_drawn(page, site, browser):
+    browser.open(site / page)
+    assert browser.run("document.querySelectorAll('.katex').length") > 0
+    assert browser.run(UNDRAWN) == 0
+
+
+@pytest.mark.slow
+def test_a_formula_that_cannot_be_drawn_is_noticed(site, browser):
+    broken = site / "broken-formula.html"
+    text = (site / "model.html").read_text(encoding="utf-8")
+    broken.write_text(text.replace("\\(C\\)", "\\(\\frac{\\)"), encoding="utf-8")
+    browser.complaints.clear()
+    browser.open(broken)
+    assert browser.run(UNDRAWN) > 0
+    assert any("ParseError" in complaint for complaint in browser.complaints)
+    broken.unlink()
+
+
+@pytest.mark.slow
+def test_search_finds_an_effect_by_a_part_of_its_name(site, browser):
+    browser.open(site / "index.html")
+    field = "document.querySelector('.md-search__input')"
+    browser.run(f"{field}.focus(), {field}.value = 'backlash'")
+    browser.run(
+        f"{field}.dispatchEvent(new KeyboardEvent('keyup', {{key: 'h', bubbles: true}})), 1"
+    )
+    browser.wait_for("document.querySelectorAll('.md-search-result__item').length > 0")
+    assert "servo_" in browser.run("document.querySelector('.md-search-result__list').innerText")
+
+
+@pytest.mark.slow
+def test_no_page_is_wider_than_a_phone(site, browser):
+    wide = []
+    for page in pages_of(site):
+        browser.open(page, width=390, height=800)
+        if browser.run("document.documentElement.scrollWidth") > 390:
+            wide.append(page.name)
+    assert wide == []

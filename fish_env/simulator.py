@@ -111,7 +111,7 @@ def time_grid(sample_times: FloatArray, switches: FloatArray, dt: float) -> tupl
 class Simulator:
     """One fish in ideal water (plus its effects), driven by ideal actuators.
 
-    Example:
+    Examples:
         >>> from fish_env import Simulator, schedule
         >>> swim = schedule([{"t": 0.0, "tail_amplitude": 0.35, "tail_frequency": 2.0}])
         >>> trajectory = Simulator("zheng-2021-a").run(swim, duration_s=10.0)

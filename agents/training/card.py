@@ -42,14 +42,17 @@ def shares(progress: Progress, env_cpu_s: float) -> dict[str, float]:
     """How the processor time of training divides.
 
     Returns:
+        ``imitation``: what came before learning, if anything; of the rest,
         ``environment``: physics and its adapter; ``inference``: the rest of collecting experience
         (actions, values, normalisation, buffers); ``gradient``: updates, and what is left.
     """
     total = max(progress.cpu_s, 1e-9)
-    return {
+    imitation = progress.imitation_cpu_s
+    before = {"imitation": imitation / total} if imitation else {}
+    return before | {
         "environment": env_cpu_s / total,
         "inference": (progress.rollout_cpu_s - env_cpu_s) / total,
-        "gradient": (progress.cpu_s - progress.rollout_cpu_s) / total,
+        "gradient": (progress.cpu_s - imitation - progress.rollout_cpu_s) / total,
     }
 
 

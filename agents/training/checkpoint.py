@@ -37,6 +37,7 @@ class Progress:
         steps: control steps of all fish.
         cpu_s: processor time of training, without evaluation on the side (s).
         wall_s: the same by the clock on the wall.
+        imitation_cpu_s: part of it spent in imitation, before learning (s).
         rollout_cpu_s: part of it spent in collecting experience, environment included (s).
         env_cpu_s: part of that spent in the environment (s).
         evaluations: rows of the evaluations on the side.
@@ -45,6 +46,7 @@ class Progress:
     steps: int = 0
     cpu_s: float = 0.0
     wall_s: float = 0.0
+    imitation_cpu_s: float = 0.0
     rollout_cpu_s: float = 0.0
     env_cpu_s: float = 0.0
     evaluations: tuple[dict[str, float], ...] = ()

@@ -118,6 +118,22 @@ class Sac:
 
 
 @dataclass(frozen=True)
+class Imitation:
+    """Before learning: fit the policy to the PID controller (PPO).
+
+    Attributes:
+        rounds: episodes that all fish swim for it, the first by the controller; 0: none.
+        epochs: passes through what was collected, after each round.
+    """
+
+    rounds: int = 0
+    epochs: int = 8
+
+    def __post_init__(self) -> None:
+        _check(self.rounds >= 0 and self.epochs > 0, "imitate: rounds >= 0 and epochs > 0")
+
+
+@dataclass(frozen=True)
 class Evaluation:
     """Evaluation on the side, on episodes that are not trained on and belong to no suite.
 
@@ -164,6 +180,7 @@ class TrainConfig:
         network: see :class:`NetworkSettings`.
         ppo: see :class:`Ppo`.
         sac: see :class:`Sac`.
+        imitate: see :class:`Imitation`.
         normalise_reward: divide rewards by the running deviation of returns.
         evaluation: see :class:`Evaluation`.
         checkpoint_every: steps between two checkpoints.
@@ -183,6 +200,7 @@ class TrainConfig:
     network: NetworkSettings = field(default_factory=NetworkSettings)
     ppo: Ppo = field(default_factory=Ppo)
     sac: Sac = field(default_factory=Sac)
+    imitate: Imitation = field(default_factory=Imitation)
     normalise_reward: bool = True
     evaluation: Evaluation = field(default_factory=Evaluation)
     checkpoint_every: int = 100_000
@@ -211,6 +229,7 @@ class TrainConfig:
         known = inspect.signature(env_options).parameters
         for key in self.environment:
             _check(key in known, f"environment: unknown key '{key}'; known: {', '.join(known)}")
+        _check(self.algorithm == "ppo" or not self.imitate.rounds, "imitate: needs ppo")
         names = self.disturbances
         _check(bool(names), "disturbances: at least one suite")
         _check(self.num_envs % len(names) == 0, "num_envs: the same number for each disturbance")

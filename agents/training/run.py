@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import torch
 import yaml
+from stable_baselines3 import PPO
 from stable_baselines3.common import logger
 
 from agents.policies.export import export_policy
@@ -20,6 +22,7 @@ from agents.training.callback import Between, Watcher
 from agents.training.card import card, shares
 from agents.training.checkpoint import Progress, load_checkpoint, save_checkpoint
 from agents.training.config import TrainConfig
+from agents.training.imitation import imitate
 from agents.training.model import Model, make_model
 from agents.training.stack import Stack, make_stack, seed_episodes
 from agents.training.trial import try_policy
@@ -87,6 +90,17 @@ class _Run:
         else:
             self.model, self.progress = make_model(config, self.stack), Progress()
             seed_episodes(self.stack, config)
+            if config.imitate.rounds:
+                self._imitate()
+
+    def _imitate(self) -> None:
+        assert isinstance(self.model, PPO)
+        cpu, wall = time.process_time(), time.perf_counter()
+        imitate(self.model, self.stack, self.config, self.config.imitate)
+        self.progress.imitation_cpu_s = time.process_time() - cpu
+        self.progress.cpu_s += self.progress.imitation_cpu_s
+        self.progress.wall_s += time.perf_counter() - wall
+        self.stack.fish.cpu_s = 0.0
 
     def finish(self, watcher: Watcher) -> Outcome:
         config, progress = self.config, self.progress

@@ -14,7 +14,7 @@ import yaml
 
 from agents.policies import read_policy
 from agents.policies.files import replace_file
-from agents.training.config import Evaluation, History, Ppo, Sac, TrainConfig
+from agents.training.config import Evaluation, History, Imitation, Ppo, Sac, TrainConfig
 from agents.training.run import CHECKPOINT, POLICY, Outcome, train
 from fish_env.errors import ConfigError
 
@@ -22,11 +22,13 @@ ROOT = Path(__file__).resolve().parents[2]
 PPO = TrainConfig(
     "tiny", "ppo", "hold", 2048, num_envs=8, disturbances=("calm", "noisy"),
     ppo=Ppo(n_steps=16, batch_size=128, n_epochs=1), history=History(2, (0.5,)),
+    imitate=Imitation(1, 1),
     evaluation=Evaluation(every=700, episodes=2), checkpoint_every=300,
 )  # fmt: skip
 SAC = replace(
     PPO,
     algorithm="sac",
+    imitate=Imitation(),
     total_steps=600,
     sac=Sac(2000, batch_size=32, gradient_steps=1, learning_starts=100),
 )

@@ -35,14 +35,12 @@ class Canvas:
     def mesh(self, mesh: Mesh) -> None:
         """Draw the faces of a mesh that look at the eye, the farthest first."""
         eye = self.camera.eye
-        middles, normals = mesh.middles, mesh.normals
-        facing = np.einsum("ij,ij->i", normals, eye - middles) > 0.0
-        facing &= self.camera.seen(mesh.corners)[..., 0].min(axis=1) > NEAR
-        if not facing.any():
-            return
-        seen, middles = mesh.chosen(facing), middles[facing]
-        colours = hazed(lit(seen.colours, middles, normals[facing], eye), middles, eye)
+        seen = mesh.chosen(mesh.facing(eye))
         pixels, ahead = self.camera.project(seen.corners)
+        if not len(pixels) or ahead.min() < NEAR:
+            return
+        middles = seen.middles
+        colours = hazed(lit(seen.colours, middles, seen.normals, eye), middles, eye)
         order = np.argsort(-ahead.mean(axis=1), kind="stable")
         rows = np.column_stack([colours, seen.alphas])[order]
         if rows[:, 3].min() >= OPAQUE:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -41,16 +42,20 @@ class Mesh:
         """Some of the faces; which: (n,)."""
         return Mesh(self.corners[which], self.colours[which], self.alphas[which])
 
+    def facing(self, eye: FloatArray) -> npt.NDArray[np.bool_]:
+        """(n,) which faces look at a point (3,)."""
+        return np.asarray(np.einsum("ij,ij->i", self.normals, eye - self.middles) > 0.0)
+
     def turned_over(self) -> Mesh:
         """The same faces seen from the other side."""
         return Mesh(self.corners[:, ::-1], self.colours, self.alphas)
 
-    @property
+    @cached_property
     def middles(self) -> FloatArray:
         """(n, 3) middles of the faces (m)."""
         return np.asarray(self.corners.mean(axis=1))
 
-    @property
+    @cached_property
     def normals(self) -> FloatArray:
         """(n, 3) outward unit normals, from the diagonals."""
         first = self.corners[:, 2] - self.corners[:, 0]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +13,8 @@ from fish_env.rendering.scene import Tank
 from fish_env.rendering.water import SAND
 
 FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+Span = tuple[float, float]
 GRID_M = 0.25
 REACH_M = 5.0
 PIECE_M = 0.5
@@ -22,18 +24,23 @@ SPECKS, CLOUD_M = 170, 2.4
 
 def draw_floor_grid(canvas: Canvas, tank: Tank) -> None:
     """Lines every 25 cm, stronger each metre, inside the walls or as far as one sees."""
-    north, east = _extent(canvas, tank)
+    first, last, strong = _floor_grid(*_extent(canvas, tank), tank.bottom)
+    opacity, widths = np.where(strong, 0.8, 0.45), np.where(strong, 0.004, 0.002)
+    _draw(canvas, first, last, LINE, opacity, widths, 0.78 * SAND)
+
+
+@lru_cache(maxsize=8)
+def _floor_grid(north: Span, east: Span, bottom: float) -> tuple[FloatArray, FloatArray, BoolArray]:
+    """Both ends (n, 3) of the lines, in short pieces, and which (n,) lie at whole metres."""
     starts, ends, strong = [], [], []
     for axis, (low, high) in enumerate((north, east)):
         other = (east, north)[axis]
         for value in np.arange(np.ceil(low / GRID_M), np.floor(high / GRID_M) + 1) * GRID_M:
-            line = _pieces(axis, float(value), other, tank.bottom)
+            line = _pieces(axis, float(value), other, bottom)
             starts.append(line[:-1])
             ends.append(line[1:])
             strong += [abs(value - round(value)) < 1e-9] * (len(line) - 1)
-    opacity = np.where(strong, 0.8, 0.45)
-    first, last = np.concatenate(starts), np.concatenate(ends)
-    _draw(canvas, first, last, LINE, opacity, np.where(strong, 0.004, 0.002), 0.78 * SAND)
+    return np.concatenate(starts), np.concatenate(ends), np.array(strong)
 
 
 def draw_walls(canvas: Canvas, tank: Tank) -> None:
@@ -59,14 +66,14 @@ def draw_walls(canvas: Canvas, tank: Tank) -> None:
     _draw(canvas, first, last, WALL, np.full(len(first), 0.5), np.full(len(first), 0.003))
 
 
-def _extent(canvas: Canvas, tank: Tank) -> tuple[tuple[float, float], tuple[float, float]]:
+def _extent(canvas: Canvas, tank: Tank) -> tuple[Span, Span]:
     if tank.walls is not None:
         return tank.walls[:2], tank.walls[2:]
-    north, east = np.round(canvas.camera.eye[:2] / GRID_M) * GRID_M
+    north, east = (float(np.round(x / PIECE_M) * PIECE_M) for x in canvas.camera.eye[:2])
     return (north - REACH_M, north + REACH_M), (east - REACH_M, east + REACH_M)
 
 
-def _pieces(axis: int, value: float, other: tuple[float, float], depth: float) -> FloatArray:
+def _pieces(axis: int, value: float, other: Span, depth: float) -> FloatArray:
     """A level line in short pieces, so that haze can change along it: points (n, 3)."""
     count = max(2, round((other[1] - other[0]) / PIECE_M) + 1)
     points = np.full((count, 3), depth)

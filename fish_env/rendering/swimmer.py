@@ -65,7 +65,7 @@ class Swimmer:
         return np.asarray(body @ self.rotation.T + self.scene.position)
 
     def _placed(self, mesh: Mesh) -> Mesh:
-        return mesh.placed(self.rotation, self.scene.position)
+        return mesh.chosen(mesh.facing(self.eye)).placed(self.rotation, self.scene.position)
 
     def _outer_parts(self, fish: Fish) -> tuple[list[Mesh], list[Mesh]]:
         """Tail and fins: those that the hull may cover, and those that may cover it."""

@@ -77,8 +77,12 @@ class View:
             swimmer.draw()
             return
         near = Side(scene.goal.depth, bool(canvas.camera.eye[2] < scene.goal.depth))
+        beyond = not near.holds(scene.position[None])[0]
+        if beyond:
+            markers.draw_plumb_line(canvas, scene, scene.goal)
         swimmer.draw(near.other)
         markers.draw_goal_plane(canvas, scene, scene.goal)
         markers.draw_goal_heading(canvas, scene, scene.goal, self.follower.length)
-        markers.draw_plumb_line(canvas, scene, scene.goal)
+        if not beyond:
+            markers.draw_plumb_line(canvas, scene, scene.goal)
         swimmer.draw(near)

@@ -37,6 +37,10 @@ def load_agents(name: str, task: str) -> list[Agent]:
         from agents.controllers.pid import PIDController
 
         return [PIDController()]
+    if name == "mppi":
+        from agents.controllers.mppi import MPPIController
+
+        return [MPPIController()]
     return _policies(name, task)
 
 

@@ -40,6 +40,10 @@ class Seen(NamedTuple):
     actuators: FloatArray
     last_action: FloatArray
 
+    def depth(self, top: float, bottom: float) -> FloatArray:
+        """Depth (m) in a tank where the fish may swim between these depths (m)."""
+        return (top + bottom) / 2 + (bottom - top) / 2 * self.tank_depth
+
     @classmethod
     def of(cls, observations: npt.ArrayLike) -> Seen:
         """From observations (N, 33); ``tank_depth`` stays -1 (top) to 1 (bottom).

@@ -1,0 +1,116 @@
+"""Measures the agents on all suites and writes results/agents.json: `make benchmark-agents`.
+
+Each finished combination is kept, so a stopped run goes on where it was:
+
+    python -m scripts.benchmark_agents --agents pid,mppi
+
+A combination is done again when the suite, the agent's code or its policies have changed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import datetime
+import hashlib
+import json
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+
+from agents.evaluation.results import Result, evaluate, read_results, write_results
+from agents.evaluation.suites import Suite, load_suite, suite_names
+from agents.registry import load_agents
+from fish_env.envs.tasks import TASKS
+from scripts.bench.harness import machine
+
+ROOT = Path(__file__).resolve().parents[1]
+RESULT = ROOT / "results" / "agents.json"
+AGENTS = ("pid", "mppi", "pretrained")
+SOURCES = {
+    "pid": ("agents/controllers/pid.py", "agents/controllers/seen.py", "configs/controllers"),
+    "mppi": ("agents/controllers/mppi.py", "agents/controllers/prediction.py"),
+    "pretrained": ("agents/pretrained", "agents/policies"),
+}
+"""What an agent's numbers depend on."""
+
+
+def fingerprint(agent: str, suite: str) -> str:
+    """Changes with anything that the numbers depend on, but the environment."""
+    places = (*SOURCES[agent], f"configs/benchmarks/{suite}.yaml", "agents/evaluation/metrics.py")
+    digest = hashlib.sha256()
+    for place in places:
+        path = ROOT / place
+        for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
+            if file.is_file() and file.suffix not in (".pyc", ".md"):
+                digest.update(file.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def measured(agents: Sequence[str], work: Path, console: Console) -> Iterator[Result]:
+    """All combinations, those that are new being measured now."""
+    for suite in map(load_suite, suite_names()):
+        for task in TASKS:
+            for agent in agents:
+                yield kept(agent, suite, task, work, console)
+
+
+def kept(agent: str, suite: Suite, task: str, work: Path, console: Console) -> Result:
+    file = work / f"{agent}-{suite.name}-{task}-{fingerprint(agent, suite.name)}.json"
+    if not file.is_file():
+        begun = time.monotonic()
+        result = evaluate(agent, load_agents(agent, task), suite, task)
+        write_results(file, [result])
+        took = time.monotonic() - begun
+        success = result.metrics["success_rate"]
+        rate = "-" if success is None else f"{success.mean:.2f}"
+        console.print(f"{agent} {suite.name} {task}: success {rate} ({took:.0f} s)")
+    (result,) = read_results(file)
+    return result
+
+
+def decision_times(agent: str, decisions: int = 400) -> dict[str, float]:
+    """Milliseconds a decision takes for one fish: by the clock, and by processor time."""
+    suite = load_suite("calm")
+    (controller, *_) = load_agents(agent, "hold")
+    env = suite.make("hold", 1)
+    observations, _ = env.reset(seed=suite.seed)
+    controller.reset(1)
+    controller.act(observations)
+    controller.reset(1)
+    wall, process = [], []
+    for _ in range(decisions):
+        before, used = time.perf_counter(), time.process_time()
+        action = controller.act(observations)
+        wall.append(1000.0 * (time.perf_counter() - before))
+        process.append(1000.0 * (time.process_time() - used))
+        observations, *_ = env.step(action)
+    return {
+        f"{clock}_ms_{name}": round(float(np.quantile(values, share)), 3)
+        for clock, values in (("wall", wall), ("process", process))
+        for name, share in (("median", 0.5), ("p99", 0.99))
+    }
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    add = parser.add_argument
+    add("--agents", default=",".join(AGENTS), help=f"some of {', '.join(AGENTS)}")
+    add("--work", type=Path, default=ROOT / "out" / "benchmark-agents")
+    add("--out", type=Path, default=RESULT)
+    options, console = parser.parse_args(arguments), Console()
+    agents = options.agents.split(",")
+    options.work.mkdir(parents=True, exist_ok=True)
+    results = list(measured(agents, options.work, console))
+    times = {agent: decision_times(agent) for agent in agents}
+    console.print(json.dumps(times, indent=1))
+    today = datetime.date.today().isoformat()
+    more = {"date": today, "machine": machine(), "decision_times": times}
+    write_results(options.out, results, **more)
+    console.print(f"written: {options.out}")
+
+
+if __name__ == "__main__":
+    main()

@@ -79,6 +79,22 @@ def test_a_steady_table_is_shown_condition_by_condition(tmp_path):
     assert (tmp_path / "figures" / "steady.svg").exists()
 
 
+def test_the_answer_about_a_table_is_read_with_its_own_signs_and_units(tmp_path):
+    said = answer(
+        kind="steady",
+        noise={"sensor_sd": {}, "disturbance": {"force_n2_s": 1e-6, "moment_n2_m2_s": 1e-8}},
+        misfit={"curvature": {"baseline": 2.0, "extended": 1.0, "unit": "noise sd"}},
+        ranking=[{"name": "servo_lag", "score": 50.0}, {"name": "added_mass", "score": -20.0}],
+        floor={"worst": [{"condition": "A1", "observation": "yaw_rate", "noise_sds": -2.5}]},
+    )
+    said["gain"]["rmse"] = {"curvature": {"baseline": 0.2, "extended": 0.02}}
+    page = write_report(said, None, tmp_path).read_text()
+    assert "On the condition kept for judging" in page
+    assert "1/m" in page
+    assert "-2.5" in page
+    assert "log score on conditions left out" in page
+
+
 def test_a_quick_answer_draws_fewer_runs(tmp_path):
     write_report(answer(quick=True), run_series(), tmp_path)
     assert (tmp_path / "figures" / "run_r01.svg").exists()
@@ -128,3 +144,28 @@ def test_series_are_predictions_of_the_two_models(tmp_path):
     alone = series_from(dataset, baseline, baseline)
     assert alone.runs[0].extended == {}
     assert len(alone.runs[0].motions) == 2
+
+
+@pytest.mark.slow
+def test_series_of_a_table_hold_its_repeats_together():
+    from fish_env.data import load_dataset
+    from fish_env.diagnosis.report.steady import steady_series_from
+    from fish_env.diagnosis.steady.fitting import fit as fit_table
+    from fish_env.diagnosis.steady.problem import SteadyProblem
+    from fish_env.diagnosis.steady.table import table_of
+    from fish_env.params import load_fish
+
+    dataset = load_dataset("msu-steady")
+    table = table_of(dataset)
+    few = SteadyProblem(table, load_fish(dataset.fish), ("mass.total",)).on(np.arange(3))
+    baseline = fit_table(few)
+    series = steady_series_from(dataset, baseline, baseline, table.conditions[-2:])
+    assert series.conditions == table.conditions
+    assert series.left_out.sum() == 2
+    assert series.extended == {}
+    rows = table.condition_of == 0
+    speed = series.measured["surge_speed"][0]
+    assert speed == pytest.approx(np.nanmean(dataset.observations["surge_speed"][rows]))
+    assert series.baseline["surge_speed"][:3] == pytest.approx(
+        baseline.means[:, table.observations.index("surge_speed")], rel=1e-3
+    )

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from fish_env.comparison.words import shown_unit
 from fish_env.data.vocabulary import COMMANDS
 from fish_env.diagnosis.causes import PARAMETER
 from fish_env.diagnosis.regimes import LEVEL, Localisation
 from fish_env.diagnosis.report.series import RunSeries, SteadySeries
-from fish_env.plotting.comparison import COMMAND_UNITS, label
+from fish_env.diagnosis.report.units import label, shown_unit
+from fish_env.plotting.comparison import COMMAND_UNITS
 from fish_env.plotting.style import BLUE, DOTS_PER_INCH, MEASURED, VERMILION, drawing
 
 if TYPE_CHECKING:
@@ -25,6 +25,10 @@ if TYPE_CHECKING:
 FloatArray = npt.NDArray[np.float64]
 BASELINE, EXTENDED = VERMILION, BLUE
 Plain = Mapping[str, Any]
+WIDE = 30.0
+"""Largest ratio of bars on a linear axis."""
+LIKELIHOOD_GAIN = "gain in -2 log likelihood over the refitted baseline (larger is better)"
+LEFT_OUT_GAIN = "log score on conditions left out, above the refitted baseline's"
 
 
 @contextmanager
@@ -131,23 +135,26 @@ def _draw_map(ax: Axes, found: Localisation, name: str, top: float) -> Any:
 
 
 def draw_ranking(answer: Plain, folder: Path) -> Path:
-    """How much each cause improves the fit, in -2 log likelihood, with intervals where known."""
+    """How much better each cause explains the data than the baseline, with intervals if known."""
     rows = list(answer["ranking"])[::-1]
     accepted = {cause["name"] for cause in answer["causes"]}
+    steady = answer.get("kind") == "steady"
+    sign, meaning = (1.0, LEFT_OUT_GAIN) if steady else (-1.0, LIKELIHOOD_GAIN)
+    gains = [sign * row["score"] for row in rows]
     with _page(7.0, 0.9 + 0.32 * len(rows)) as figure:
         ax = figure.subplots()
-        for i, row in enumerate(rows):
+        for i, (row, gain) in enumerate(zip(rows, gains, strict=True)):
             colour = EXTENDED if row["name"] in accepted else "#8a8a8a"
-            ax.barh(i, -row["score"], color=colour, height=0.66)
+            ax.barh(i, gain, color=colour, height=0.66)
             if row.get("ci95"):
-                ends = [-end for end in row["ci95"]]
+                ends = [sign * end for end in row["ci95"]]
                 ax.plot(ends, [i, i], color=MEASURED, lw=1.4, marker="|")
         names = [row["name"].removeprefix(PARAMETER) for row in rows]
         ax.set_yticks(range(len(rows)), names)
-        gains = [-row["score"] for row in rows]
-        if min(gains) > 0 and max(gains) / min(gains) > 30:
+        if min(gains) > 0 and max(gains) / min(gains) > WIDE:
             ax.set_xscale("log")
-        ax.set_xlabel("gain in -2 log likelihood over the refitted baseline (larger is better)")
+        ax.axvline(0.0, color=MEASURED, lw=0.8)
+        ax.set_xlabel(meaning)
         ax.grid(axis="y", visible=False)
         return _saved(figure, folder, "ranking")
 
@@ -166,10 +173,11 @@ def draw_confusability(names: Sequence[str], cosines: FloatArray, folder: Path) 
 
 
 def draw_misfit(answer: Plain, folder: Path) -> Path:
-    """One-step errors by channel in units of the noise, baseline and extended."""
+    """Errors by channel in units of the noise, of the baseline and the best explanation."""
     names = list(answer["misfit"])
     pairs = [answer["misfit"][name] for name in names]
-    extended = bool(answer["causes"])
+    extended = any(pair["baseline"] != pair["extended"] for pair in pairs)
+    word = "extended" if answer["causes"] else "best explanation tried"
     with _page(7.0, 2.6) as figure:
         ax = figure.subplots()
         place = np.arange(len(names))
@@ -180,10 +188,10 @@ def draw_misfit(answer: Plain, folder: Path) -> Path:
                label="refitted baseline")  # fmt: skip
         if extended:
             after = [pair["extended"] for pair in pairs]
-            ax.bar(place + shift, after, width, color=EXTENDED, label="extended")
+            ax.bar(place + shift, after, width, color=EXTENDED, label=word)
         ax.axhline(1.0, color=MEASURED, lw=1.0, ls=":", label="noise alone")
         ax.set_xticks(place, [name.replace("_", " ") for name in names])
-        ax.set_ylabel("one-step error (noise sd)")
+        ax.set_ylabel("error (noise sd)")
         ax.grid(axis="x", visible=False)
         ax.legend(loc="upper right", ncols=3)
         ax.set_ylim(0.0, 1.25 * max([*before, 1.0]))

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fish_env.comparison.words import shown_unit
 from fish_env.diagnosis.answer import words
 from fish_env.diagnosis.causes import PARAMETER
 from fish_env.diagnosis.report import figures as draw
@@ -23,6 +22,7 @@ from fish_env.diagnosis.report.html import (
     text,
 )
 from fish_env.diagnosis.report.series import SETTLED_S, ReportSeries, SteadySeries
+from fish_env.diagnosis.report.units import shown_unit
 from fish_env.plotting.comparison import COMMAND_UNITS
 from fish_env.replay import Group, component
 
@@ -31,6 +31,8 @@ Series = ReportSeries | SteadySeries | None
 FloatArray = npt.NDArray[np.float64]
 MOST_DRAWN = 3
 """Runs with a drawing of their own; the replay has them all."""
+MOST_NAMED = 8
+"""Names in one sentence."""
 VERDICTS = {
     "no_misfit": "Nothing is wrong that these runs could show",
     "parameters": "Right structure, wrong numbers",
@@ -99,7 +101,8 @@ def channels(answer: Answer, series: Series, folder: Path) -> str:
     parts = []
     if answer.get("misfit"):
         picture = draw.draw_misfit(answer, folder)
-        parts.append(figure(picture, "One-step prediction errors in units of the noise."))
+        errors = "Errors" if _noun(answer) == "condition" else "One-step prediction errors"
+        parts.append(figure(picture, f"{errors} in units of the noise."))
     if isinstance(series, ReportSeries):
         window = series.window_s
         for i, run in enumerate(series.runs[: 1 if answer.get("quick") else MOST_DRAWN]):
@@ -152,7 +155,7 @@ def gain(answer: Answer, series: Series, folder: Path) -> str:
     found = answer.get("gain")
     if not found:
         return ""
-    parts = [_gain_words(found)]
+    parts = [_gain_words(found, _noun(answer))]
     runs = _fit_by_run(found, series)
     if runs:
         caption = "Fit of each run kept for judging, mean over its channels."
@@ -164,13 +167,13 @@ def gain(answer: Answer, series: Series, folder: Path) -> str:
     return section("What the extension gains", *parts, key="gain")
 
 
-def _gain_words(found: Answer) -> str:
+def _gain_words(found: Answer, noun: str) -> str:
     fit, share = found.get("fit_percent"), found.get("share_of_reachable")
     said = []
     if fit:
         said.append(
-            f"On {_counted(len(found.get('final_runs', ())))} kept for judging, predictions fit "
-            f"{fit['extended']:.0f} % with the extension and {fit['baseline']:.0f} % with the "
+            f"On {_counted(len(found.get('final_runs', ())), noun)} kept for judging, predictions "
+            f"fit {fit['extended']:.0f} % with the extension and {fit['baseline']:.0f} % with the "
             "refitted baseline."
         )
     if share:
@@ -182,8 +185,12 @@ def _gain_words(found: Answer) -> str:
     return paragraph(" ".join(said))
 
 
-def _counted(runs: int) -> str:
-    return "the run" if runs == 1 else f"{runs} runs"
+def _noun(answer: Answer) -> str:
+    return "condition" if answer.get("kind") == "steady" else "run"
+
+
+def _counted(count: int, noun: str) -> str:
+    return f"the {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def _fit_by_run(found: Answer, series: Series) -> dict[str, tuple[float, float]]:
@@ -222,8 +229,19 @@ def where(answer: Answer, series: Series, folder: Path) -> str:
             by_regime.setdefault(regime.replace("_", " "), []).append(label)
         rows = [(text(regime), text(", ".join(bins))) for regime, bins in by_regime.items()]
         parts.append(table(("never visited", "bins"), rows))
-    parts.append(_asked_for(answer))
+    parts += [_farthest(answer), _asked_for(answer)]
     return section("Where the misfit sits", *parts, key="where")
+
+
+def _farthest(answer: Answer) -> str:
+    """Conditions of a table that the best explanation misses most."""
+    worst = (answer.get("floor") or {}).get("worst", [])
+    rows = [
+        (text(w["condition"]), text(w["observation"].replace("_", " ")), number(w["noise_sds"]))
+        for w in worst
+    ]
+    caption = "Farthest from the best explanation"
+    return table(("condition", "observation", "off by (noise sd)"), rows, caption)
 
 
 def _asked_for(answer: Answer) -> str:
@@ -250,11 +268,7 @@ def unseen(answer: Answer, series: Series, folder: Path) -> str:
     if not found:
         return ""
     blind = [p["name"] for p in found if not p["excited"]]
-    said = (
-        f"These runs could not have shown: {', '.join(blind)}."
-        if blind
-        else "Every known effect of a plausible size would have been seen."
-    )
+    said = _blind_words(blind, len(found), "This table" if answer.get("kind") else "These runs")
     heads = (
         "effect", "would be seen", "smallest size seen (power 0.8)", "a plausible robot has",
         "swallowed by a refit", "looks most like",
@@ -267,6 +281,14 @@ def unseen(answer: Answer, series: Series, folder: Path) -> str:
         caption = "How alike the signals of two effects are, after a refit of the baseline."
         parts.append(figure(draw.draw_confusability(names, cosines, folder), caption))
     return section("What could not have been seen", *parts, key="unseen")
+
+
+def _blind_words(blind: list[str], known: int, subject: str) -> str:
+    if not blind:
+        return "Every known effect of a plausible size would have been seen."
+    if len(blind) > MOST_NAMED:
+        return f"{subject} could not have shown {len(blind)} of {known} known effects, as follows."
+    return f"{subject} could not have shown: {', '.join(blind)}."
 
 
 def _cosine(precondition: Answer, other: str) -> float:
@@ -354,9 +376,8 @@ def coefficients(answer: Answer, series: Series, folder: Path) -> str:
 def about(answer: Answer, series: Series, folder: Path) -> str:
     """Noise, notes, and how this was made."""
     lines = [str(note) for note in answer.get("notes", [])]
-    noise = answer.get("noise")
-    if noise and "disturbance" in noise:
-        d = noise["disturbance"]
+    d = (answer.get("noise") or {}).get("disturbance", {})
+    if "force_sd" in d:
         lines.append(
             f"Disturbance found: {1e3 * d['force_sd']:.3g} mN and {1e3 * d['moment_sd']:.3g} mN m, "
             f"correlated over {d['correlation_s']:.2g} s."

@@ -23,7 +23,7 @@ def diagnose_dataset(
     Args:
         console: Where the verdict goes.
         dataset: Folder, or name of a shipped dataset.
-        out: Folder for `diagnosis.json` and `extended.yaml`.
+        out: Folder for `diagnosis.json`, `report.html` and `extended.yaml`.
         fish: Another fish than the dataset names: preset or file.
         quick: Refit fewer causes.
         seed: Of the split into runs and of the null distributions.
@@ -38,10 +38,19 @@ def diagnose_dataset(
             dataset, out, seed, quick, fish, lambda step: progress.update(task, description=step)
         )
     print_answer(console, answer)
-    console.print(f"numbers: {out / 'diagnosis.json'}", soft_wrap=True)
-    if (out / "extended.yaml").exists():
-        console.print(f"extended model: {out / 'extended.yaml'}", soft_wrap=True)
+    _print_files(console, out)
     return answer
+
+
+def _print_files(console: Console, out: Path) -> None:
+    files = {
+        "report": "report.html",
+        "numbers": "diagnosis.json",
+        "extended model": "extended.yaml",
+    }
+    for word, name in files.items():
+        if (out / name).exists():
+            console.print(f"{word}: {out / name}", soft_wrap=True)
 
 
 def print_answer(console: Console, answer: dict[str, Any]) -> None:

@@ -37,10 +37,10 @@ def find_browser() -> str:
 class Browser:
     """One page in a headless browser, with everything it complains about and asks for."""
 
-    def __init__(self, profile: Path) -> None:
+    def __init__(self, profile: Path, *flags: str) -> None:
         to_browser, self._write = os.pipe()
         self._read, from_browser = os.pipe()
-        command = (find_browser(), *FLAGS, f"--user-data-dir={profile}", "about:blank")
+        command = (find_browser(), *FLAGS, *flags, f"--user-data-dir={profile}", "about:blank")
         joined = f'exec "$@" 3<&{to_browser} 4>&{from_browser}'
         self._process = subprocess.Popen(
             ["bash", "-c", joined, "bash", *command],
@@ -154,6 +154,12 @@ class Browser:
                 "Input.dispatchMouseEvent",
                 type=kind, x=x, y=y, button="left", buttons=1, clickCount=1,
             )  # fmt: skip
+
+    def swipe(self, start: tuple[float, float], end: tuple[float, float]) -> None:
+        """Puts a finger down at one place and lifts it at another."""
+        for kind, place in (("touchStart", start), ("touchMove", end), ("touchEnd", None)):
+            points = [{"x": place[0], "y": place[1]}] if place else []
+            self.call("Input.dispatchTouchEvent", type=kind, touchPoints=points)
 
     def wheel(self, place: tuple[float, float], down: float) -> None:
         """Turns the mouse wheel."""

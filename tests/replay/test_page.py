@@ -22,6 +22,10 @@ SWIM = [
 POSE = "Robofish.replays[0].stage.actors[0].fish.group.position.toArray()"
 TAIL = "Robofish.replays[0].stage.actors[0].fish.tail.rotation.z"
 TIME = "Robofish.replays[0].clock.time"
+OVER = (
+    "(({x, y, width, height}) => [x, y, width, height])"
+    "(document.querySelector('.u-over').getBoundingClientRect())"
+)
 DRAWN = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))"
 
 
@@ -107,9 +111,7 @@ def test_slider_and_plots_scrub(opened):
         " s.dispatchEvent(new Event('input')); })()"
     )
     assert opened.run(TIME) == pytest.approx(6.0)
-    box = opened.run("(({x, y, width, height}) => [x, y, width, height])"
-                     "(document.querySelector('.u-over').getBoundingClientRect())")  # fmt: skip
-    x, y, width, height = box
+    x, y, width, height = opened.run(OVER)
     opened.drag((x + 0.2 * width, y + height / 2), (x + 0.8 * width, y + height / 2))
     assert opened.run(TIME) == pytest.approx(8.0, abs=0.1)
     assert opened.run("document.querySelector('.rf-time').textContent").startswith("8.0")
@@ -172,6 +174,31 @@ def test_a_phone_shows_everything_in_its_width(browser, page, pictures, dark):
     )
     assert browser.run(smallest) >= 40
     browser.screenshot(pictures / f"replay_phone_{'dark' if dark else 'light'}.png", whole=True)
+
+
+def test_a_finger_turns_the_camera_and_moves_the_time(browser, page):
+    browser.open(page, 360, 740)
+    browser.run("Robofish.replays[0].clock.play(false), Robofish.replays[0].clock.seek(0), 1")
+    place = "Robofish.replays[0].stage.camera.position.toArray()"
+    before = browser.run(place)
+    browser.swipe((180, 350), (240, 350))
+    browser.run(DRAWN)
+    assert browser.run(place) != before
+    browser.run("document.querySelector('.u-over').scrollIntoView({block: 'center'})")
+    x, y, width, height = browser.run(OVER)
+    browser.swipe((x + 0.2 * width, y + height / 2), (x + 0.5 * width, y + height / 2))
+    assert browser.run(TIME) > 1.5
+
+
+def test_without_3d_the_plots_still_play(page, tmp_path):
+    flat = Browser(tmp_path / "profile", "--disable-3d-apis")
+    try:
+        flat.open(page)
+        flat.wait_for(f"{TIME} > 0.3")
+        assert "WebGL is off" in flat.run("document.querySelector('.rf-sorry').textContent")
+        assert flat.run("document.querySelectorAll('.rf-plot canvas').length") >= 4
+    finally:
+        flat.close()
 
 
 def test_colours_follow_the_system(browser, page, pictures):

@@ -72,6 +72,13 @@ def test_what_is_not_run_says_why():
     assert [block.name for page in PAGES for block in fences(page) if block.not_run == ""] == []
 
 
+def test_nothing_that_runs_installs_or_sets_up():
+    """Mark such a block ```` ```{.sh .no-run data-reason="installs packages"} ````."""
+    running = [block for block in all_blocks(*SHELL) if block.not_run is None]
+    setting_up = re.compile(r"^\s*(\S*pip|make|apt|apt-get|git clone)\b", re.MULTILINE)
+    assert [block.name for block in running if setting_up.search(block.text)] == []
+
+
 def test_the_readme_runs_the_simulator_and_the_environment():
     code = "".join(block.text for block in blocks(ROOT / "README.md", "python"))
     assert "Simulator(" in code

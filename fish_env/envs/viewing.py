@@ -12,7 +12,6 @@ from fish_env.envs.layout import OUTPUTS
 from fish_env.envs.options import EnvOptions
 from fish_env.errors import ConfigError
 from fish_env.model.emit import OUTPUTS as TERM_OUTPUTS
-from fish_env.model.frames import euler_from_quaternion
 from fish_env.model.state import BASE_STATES
 from fish_env.rendering import (
     Goal,
@@ -56,7 +55,6 @@ def scene_of(batch: FishBatch, lane: int, wake: FloatArray, label: str) -> Scene
         float(batch.time[lane]),
         state[0:3].copy(),
         state[3:7].copy(),
-        euler_from_quaternion(state[3:7]),
         float(state[7]),
         _tail_angle(batch, lane),
         float(state[TAIL_PHASE]),

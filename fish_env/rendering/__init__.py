@@ -11,8 +11,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fish_env.errors import missing_extra
-from fish_env.rendering.scene import Goal, Scene, Setting, Tank, between
+from fish_env.errors import MissingExtraError, missing_extra
+from fish_env.rendering.scene import PICTURE_SIZE, Goal, Scene, Setting, Tank, between
 from fish_env.rendering.shape import FishShape
 from fish_env.rendering.trajectory import scenes_of
 
@@ -35,24 +35,28 @@ __all__ = [
     "window",
     "write_video",
 ]
-SIZE = (640, 480)
 
 
 def check_installed() -> None:
     """Say what to install if pictures cannot be drawn.
 
     Raises:
-        MissingExtraError: pygame is not installed.
+        MissingExtraError: pygame-ce is not installed.
     """
     try:
         # The library greets on stdout unless told not to.
         os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
-        import pygame  # noqa: F401
+        import pygame
     except ImportError:
         raise missing_extra("Drawing the fish", "pygame-ce", "render") from None
+    if not getattr(pygame, "IS_CE", False):
+        raise MissingExtraError(
+            "Drawing the fish needs 'pygame-ce', and its relative 'pygame' is in its place. "
+            "Replace it with: pip uninstall pygame; pip install --force-reinstall pygame-ce"
+        )
 
 
-def view(setting: Setting, size: tuple[int, int] = SIZE) -> View:
+def view(setting: Setting, size: tuple[int, int] = PICTURE_SIZE) -> View:
     """What draws scenes of one fish as arrays (height, width, 3), uint8.
 
     Raises:
@@ -64,7 +68,7 @@ def view(setting: Setting, size: tuple[int, int] = SIZE) -> View:
     return View(setting, size)
 
 
-def mosaic(setting: Setting, count: int, size: tuple[int, int] = SIZE) -> Mosaic:
+def mosaic(setting: Setting, count: int, size: tuple[int, int] = PICTURE_SIZE) -> Mosaic:
     """What draws scenes of several fish side by side as one array.
 
     Raises:
@@ -76,12 +80,12 @@ def mosaic(setting: Setting, count: int, size: tuple[int, int] = SIZE) -> Mosaic
     return Mosaic(setting, count, size)
 
 
-def window(setting: Setting, count: int = 1, size: tuple[int, int] = SIZE) -> Window:
+def window(setting: Setting, count: int = 1, size: tuple[int, int] = PICTURE_SIZE) -> Window:
     """A window that shows one fish, or several side by side.
 
     Raises:
         MissingExtraError: pygame is not installed.
-        RenderingError: there is no screen.
+        ConfigError: there is no screen.
     """
     check_installed()
     from fish_env.rendering.window import Window
@@ -95,7 +99,7 @@ def write_video(
     setting: Setting,
     *,
     fps: float = 30.0,
-    size: tuple[int, int] = SIZE,
+    size: tuple[int, int] = PICTURE_SIZE,
     report: Callable[[], object] = lambda: None,
 ) -> Path:
     """Write scenes as a film (mp4, H.264) that runs in real time.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -41,6 +42,22 @@ ROUNDNESS = 2.25
 """Sections of the hull are a little boxier than ellipses."""
 
 
+class Fin(NamedTuple):
+    """A fin on the hull: its sheet, where it stands and which way (3,), body frame."""
+
+    mesh: Mesh
+    foot: FloatArray
+    outward: FloatArray
+
+
+class Eye(NamedTuple):
+    """An eye: its middle, which way it looks (3,), and its two half axes (2, 3), body frame."""
+
+    middle: FloatArray
+    outward: FloatArray
+    axes: FloatArray
+
+
 @dataclass(frozen=True)
 class Fish:
     """All that is drawn of a fish, in its body frame.
@@ -50,7 +67,7 @@ class Fish:
         hull: the outside of the hull without its window.
         window: the half transparent part of the hull.
         lining: the inside of the hull near the window.
-        fins: name -> fin on the hull, and the point and direction (3,) where it stands out.
+        fins: on the back and on both sides.
         rail: what the weight block slides along.
         tail: at rest, its joint at the origin.
     """
@@ -59,7 +76,7 @@ class Fish:
     hull: Mesh
     window: Mesh
     lining: Mesh
-    fins: tuple[tuple[Mesh, FloatArray, FloatArray], ...]
+    fins: tuple[Fin, ...]
     rail: Mesh
     tail: Mesh
 
@@ -175,10 +192,10 @@ def _fin(shape: FishShape, start: float) -> Mesh:
     return one + one.turned_over()
 
 
-def _fins(shape: FishShape) -> tuple[tuple[Mesh, FloatArray, FloatArray], ...]:
+def _fins(shape: FishShape) -> tuple[Fin, ...]:
     back = np.array([0.0, 0.0, -1.0])
     return (
-        (_dorsal(shape), _on_hull(shape, 0.45, back), back),
+        Fin(_dorsal(shape), _on_hull(shape, 0.45, back), back),
         *(_pectoral(shape, side) for side in (1.0, -1.0)),
     )
 
@@ -206,7 +223,7 @@ def _dorsal(shape: FishShape) -> Mesh:
     return plate(tip, foot, FIN * np.linspace(0.85, 1.0, 12)[:, None])
 
 
-def _pectoral(shape: FishShape, side: float) -> tuple[Mesh, FloatArray, FloatArray]:
+def _pectoral(shape: FishShape, side: float) -> Fin:
     out = np.array([0.0, side, 0.35])
     share = np.linspace(0.0, 1.0, 9)
     before_window = _window(shape)[0] - 0.10
@@ -215,7 +232,7 @@ def _pectoral(shape: FishShape, side: float) -> tuple[Mesh, FloatArray, FloatArr
     reach = 0.42 * shape.width * np.sin(np.pi * (0.1 + 0.75 * share))
     sweep = 0.10 * shape.length * (0.2 + share)
     tip = foot + np.stack([-sweep, side * 0.62 * reach, 0.75 * reach], axis=1)
-    return plate(tip, foot, FIN * np.linspace(0.9, 1.05, 8)[:, None]), root, out
+    return Fin(plate(tip, foot, FIN * np.linspace(0.9, 1.05, 8)[:, None]), root, out)
 
 
 def _rail(shape: FishShape) -> Mesh:
@@ -223,8 +240,8 @@ def _rail(shape: FishShape) -> Mesh:
     return box((shape.block[0] + 0.05, 0.006, 0.006), RAIL).placed(np.eye(3), shape.block_rest)
 
 
-def eyes(shape: FishShape) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
-    """Middle, outward direction and the two half axes (2, 3) of each eye, body frame."""
+def eyes(shape: FishShape) -> list[Eye]:
+    """The eyes on both sides of the nose."""
     found = []
     along = 0.115
     for side in (1.0, -1.0):
@@ -234,5 +251,5 @@ def eyes(shape: FishShape) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
         first = np.cross(outward, [0.0, 0.0, 1.0])
         first /= np.linalg.norm(first)
         axes = 0.052 * shape.height * np.stack([first, np.cross(outward, first)])
-        found.append((middle + 0.001 * outward, outward, axes))
+        found.append(Eye(middle + 0.001 * outward, outward, axes))
     return found

@@ -8,8 +8,8 @@ import numpy as np
 import numpy.typing as npt
 import pygame
 
+from fish_env.rendering.lettering import Colour, write
 from fish_env.rendering.light import FISH, GOAL
-from fish_env.rendering.type import Colour, write
 
 FloatArray = npt.NDArray[np.float64]
 PANEL = (6, 24, 38, 150)
@@ -17,6 +17,9 @@ INK: Colour = (228, 240, 244)
 DIM: Colour = (128, 160, 174)
 SKY: Colour = (70, 140, 176)
 GROUND: Colour = (112, 92, 62)
+FACE = (10, 34, 52, 235)
+SWEEP = np.radians(135.0)
+"""From the top of the speed dial to both of its ends."""
 FINE = 3
 """Gauges are drawn this much larger and shrunk, so that their edges come out smooth."""
 
@@ -59,37 +62,57 @@ def horizon(
 ) -> None:
     """Attitude: the horizon as seen from the fish, 45 degrees of pitch to the rim (rad)."""
     full = round(FINE * size)
-    middle, reach = full / 2, full / 2
+    middle = full / 2
     dial = pygame.Surface((full, full), pygame.SRCALPHA)
     dial.fill(SKY)
-    across = np.array([np.cos(roll), -np.sin(roll)])
-    down = np.array([np.sin(roll), np.cos(roll)])
-    centre = np.array([middle, middle]) + down * reach * pitch / np.radians(45.0)
-    ground = [centre - 3 * full * across, centre + 3 * full * across]
-    ground += [ground[1] + 6 * full * down, ground[0] + 6 * full * down]
-    pygame.draw.polygon(dial, GROUND, [p.tolist() for p in ground])
-    for degrees in (-30, -20, -10, 0, 10, 20, 30):
-        at_line = centre - down * reach * degrees / 45.0
-        half = reach * (0.9 if degrees == 0 else 0.22 if degrees % 20 else 0.34)
-        left, right = at_line - half * across, at_line + half * across
-        width = FINE if degrees else FINE + 1
-        pygame.draw.line(dial, INK, left.tolist(), right.tolist(), width)
-    wing = 0.16 * full
+    _draw_ground(dial, roll, pitch)
     for side in (-1, 1):
-        inner, outer = middle + side * 0.10 * full, middle + side * (0.10 * full + wing)
+        inner, outer = middle + side * 0.10 * full, middle + side * 0.26 * full
         pygame.draw.line(dial, FISH, (inner, middle), (outer, middle), 3 * FINE)
     pygame.draw.circle(dial, FISH, (middle, middle), 1.6 * FINE)
     dial.blit(_mask(full), (0, 0), special_flags=pygame.BLEND_RGBA_MIN)
-    pygame.draw.circle(dial, DIM, (middle, middle), full / 2 - 1, 2 * FINE - 2)
+    pygame.draw.circle(dial, DIM, (middle, middle), middle - 1, 2 * FINE - 2)
     _shrunk(surface, dial, at, size)
+
+
+def _draw_ground(dial: pygame.Surface, roll: float, pitch: float) -> None:
+    """What is below the horizon, and lines at each ten degrees of pitch."""
+    full = dial.get_width()
+    reach = full / 2
+    across = np.array([np.cos(roll), -np.sin(roll)])
+    down = np.array([np.sin(roll), np.cos(roll)])
+    centre = reach + down * reach * pitch / np.radians(45.0)
+    left, right = centre - 3 * full * across, centre + 3 * full * across
+    corners = [left, right, right + 6 * full * down, left + 6 * full * down]
+    pygame.draw.polygon(dial, GROUND, [corner.tolist() for corner in corners])
+    for degrees in (-30, -20, -10, 0, 10, 20, 30):
+        middle = centre - down * reach * degrees / 45.0
+        half = reach * (0.9 if degrees == 0 else 0.22 if degrees % 20 else 0.34) * across
+        width = FINE if degrees else FINE + 1
+        pygame.draw.line(dial, INK, (middle - half).tolist(), (middle + half).tolist(), width)
+
+
+def _face(full: int) -> pygame.Surface:
+    """A round dial with nothing on it."""
+    dial = pygame.Surface((full, full), pygame.SRCALPHA)
+    middle = full / 2
+    pygame.draw.circle(dial, FACE, (middle, middle), middle - 1)
+    pygame.draw.circle(dial, DIM, (middle, middle), middle - 1, 2 * FINE - 2)
+    return dial
+
+
+def _mark_goal(dial: pygame.Surface, angle: float) -> None:
+    """A mark on the rim of a dial that points inwards."""
+    middle = dial.get_width() / 2
+    corners = ((0.74, 0.0), (0.99, -0.19), (0.99, 0.19))
+    points = [_on_circle(middle, radius * middle, angle + turn) for radius, turn in corners]
+    pygame.draw.polygon(dial, GOAL, points)
 
 
 @lru_cache(maxsize=8)
 def _rose(full: int) -> pygame.Surface:
-    dial = pygame.Surface((full, full), pygame.SRCALPHA)
+    dial = _face(full)
     middle = full / 2
-    pygame.draw.circle(dial, (10, 34, 52, 235), (middle, middle), middle - 1)
-    pygame.draw.circle(dial, DIM, (middle, middle), middle - 1, 2 * FINE - 2)
     for step in range(24):
         angle = np.radians(15.0 * step)
         inner = middle * (0.80 if step % 2 == 0 else 0.87)
@@ -113,26 +136,17 @@ def compass(
     middle = full / 2
     dial = _rose(full).copy()
     if goal is not None:
-        tip, left, right = (
-            _on_circle(middle, radius * middle, goal + turn)
-            for radius, turn in ((0.74, 0.0), (0.99, -0.19), (0.99, 0.19))
-        )
-        pygame.draw.polygon(dial, GOAL, [tip, left, right])
+        _mark_goal(dial, goal)
     points = ((0.70, 0.0), (0.22, 2.5), (0.10, np.pi), (0.22, -2.5))
     needle = [_on_circle(middle, radius * middle, heading + turn) for radius, turn in points]
     pygame.draw.polygon(dial, FISH, needle)
     _shrunk(surface, dial, at, size)
 
 
-SWEEP = np.radians(135.0)
-
-
 @lru_cache(maxsize=8)
-def _speed_face(full: int, top: float) -> pygame.Surface:
-    dial = pygame.Surface((full, full), pygame.SRCALPHA)
+def _speed_face(full: int) -> pygame.Surface:
+    dial = _face(full)
     middle = full / 2
-    pygame.draw.circle(dial, (10, 34, 52, 235), (middle, middle), middle - 1)
-    pygame.draw.circle(dial, DIM, (middle, middle), middle - 1, 2 * FINE - 2)
     for step in range(11):
         angle = -SWEEP + 2.0 * SWEEP * step / 10
         inner = middle * (0.78 if step % 5 == 0 else 0.86)
@@ -152,17 +166,13 @@ def speed_dial(
     """Surge speed (m/s) on a dial that ends at ``top``, with the goal's speed on the rim."""
     full = round(FINE * size)
     middle = full / 2
-    dial = _speed_face(full, top).copy()
+    dial = _speed_face(full).copy()
 
     def angle(value: float) -> float:
         return float(-SWEEP + 2.0 * SWEEP * np.clip(value / top, 0.0, 1.0))
 
     if goal is not None:
-        tip, left, right = (
-            _on_circle(middle, radius * middle, angle(goal) + turn)
-            for radius, turn in ((0.74, 0.0), (0.99, -0.19), (0.99, 0.19))
-        )
-        pygame.draw.polygon(dial, GOAL, [tip, left, right])
+        _mark_goal(dial, angle(goal))
     ends = (middle, middle), _on_circle(middle, 0.72 * middle, angle(speed))
     pygame.draw.line(dial, FISH, *ends, 3 * FINE)
     pygame.draw.circle(dial, FISH, (middle, middle), 3 * FINE)

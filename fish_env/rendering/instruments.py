@@ -6,9 +6,9 @@ import numpy as np
 import pygame
 
 from fish_env.rendering.gauges import DIM, INK, bar, compass, horizon, panel, speed_dial
+from fish_env.rendering.lettering import write
 from fish_env.rendering.light import FISH, GOAL
 from fish_env.rendering.scene import Scene, Setting
-from fish_env.rendering.type import write
 
 ACTUATORS = (
     ("tail offset", "°", 180.0 / np.pi, 0),
@@ -46,33 +46,25 @@ class Instruments:
     def _draw_depth(self, surface: pygame.Surface, scene: Scene, unit: float) -> None:
         """A scale of the whole depth at the right, with the fish's and the goal's."""
         width, height = surface.get_size()
+        x, top = width - 22.0 * unit, 34.0 * unit
+        bottom = height - (128.0 if width >= NARROW else 24.0) * unit
         tank = self.setting.tank
-        top, bottom = 34.0 * unit, height - (128.0 if width >= NARROW else 24.0) * unit
-        x = width - 22.0 * unit
-        panel(
-            surface, (x - 13 * unit, top - 28 * unit, 30 * unit, bottom - top + 38 * unit), 8 * unit
-        )
+        long = bottom - top
+        panel(surface, (x - 13 * unit, top - 28 * unit, 30 * unit, long + 38 * unit), 8 * unit)
         write(surface, "depth", (x + 2 * unit, top - 17 * unit), round(9 * unit), DIM, "middle")
 
         def level(depth: float) -> float:
             share = (depth - tank.top) / (tank.bottom - tank.top)
-            return float(top + (bottom - top) * np.clip(share, 0.0, 1.0))
+            return float(top + long * np.clip(share, 0.0, 1.0))
 
         pygame.draw.line(surface, DIM, (x, top), (x, bottom))
-        step = _step(tank.bottom - tank.top)
-        for depth in np.arange(np.ceil(tank.top / step), np.floor(tank.bottom / step) + 1) * step:
-            y = level(float(depth))
-            pygame.draw.line(surface, DIM, (x, y), (x + 6 * unit, y))
+        for depth in _marks(tank.top, tank.bottom):
+            pygame.draw.line(surface, DIM, (x, level(depth)), (x + 6 * unit, level(depth)))
         if scene.goal is not None:
             y = level(scene.goal.depth)
             pygame.draw.line(surface, GOAL, (x - 8 * unit, y), (x + 10 * unit, y), round(2 * unit))
         depth = float(scene.position[2])
-        y = level(depth)
-        arrow = [(x, y), (x - 10 * unit, y - 5 * unit), (x - 10 * unit, y + 5 * unit)]
-        panel(surface, (x - 62 * unit, y - 9 * unit, 48 * unit, 18 * unit), 5 * unit)
-        pygame.draw.polygon(surface, FISH, arrow)
-        text = (x - 18 * unit, y)
-        write(surface, f"{_number(depth, 2)} m", text, round(10.5 * unit), INK, "right", bold=True)
+        _draw_pointer(surface, (x, level(depth)), f"{_number(depth, 2)} m", unit)
 
     def _draw_actuators(self, surface: pygame.Surface, scene: Scene, unit: float) -> None:
         """Bars of the five actuators over their ranges, at the lower right."""
@@ -92,6 +84,15 @@ class Instruments:
             write(surface, f"{number} {symbol}", (x + inner - 8 * unit, middle), size, INK, "right")
 
 
+def _draw_pointer(surface: pygame.Surface, at: tuple[float, float], text: str, unit: float) -> None:
+    """A small arrow from the left, and what it says."""
+    x, y = at
+    panel(surface, (x - 62 * unit, y - 9 * unit, 48 * unit, 18 * unit), 5 * unit)
+    back = x - 10 * unit
+    pygame.draw.polygon(surface, FISH, [(x, y), (back, y - 5 * unit), (back, y + 5 * unit)])
+    write(surface, text, (x - 18 * unit, y), round(10.5 * unit), INK, "right", bold=True)
+
+
 def _draw_title(surface: pygame.Surface, scene: Scene, unit: float) -> None:
     size = round(12 * unit)
     at = (12 * unit, 16 * unit)
@@ -105,27 +106,23 @@ def _draw_title(surface: pygame.Surface, scene: Scene, unit: float) -> None:
 
 def _draw_dials(surface: pygame.Surface, scene: Scene, unit: float) -> None:
     """Attitude, heading and speed at the lower left, each with its numbers below."""
-    height = surface.get_size()[1]
     size = 74.0 * unit
-    x, y = 8 * unit, height - size - 34 * unit
+    x, y = 8 * unit, surface.get_height() - size - 34 * unit
     panel(surface, (x, y, 3 * size + 32 * unit, size + 28 * unit), 8 * unit)
     roll, pitch, yaw = (float(angle) for angle in scene.euler)
-    goal = scene.goal
+    heading, speed = (scene.goal.heading, scene.goal.speed) if scene.goal else (None, None)
     middle = y + 6 * unit + size / 2
-    centres = [x + 8 * unit + size / 2 + i * (size + 8 * unit) for i in range(3)]
-    horizon(surface, (centres[0], middle), size, roll, pitch)
-    compass(surface, (centres[1], middle), size, yaw, None if goal is None else goal.heading)
-    speed_at = (centres[2], middle)
-    speed_dial(
-        surface, speed_at, size, scene.speed, TOP_SPEED, None if goal is None else goal.speed
-    )
-    degrees = np.degrees([roll, pitch])
-    texts = (
-        f"r {_number(degrees[0], 0)}° p {_number(degrees[1], 0)}°",
-        f"heading {np.degrees(yaw) % 360.0:03.0f}°",
-        f"{_number(scene.speed, 2)} m/s",
-    )
-    for centre, text in zip(centres, texts, strict=True):
+    first, second, third = (x + 8 * unit + size / 2 + i * (size + 8 * unit) for i in range(3))
+    horizon(surface, (first, middle), size, roll, pitch)
+    compass(surface, (second, middle), size, yaw, heading)
+    speed_dial(surface, (third, middle), size, scene.speed, TOP_SPEED, speed)
+    degrees = [_number(np.degrees(angle), 0) for angle in (roll, pitch)]
+    texts = {
+        first: f"r {degrees[0]}° p {degrees[1]}°",
+        second: f"heading {np.degrees(yaw) % 360.0:03.0f}°",
+        third: f"{_number(scene.speed, 2)} m/s",
+    }
+    for centre, text in texts.items():
         write(surface, text, (centre, y + size + 17 * unit), round(10.5 * unit), INK, "middle")
 
 
@@ -143,6 +140,11 @@ def _number(value: float, decimals: int) -> str:
     return f"{round(value, decimals) + 0.0:.{decimals}f}".replace("-", "−")
 
 
-def _step(depth: float) -> float:
-    """Distance between the marks of the depth scale: ten or so of them (m)."""
-    return float(10.0 ** np.floor(np.log10(depth))) / (10.0 if depth < 3.0 else 2.0)
+def _marks(top: float, bottom: float) -> list[float]:
+    """Round depths between two, some ten of them (m)."""
+    span = bottom - top
+    step = 10.0 ** np.floor(np.log10(span)) / (10.0 if span < 3.0 else 2.0)
+    marks: list[float] = (
+        np.arange(np.ceil(top / step), np.floor(bottom / step) + 1) * step
+    ).tolist()
+    return marks

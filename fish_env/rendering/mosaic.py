@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 import pygame
 
-from fish_env.rendering.scene import Scene, Setting
-from fish_env.rendering.view import SIZE, View
+from fish_env.rendering.scene import PICTURE_SIZE, Scene, Setting
+from fish_env.rendering.view import Frame, View, as_array
 
-Frame = npt.NDArray[np.uint8]
 GAP = 2
 FRAME = (8, 20, 30)
 
@@ -37,7 +35,7 @@ class Mosaic:
         size: width and height of the whole picture (pixels).
     """
 
-    def __init__(self, setting: Setting, count: int, size: tuple[int, int] = SIZE) -> None:
+    def __init__(self, setting: Setting, count: int, size: tuple[int, int] = PICTURE_SIZE) -> None:
         self.views = [View(setting, size) for _ in range(count)]
         self.resize(size)
 
@@ -56,8 +54,7 @@ class Mosaic:
 
     def frame(self, scenes: Sequence[Scene]) -> Frame:
         """The picture of one scene for each fish: (height, width, 3), uint8."""
-        pixels = np.frombuffer(pygame.image.tobytes(self.surface(scenes), "RGB"), np.uint8)
-        return pixels.reshape(self.size[1], self.size[0], 3).copy()
+        return as_array(self.surface(scenes))
 
     def surface(self, scenes: Sequence[Scene]) -> pygame.Surface:
         """The picture as a surface of the drawing library."""

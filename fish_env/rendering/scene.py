@@ -7,13 +7,17 @@ run.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
+from fish_env.model.frames import euler_from_quaternion
 from fish_env.rendering.shape import FishShape
 
 FloatArray = npt.NDArray[np.float64]
+PICTURE_SIZE = (640, 480)
+"""Width and height of a picture (pixels), unless another is asked for."""
 NO_WAKE = np.zeros((0, 3))
 REST = np.zeros(5)
 
@@ -73,7 +77,6 @@ class Scene:
         time_s: s.
         position: (3,) of O_b (m).
         quaternion: (4,) scalar first, body to inertial.
-        euler: roll, pitch, yaw (rad).
         speed: surge speed over ground (m/s).
         tail_angle: angle of the tail about its joint (rad), positive with the fin to port.
         tail_phase: phase of the tail beat (rad), which says how to fill in between two scenes.
@@ -86,7 +89,6 @@ class Scene:
     time_s: float
     position: FloatArray
     quaternion: FloatArray
-    euler: FloatArray
     speed: float
     tail_angle: float
     tail_phase: float = 0.0
@@ -94,6 +96,11 @@ class Scene:
     wake: FloatArray = field(default_factory=lambda: NO_WAKE)
     goal: Goal | None = None
     label: str = ""
+
+    @cached_property
+    def euler(self) -> FloatArray:
+        """Roll, pitch, yaw (rad)."""
+        return euler_from_quaternion(self.quaternion)
 
     @property
     def commanded_tail(self) -> float:
@@ -120,24 +127,18 @@ def between(first: Scene, second: Scene, share: float) -> Scene:
         start, end = np.asarray(a, float), np.asarray(b, float)
         return np.asarray(start + share * (end - start))
 
-    turns = (second.quaternion @ first.quaternion < 0.0) * -2.0 + 1.0
-    attitude = mixed(first.quaternion, turns * second.quaternion)
+    # A quaternion and its negative are the same attitude: take the nearer one.
+    nearer = np.copysign(1.0, first.quaternion @ second.quaternion)
+    attitude = mixed(first.quaternion, nearer * second.quaternion)
     rest = (s.tail_angle - s.commanded_tail for s in (first, second))
-    angles = first.euler + share * _wrapped(second.euler - first.euler)
     ideal = replace(
         second,
         time_s=float(mixed(first.time_s, second.time_s)),
         position=mixed(first.position, second.position),
         quaternion=attitude / np.linalg.norm(attitude),
-        euler=angles,
         speed=float(mixed(first.speed, second.speed)),
         tail_phase=float(mixed(first.tail_phase, second.tail_phase)),
         actuators=mixed(first.actuators, second.actuators),
         wake=first.wake,
     )
     return replace(ideal, tail_angle=ideal.commanded_tail + float(mixed(*rest)))
-
-
-def _wrapped(angle: FloatArray) -> FloatArray:
-    wrapped: FloatArray = (angle + np.pi) % (2.0 * np.pi) - np.pi
-    return wrapped

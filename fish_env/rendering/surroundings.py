@@ -44,7 +44,7 @@ def _floor_grid(north: Span, east: Span, bottom: float) -> tuple[FloatArray, Flo
 
 
 def draw_walls(canvas: Canvas, tank: Tank) -> None:
-    """Upright and level lines every 25 cm on the walls, if there are any."""
+    """Level lines every 25 cm and upright ones every half metre on the walls, if there are any."""
     if tank.walls is None:
         return
     north, east = tank.walls[:2], tank.walls[2:]

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from fish_env.model.frames import rotation
+from fish_env.model.jit import py_function
 from fish_env.rendering import markers
 from fish_env.rendering.body import EYE, PUPIL, Fish, eyes
 from fish_env.rendering.canvas import Canvas
 from fish_env.rendering.light import hazed
-from fish_env.rendering.mesh import Mesh, attitude
+from fish_env.rendering.mesh import Mesh
 from fish_env.rendering.scene import Scene
 from fish_env.rendering.shape import hull_profile
 
@@ -49,7 +51,8 @@ class Swimmer:
         self.canvas = canvas
         self.scene = scene
         self.shape = fish.shape
-        self.rotation = attitude(scene.quaternion)
+        unit = scene.quaternion / np.linalg.norm(scene.quaternion)
+        self.rotation = np.array(py_function(rotation)(*unit)).reshape(3, 3)
         self.eye = self.rotation.T @ (canvas.camera.eye - scene.position)
         behind, before = self._outer_parts(fish)
         block = fish.block(float(scene.actuators[3]), float(scene.actuators[4]))

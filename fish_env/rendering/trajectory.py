@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
-from fish_env.model.frames import euler_from_quaternion
-from fish_env.model.state import INPUTS
 from fish_env.rendering.scene import Goal, Scene, Setting, Tank
 from fish_env.rendering.shape import FishShape
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from fish_env.params.schema import FishParams
     from fish_env.trajectory import Trajectory
 
+FloatArray = npt.NDArray[np.float64]
 ROOM_M = 0.35
 """m of water left above and below a trajectory that leaves the default tank."""
 WAKE_S = 30.0
@@ -23,55 +24,51 @@ WAKE_S = 30.0
 def scenes_of(
     trajectory: Trajectory,
     fish: FishParams,
+    *,
     goal: Goal | None = None,
     label: str = "",
     tank: Tank | None = None,
+    tail_angle: FloatArray | None = None,
 ) -> tuple[Setting, list[Scene]]:
     """The setting and the scenes of a trajectory, one for each sample.
 
     Args:
-        trajectory: sampled at 20 Hz or more, or else the tail's angle between samples is taken
-            from its beat.
+        trajectory: what the fish did.
         fish: whose shape is drawn.
         goal: shown throughout.
         label: words in the corner.
         tank: the water; default: one that holds the whole trajectory.
+        tail_angle: (T,) angle of the tail (rad), ``Simulator.outputs(trajectory)["tail_angle"]``;
+            default: that of an ideal servo.
     """
-    position = trajectory.states[:, :3]
-    setting = Setting(FishShape.of(fish), tank or _tank(position[:, 2]))
     low, high = trajectory.inputs.min(axis=0), trajectory.inputs.max(axis=0)
-    setting = Setting(
-        setting.shape,
-        setting.tank,
-        np.minimum(setting.low, low),
-        np.maximum(setting.high, high),
-    )
-    quaternion = trajectory.states[:, 3:7]
-    euler = euler_from_quaternion(quaternion)
+    usual = Setting(FishShape.of(fish), tank or tank_around(trajectory["z"]))
+    setting = replace(usual, low=np.minimum(usual.low, low), high=np.maximum(usual.high, high))
     phase = trajectory["tail_phase"]
-    tail = trajectory.inputs[:, 0] + trajectory.inputs[:, 1] * np.sin(phase)
+    ideal = trajectory.inputs[:, 0] + trajectory.inputs[:, 1] * np.sin(phase)
+    tail = ideal if tail_angle is None else tail_angle
+    position = trajectory.states[:, :3]
     first = np.searchsorted(trajectory.time_s, trajectory.time_s - WAKE_S)
     return setting, [
         Scene(
-            float(trajectory.time_s[i]),
-            position[i],
-            quaternion[i],
-            euler[i],
-            float(trajectory["u"][i]),
-            float(tail[i]),
-            float(phase[i]),
-            trajectory.inputs[i, : len(INPUTS)],
-            position[first[i] : i],
-            goal,
-            label,
+            time_s=float(trajectory.time_s[i]),
+            position=position[i],
+            quaternion=trajectory.states[i, 3:7],
+            speed=float(trajectory.states[i, 7]),
+            tail_angle=float(tail[i]),
+            tail_phase=float(phase[i]),
+            actuators=trajectory.inputs[i],
+            wake=position[first[i] : i],
+            goal=goal,
+            label=label,
         )
         for i in range(len(trajectory))
     ]
 
 
-def _tank(depth: np.ndarray) -> Tank:
-    """The default tank, or one around depths (T,) that leave it."""
-    default = Tank()
-    top = min(default.top, float(depth.min()) - ROOM_M)
-    bottom = max(default.bottom, float(depth.max()) + ROOM_M)
-    return default if top < 0.0 and depth.min() > 0.0 else Tank(top, bottom)
+def tank_around(depth: FloatArray) -> Tank:
+    """The usual tank, made higher or deeper if depths (T,) (m) leave it."""
+    usual = Tank()
+    low, high = float(depth.min()), float(depth.max())
+    top = usual.top if low > usual.top else low - ROOM_M
+    return Tank(top, usual.bottom if high < usual.bottom else high + ROOM_M)

@@ -11,7 +11,7 @@ from fish_env.errors import ConfigError, missing_extra
 from fish_env.rendering.scene import Scene, Setting, between
 from fish_env.rendering.view import View
 
-QUALITY = 7
+QUALITY = 6
 """Of imageio-ffmpeg, 0 to 10."""
 
 

@@ -11,14 +11,20 @@ from fish_env.rendering.body import Fish
 from fish_env.rendering.camera import Follower
 from fish_env.rendering.canvas import Canvas
 from fish_env.rendering.instruments import Instruments
-from fish_env.rendering.scene import Scene, Setting
+from fish_env.rendering.scene import PICTURE_SIZE, Scene, Setting
 from fish_env.rendering.swimmer import Side, Swimmer
 from fish_env.rendering.water import paint
 
 Frame = npt.NDArray[np.uint8]
-SIZE = (640, 480)
 FULL_SAMPLING = 1_000_000
 """Pixels up to which a picture is drawn at twice its size; a larger one is smooth enough."""
+
+
+def as_array(surface: pygame.Surface) -> Frame:
+    """The colours of a surface (height, width, 3), uint8, as an array of its own."""
+    width, height = surface.get_size()
+    pixels = np.frombuffer(pygame.image.tobytes(surface, "RGB"), np.uint8)
+    return pixels.reshape(height, width, 3).copy()
 
 
 class View:
@@ -31,7 +37,7 @@ class View:
     """
 
     def __init__(
-        self, setting: Setting, size: tuple[int, int] = SIZE, instruments: bool = True
+        self, setting: Setting, size: tuple[int, int] = PICTURE_SIZE, instruments: bool = True
     ) -> None:
         self.setting = setting
         self.fish = Fish.built(setting.shape)
@@ -41,8 +47,7 @@ class View:
 
     def frame(self, scene: Scene) -> Frame:
         """The picture of a scene: (height, width, 3), uint8."""
-        pixels = np.frombuffer(pygame.image.tobytes(self.surface(scene), "RGB"), np.uint8)
-        return pixels.reshape(self.size[1], self.size[0], 3).copy()
+        return as_array(self.surface(scene))
 
     def surface(self, scene: Scene) -> pygame.Surface:
         """The picture of a scene as a surface of the drawing library."""
@@ -62,9 +67,9 @@ class View:
         water = paint(camera, coarse, scene.time_s, tank.top, tank.bottom)
         canvas = Canvas(pygame.transform.smoothscale(water, large), camera, unit)
         self._draw(canvas, scene)
-        return (
-            pygame.transform.smoothscale(canvas.surface, self.size) if unit > 1 else canvas.surface
-        )
+        if unit == 1:
+            return canvas.surface
+        return pygame.transform.smoothscale(canvas.surface, self.size)
 
     def _draw(self, canvas: Canvas, scene: Scene) -> None:
         tank = self.setting.tank

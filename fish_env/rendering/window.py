@@ -9,10 +9,9 @@ from collections.abc import Sequence
 import pygame
 
 from fish_env.errors import ConfigError
-from fish_env.rendering.help import draw_help, draw_note
 from fish_env.rendering.mosaic import Mosaic
-from fish_env.rendering.scene import Scene, Setting, between
-from fish_env.rendering.view import SIZE
+from fish_env.rendering.notes import draw_help, draw_note
+from fish_env.rendering.scene import PICTURE_SIZE, Scene, Setting, between
 
 TITLE = "robotic fish"
 SMALLEST = (160, 120)
@@ -55,7 +54,9 @@ class Window:
         ConfigError: no window can be opened, for want of a screen.
     """
 
-    def __init__(self, setting: Setting, count: int = 1, size: tuple[int, int] = SIZE) -> None:
+    def __init__(
+        self, setting: Setting, count: int = 1, size: tuple[int, int] = PICTURE_SIZE
+    ) -> None:
         _find_screen()
         self._window: pygame.Window | None = pygame.Window(TITLE, size, resizable=True)
         self._window.minimum_size = SMALLEST

@@ -24,7 +24,6 @@ def scene(euler=LEVEL, **changes: Any) -> Scene:
         5.0,
         np.array([0.4, -0.2, 0.5]),
         quaternion_from_euler(euler),
-        np.array(euler),
         0.1,
         0.3,
         actuators=np.array([0.0, 0.3, 2.0, 0.0, 0.0]),

@@ -132,6 +132,12 @@ def test_what_is_missing_is_named_at_once(make, monkeypatch):
     make()
 
 
+def test_the_other_pygame_is_not_taken_for_ours(monkeypatch):
+    monkeypatch.delattr("pygame.IS_CE")
+    with pytest.raises(MissingExtraError, match="pip uninstall pygame"):
+        RoboticFish3DEnv(render_mode="rgb_array")
+
+
 def test_an_environment_that_draws_nothing_loads_no_pygame():
     code = (
         "import sys, gymnasium; env = gymnasium.make('fish_env:RoboticFish3D-v0'); "

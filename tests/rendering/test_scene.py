@@ -28,7 +28,7 @@ def test_attitude_goes_the_short_way():
     """Across north, and whichever sign the quaternions have."""
     first, second = (0.0, 0.0, -0.1 % (2 * np.pi)), (0.0, 0.0, 0.1)
     a = scene(first)
-    b = moved(quaternion=-quaternion_from_euler(second), euler=np.array(second))
+    b = moved(quaternion=-quaternion_from_euler(second))
     middle = between(a, b, 0.5)
     north = quaternion_from_euler((0.0, 0.0, 0.0))
     assert abs(middle.quaternion @ north) == pytest.approx(1.0)
@@ -68,6 +68,12 @@ def test_scenes_of_a_trajectory_follow_it():
     np.testing.assert_array_equal(scenes[20].wake, run.states[:20, :3])
     tail = simulator.outputs(run)["tail_angle"]
     np.testing.assert_allclose([s.tail_angle for s in scenes], tail, atol=1e-12)
+
+
+def test_the_tail_of_a_trajectory_can_be_given():
+    run = Simulator("zheng-2021-a").run(SWIM, duration_s=0.5)
+    _, scenes = scenes_of(run, FISH, tail_angle=np.full(len(run), 0.123))
+    assert {s.tail_angle for s in scenes} == {0.123}
 
 
 def test_the_tank_holds_a_trajectory_that_leaves_the_usual_one():

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pygame
 
 from fish_env.rendering.gauges import INK, panel
+from fish_env.rendering.lettering import write
 from fish_env.rendering.light import GOAL
-from fish_env.rendering.type import write
 
 KEYS = (
     ("drag, arrows", "turn the camera"),

@@ -6,7 +6,9 @@ import re
 from pathlib import Path
 
 import pytest
+from typer.main import get_command
 
+from fish_env.cli import app
 from fish_env.effects import catalogue
 from fish_env.envs.robotic_fish_3d import RoboticFish3DEnv
 from scripts import (
@@ -73,6 +75,18 @@ def test_the_examples_on_a_page_are_the_files(example):
     shown = re.search(rf"<!-- {example} -->\n```\w+\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
     assert shown is not None
     assert shown[1] == (ROOT / example).read_text(encoding="utf-8"), "copy the file into the page"
+
+
+def test_every_command_is_on_the_first_page():
+    page = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"^\| `robofish (\w+)", page, re.MULTILINE))
+    assert named == set(get_command(app).commands)  # type: ignore[attr-defined]
+
+
+def test_every_page_is_in_the_navigation():
+    """Also without the site's builder, which would only mention it."""
+    named = set(re.findall(r"(\w[\w-]*\.md)$", (ROOT / "mkdocs.yml").read_text(), re.MULTILINE))
+    assert named == {page.name for page in PAGES} - {"README.md"}, "add it to nav in mkdocs.yml"
 
 
 def links(page: Path) -> list[str]:

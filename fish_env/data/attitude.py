@@ -10,6 +10,10 @@ NORM_TOLERANCE = 0.01
 """How far the norm may be from one: rounding to two decimals, but no wrong column."""
 
 
+TILTED, UPRIGHT = 0.7, 0.9
+"""Cosines of the tilt that most of a run exceeds if the fish is not, or is, upright."""
+
+
 def euler_from_quaternion(quaternion: FloatArray) -> FloatArray:
     """Converts unit quaternions to Z-Y-X Euler angles.
 
@@ -31,7 +35,7 @@ def euler_from_quaternion(quaternion: FloatArray) -> FloatArray:
 
 
 def check_quaternion(quaternion: FloatArray, rows: list[int], place: Place) -> None:
-    """Refuses half-measured quaternions and norms away from one.
+    """Refuses half-measured quaternions, norms away from one, and a scalar in the last column.
 
     Args:
         quaternion: Shape (n, 4), NaN where missing.
@@ -53,4 +57,17 @@ def check_quaternion(quaternion: FloatArray, rows: list[int], place: Place) -> N
         raise place.at(rows[wrong[0]], ",".join(QUATERNION)).refuse(
             f"the quaternion has norm {norm[wrong[0]]:.4g}, not 1",
             "Correct the row; the order is qw, qx, qy, qz, body to inertial",
+        )
+    _check_order(quaternion, place)
+
+
+def _check_order(quaternion: FloatArray, place: Place) -> None:
+    """Refuses a fish that lies on its side or back unless the scalar is taken from the end."""
+    declared = 1.0 - 2.0 * np.sum(quaternion[:, 1:3] ** 2, axis=1)
+    scalar_last = 1.0 - 2.0 * np.sum(quaternion[:, 0:2] ** 2, axis=1)
+    if np.nanmedian(declared) < TILTED and np.nanmedian(scalar_last) > UPRIGHT:
+        raise place.at(column=",".join(QUATERNION)).refuse(
+            "as declared the fish swims on its side or back, and with the scalar as the last of "
+            "the four it swims upright",
+            "Name the columns so that qw is the scalar; the order is qw, qx, qy, qz",
         )

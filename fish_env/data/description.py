@@ -201,7 +201,7 @@ def _parse_runs(top: Section) -> tuple[RunEntry, ...]:
     entries = [_parse_run(item, top) for item in top.items("runs")]
     for what, values in (
         ("id", [entry.id for entry in entries]),
-        ("file", [str(entry.file) for entry in entries]),
+        ("file", [str(entry.file.resolve()) for entry in entries]),
     ):
         twice = [value for value in values if values.count(value) > 1]
         if twice:

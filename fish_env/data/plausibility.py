@@ -1,6 +1,7 @@
 """Refusal of values that cannot be what their unit says."""
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,13 @@ WINDING_START = 4.0 * math.pi
 
 YAW_INTERVAL = 0.1
 """s. Yaw is differenced over at least this time, so that noise does not look like turning."""
+
+FASTEST_TRAVEL, TRAVEL_INTERVAL = 5.0, 0.5
+"""m/s, and s over which it is taken. No robotic fish of this kind comes near it."""
+
+LITTLE_WAY, LONG_ENOUGH = 2.0, 3.0
+"""m and s. A fish that swims for so long in a tank of a few metres covers more than a thousandth
+of the way, but a way in metres read as millimetres does not."""
 
 
 def check_range(
@@ -122,6 +130,65 @@ def check_rate(rate: FloatArray, unit: Unit, rows: list[int], place: Place) -> N
         reason = f"a tenth of the run turns at {fast:.3g} rad/s or faster"
         first = int(np.argmax(np.abs(rate) > FASTEST_TURNING))
         raise _refuse_degrees(reason, unit, place.at(rows[first]))
+
+
+def check_travel(
+    time_s: FloatArray, channel: FloatArray, unit: Unit, rows: list[int], place: Place
+) -> None:
+    """Refuses a position that moves faster than anything swims, in metres or centimetres.
+
+    Args:
+        time_s: Sample times, shape (n,), s.
+        channel: x, y, z or depth, shape (n,), m, NaN where missing.
+        unit: The unit of the file; millimetres are not questioned.
+        rows: Line of the file of each sample.
+        place: The file, run and column.
+
+    Raises:
+        DatasetError: A tenth of the run is faster than that.
+    """
+    measured = np.flatnonzero(np.isfinite(channel))
+    time, values = time_s[measured], channel[measured]
+    later = np.searchsorted(time, time + TRAVEL_INTERVAL)
+    first = np.flatnonzero(later < time.size)
+    if unit.name == "mm" or not first.size:
+        return
+    speed = np.abs(values[later[first]] - values[first]) / (time[later[first]] - time[first])
+    fast = float(np.quantile(speed, 0.9))
+    if fast > FASTEST_TRAVEL:
+        row = rows[measured[first[np.argmax(speed > FASTEST_TRAVEL)]]]
+        raise place.at(row).refuse(
+            f"a tenth of the run moves at {fast:.3g} m/s or faster, which no such fish does",
+            f"Declare a smaller unit than '{unit.name}' for it in dataset.yaml, or correct the "
+            "cells",
+        )
+
+
+def check_progress(
+    beating_s: float, channels: Mapping[str, FloatArray], units: Mapping[str, Unit], place: Place
+) -> None:
+    """Refuses positions in small units that hardly change while the tail beats.
+
+    Args:
+        beating_s: How long the tail is asked to beat, s.
+        channels: The measured positions, m, NaN where missing.
+        units: Their units in the file; metres are not questioned.
+        place: The file and run.
+
+    Raises:
+        DatasetError: All stay within what such a unit makes of a short way in metres.
+    """
+    if not channels or beating_s < LONG_ENOUGH or any(units[n].name == "m" for n in channels):
+        return
+    spans = {name: float(np.nanmax(a) - np.nanmin(a)) for name, a in channels.items()}
+    if all(span < LITTLE_WAY * units[name].factor for name, span in spans.items()):
+        name = max(spans, key=lambda n: spans[n])
+        raise place.at(column=name).refuse(
+            f"it stays within {1e3 * spans[name]:.2g} mm while the tail beats for "
+            f"{beating_s:.3g} s",
+            f"Declare the unit 'm' instead of '{units[name].name}' if the cells are in metres, or "
+            "leave out a run in which the fish is held",
+        )
 
 
 def _refuse_degrees(reason: str, unit: Unit, place: Place, remedy: str = "") -> Exception:

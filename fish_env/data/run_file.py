@@ -7,12 +7,13 @@ from fish_env.data.columns import note_ignored, read_commands, read_quantities
 from fish_env.data.description import Description, RunEntry
 from fish_env.data.frames import switch_command_frame, switch_frame, switch_tail_phase
 from fish_env.data.place import Place
-from fish_env.data.plausibility import check_rate, check_turning
+from fish_env.data.plausibility import check_progress, check_rate, check_travel, check_turning
 from fish_env.data.schema import CommandSteps, FloatArray, Run
 from fish_env.data.table import Table, read_table
 from fish_env.data.units import Unit
-from fish_env.data.vocabulary import FILE_CHANNELS, QUATERNION
+from fish_env.data.vocabulary import COMMANDS, FILE_CHANNELS, QUATERNION
 
+POSITION = ("x", "y", "z", "depth")
 DEPTH_TOLERANCE = 0.05
 """m. Two sensors of one depth may differ by their offsets, but not by more."""
 
@@ -38,6 +39,7 @@ def read_run(description: Description, entry: RunEntry) -> tuple[Run, tuple[str,
     check_turning_channels(time, channels, description.channels, table)
     channels = quaternion_to_angles(channels, table)
     commands, phase = read_commands(table, description), entry.tail_phase
+    check_positions(time, channels, commands, description.channels, table)
     if description.frame == "enu":
         channels = switch_frame(channels)
         commands, phase = switch_command_frame(commands), switch_tail_phase(phase)
@@ -59,7 +61,8 @@ def read_time(table: Table) -> FloatArray:
         before, after = time[backward[0]], time[backward[0] + 1]
         raise table.place.at(table.rows[backward[0] + 1], "t").refuse(
             f"time does not increase: {after:.9g} s comes after {before:.9g} s",
-            "Sort the rows, or remove the repeated one",
+            "Sort the rows or remove the repeated one; if the clock was set back, correct it or "
+            "make two runs of it",
         )
     return time
 
@@ -74,6 +77,22 @@ def check_turning_channels(
             check_turning(time, values, units[name], table.rows, place)
         elif FILE_CHANNELS[name].dimension == "rate":
             check_rate(values, units[name], table.rows, place)
+
+
+def check_positions(
+    time: FloatArray,
+    channels: dict[str, FloatArray],
+    commands: FloatArray,
+    units: dict[str, Unit],
+    table: Table,
+) -> None:
+    """Refuses positions whose unit can only be another."""
+    positions = {name: values for name, values in channels.items() if name in POSITION}
+    for name, values in positions.items():
+        check_travel(time, values, units[name], table.rows, table.place.at(column=name))
+    amplitude = commands[:-1, list(COMMANDS).index("tail_amplitude")]
+    beating = float(np.sum(np.diff(time)[amplitude > 0.0]))
+    check_progress(beating, positions, units, table.place)
 
 
 def quaternion_to_angles(channels: dict[str, FloatArray], table: Table) -> dict[str, FloatArray]:

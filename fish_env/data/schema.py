@@ -7,6 +7,7 @@ equal to missing samples.
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from itertools import combinations
 from typing import Any, Literal
 
 import numpy as np
@@ -17,6 +18,9 @@ from fish_env.errors import DatasetError
 
 FloatArray = NDArray[np.float64]
 Start = Literal["rest", "unknown"]
+
+FEWEST_SHARED, SHARED = 10, 0.2
+"""Runs are the same if this many of their samples are, and this share of the shorter run's."""
 
 
 def _same(left: Any, right: Any) -> bool:
@@ -232,15 +236,34 @@ class Dataset(_ComparedByContent):
 
 
 def identical_runs(runs: tuple[Run, ...]) -> tuple[tuple[str, str], ...]:
-    """Returns pairs of ids of runs whose samples are all the same, which repeats never are."""
-    first: dict[bytes, str] = {}
-    pairs = []
-    for run in runs:
-        content = b"".join(array.tobytes() for array in (run.time_s, *run.channels.values()))
-        if content in first:
-            pairs.append((first[content], run.id))
-        first.setdefault(content, run.id)
-    return tuple(pairs)
+    """Returns pairs of ids of runs that hold the same samples, which repeats never do.
+
+    Whatever their times: a run that was copied, cut or moved in time counts as the same.
+    """
+    every = [_moments(run) for run in runs]
+    return tuple(
+        (one.id, other.id)
+        for (i, one), (j, other) in combinations(enumerate(runs), 2)
+        if _overlap(every[i], every[j])
+    )
+
+
+def _moments(run: Run) -> frozenset[bytes]:
+    """The distinct triples of samples that follow each other, of all channels at once.
+
+    A single sample may well come again: at rest, or where there is one channel only.
+    """
+    values = np.column_stack(list(run.channels.values()))
+    measured = np.isfinite(values)
+    # One of each number, whichever sign of zero or NaN.
+    values = np.where(measured, values, 0.0) + 0.0
+    kept = np.ascontiguousarray(values[measured.any(axis=1)])
+    return frozenset(kept[i : i + 3].tobytes() for i in range(max(1, len(kept) - 2)))
+
+
+def _overlap(one: frozenset[bytes], other: frozenset[bytes]) -> bool:
+    shared, fewest = len(one & other), min(len(one), len(other))
+    return shared == fewest or (shared >= FEWEST_SHARED and shared > SHARED * fewest)
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,10 @@ ANGLE_TOLERANCE = 0.02
 """rad. Sensor noise may carry an angle this far past the end of its range."""
 
 
+HIGHEST = 0.5
+"""m. How far above the surface a depth may be: a shifted zero, but no height for a depth."""
+
+
 @dataclass(frozen=True)
 class Quantity:
     """What a column holds.
@@ -60,7 +64,7 @@ QUATERNION = ("qw", "qx", "qy", "qz")
 
 FILE_CHANNELS: dict[str, Quantity] = {
     **CHANNELS,
-    "depth": Quantity("length"),
+    "depth": Quantity("length", -HIGHEST),
     **{name: Quantity("number") for name in QUATERNION},
 }
 """Channels a file may declare; depth becomes z, a quaternion becomes Euler angles."""

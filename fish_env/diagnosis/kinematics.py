@@ -23,6 +23,8 @@ ANGLES, RATES = ("roll", "pitch", "yaw"), ("p", "q", "r")
 POSITIONS, VELOCITIES = ("x", "y", "z"), ("u", "v", "w")
 LONGEST_BRIDGE = 3.5
 """Usual sample intervals. Across a longer gap nothing is integrated."""
+CHUNK, MEMORY = 60, 24
+"""Samples that are integrated at a time, and how many beside them a spline takes into account."""
 FEWEST_SAMPLES = 5
 MARGIN_S = 0.2
 """s. Left out at both ends of a run."""
@@ -212,17 +214,29 @@ def integrator(t_in: FloatArray, t_out: FloatArray, breaks: FloatArray) -> spars
     """
     cuts = np.searchsorted(t_in, breaks - 0.5 * np.median(np.diff(t_in)))
     cuts = np.unique(np.clip(np.append(cuts, [0, len(t_in) - 1]), 0, len(t_in) - 1))
-    result = np.zeros((len(t_out), len(t_in)))
-    for first, last in pairwise(cuts):
-        knots = t_in[first : last + 1]
-        curve = CubicSpline(knots, np.eye(len(knots))).antiderivative()
-        inside = (t_out > knots[0]) & (t_out <= knots[-1])
-        result[inside, first : last + 1] += curve(t_out[inside])
-        result[t_out > knots[-1], first : last + 1] += curve(knots[-1])
-    weights = np.diff(result, axis=0)
-    # A spline forgets what is far away.
-    weights[np.abs(weights) < 1e-14 * np.abs(weights).max()] = 0.0
-    return sparse.csr_array(weights)
+    parts = [
+        _part(t_in, t_out, (first, last), begin, min(begin + CHUNK, last))
+        for first, last in pairwise(cuts)
+        for begin in range(first, last, CHUNK)
+    ]
+    weights, rows, columns = (np.concatenate(side) for side in zip(*parts, strict=True))
+    return sparse.csr_array((weights, (rows, columns)), shape=(len(t_out) - 1, len(t_in)))
+
+
+def _part(
+    t_in: FloatArray, t_out: FloatArray, piece: tuple[int, int], begin: int, end: int
+) -> tuple[FloatArray, npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """What the inputs from `begin` to `end` add to the integrals: weights, rows and columns.
+
+    A spline forgets what is far away, so only so much of its smooth piece is looked at.
+    """
+    low, high = max(piece[0], begin - MEMORY), min(piece[1], end + MEMORY)
+    curve = CubicSpline(t_in[low : high + 1], np.eye(high + 1 - low)).antiderivative()
+    inside = np.flatnonzero((t_out[1:] > t_in[begin]) & (t_out[:-1] < t_in[end]))
+    since, until = (np.clip(t, t_in[begin], t_in[end]) for t in (t_out[inside], t_out[inside + 1]))
+    weights = curve(until) - curve(since)
+    rows = np.repeat(inside, weights.shape[1])
+    return weights.ravel(), rows, np.tile(np.arange(low, high + 1), len(inside))
 
 
 def euler_rates(euler: FloatArray) -> FloatArray:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from fish_env.data.schema import Dataset, Run, identical_runs
+from fish_env.diagnosis.conventions import check_conventions
+from fish_env.diagnosis.records import check_clock_jumps, check_stuck
 from fish_env.errors import DatasetError
 from fish_env.identification.runs import usable_channels
 
@@ -33,6 +37,7 @@ def check_runs(dataset: Dataset) -> None:
     for run in dataset.runs:
         _check_run(dataset.name, run)
     _check_amount(dataset)
+    check_conventions(dataset)
 
 
 def _check_run(name: str, run: Run) -> None:
@@ -46,6 +51,8 @@ def _check_run(name: str, run: Run) -> None:
                 f"{place}: {channel} is {present[0]:g} in every sample, no sensor is that still; "
                 "leave its cells empty in this run, or leave out the run"
             )
+        check_stuck(place, run, channel)
+    check_clock_jumps(place, run)
 
 
 def _check_length(place: str, run: Run) -> None:
@@ -77,3 +84,28 @@ def _check_amount(dataset: Dataset) -> None:
                 f"{dataset.name}: {present} samples of {channel} in all, too few to judge anything "
                 f"by; measure at least {FEWEST_SAMPLES}"
             )
+
+
+ASTONISHING, MANY = 6.0, 4.0
+"""Prior standard deviations that one coefficient, and the root mean square of all, may move."""
+
+
+def another_fish(prior_sds_off: Sequence[float]) -> str | None:
+    """A doubt to voice where a refit moved the coefficients further than the priors allow.
+
+    Data cannot tell for sure that the parameter file is of another fish: a wrong mass or size
+    comes out as coefficients that are all off at once.
+
+    Args:
+        prior_sds_off: how far each refitted coefficient is from its nominal value, in standard
+            deviations of its prior.
+    """
+    off = np.abs(np.asarray(prior_sds_off, dtype=np.float64))
+    far = int(np.sum(off > ASTONISHING))
+    if not off.size or (far < 2 and np.sqrt(np.mean(off**2)) < MANY):
+        return None
+    return (
+        f"The refit moved coefficients by up to {off.max():.0f} prior standard deviations "
+        f"({far} by more than {ASTONISHING:.0f}). Perhaps the parameter file is of another fish, "
+        "or mass, size or block were changed since: check `fish` in dataset.yaml, or give --fish."
+    )

@@ -6,7 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fish_env.data import Dataset, list_datasets, load_dataset
+from fish_env.data import CommandSteps, Dataset, Run, list_datasets, load_dataset
+from fish_env.data.schema import identical_runs
 from fish_env.errors import DatasetError
 from tests.fixtures.measured_data import DESCRIPTION, RUN, description, good_folder, write_folder
 
@@ -81,6 +82,31 @@ def test_undeclared_columns_and_unlisted_files_are_noted(tmp_path):
     assert len(notes) == 2
     assert "r02.csv" in notes[0]
     assert all(word in notes[1] for word in ("r01.csv", "run r01", "column z", "ignored"))
+
+
+def test_runs_that_were_copied_cut_or_moved_in_time_are_found():
+    rng = np.random.default_rng(0)
+    time, values = np.arange(100) / 10.0, rng.normal(0.0, 1.0, (3, 100))
+    steps = CommandSteps(np.zeros(1), np.zeros((1, 5)))
+
+    def run(id, x, y, t=time):
+        return Run(id, t, {"x": x, "y": y}, CommandSteps(t[:1], steps.values), "rest", 0.0)
+
+    first = run("a", values[0], values[1])
+    assert identical_runs((first, run("b", values[0], values[1], time + 7.0))) == (("a", "b"),)
+    cut = run("b", values[0, 30:60], values[1, 30:60], time[:30])
+    assert identical_runs((first, cut)) == (("a", "b"),)
+    assert identical_runs((first, run("b", values[0], values[2]))) == ()
+
+
+def test_a_rest_that_two_runs_share_is_no_copy():
+    time = np.arange(100) / 10.0
+    steps = CommandSteps(np.zeros(1), np.zeros((1, 5)))
+    runs = []
+    for speed in (0.1, 0.2):
+        x = np.maximum(time - 5.0, 0.0) * speed
+        runs.append(Run(f"r{speed}", time, {"x": x}, steps, "rest", 0.0))
+    assert identical_runs(tuple(runs[i] for i in (0, 1))) == ()
 
 
 def test_identical_runs_are_noted(tmp_path):

@@ -132,6 +132,67 @@ def test_bad_quaternions(tmp_path, row, expected):
     assert all(words in message for words in ("run r01", "row 3", "qw", expected))
 
 
+def positions(scale, channel="x", unit="m"):
+    """Six seconds of swimming at 0.1 m/s, written in units that are `scale` to the metre."""
+    time = np.arange(0.0, 6.0, 0.1)
+    rows = "".join(f"{t!r},{0.1 * scale * t!r},0.4\n" for t in time.tolist())
+    constants = {**dict.fromkeys(DESCRIPTION["commands"], 0.0), "tail_frequency": 1.0}
+    constants.pop("tail_amplitude")
+    changes = {
+        "channels": {channel: unit},
+        "commands": {"tail_amplitude": "rad"},
+        "constant_commands": constants,
+    }
+    return f"t,{channel},tail_amplitude\n{rows}", changes
+
+
+@pytest.mark.parametrize(
+    ("scale", "unit", "expected"),
+    [(1000.0, "m", "smaller unit than 'm'"), (1000.0, "cm", None), (100.0, "cm", None),
+     (1.0, "mm", "the unit 'm' instead of 'mm'"), (1000.0, "mm", None), (1.0, "m", None)],
+)  # fmt: skip
+def test_positions_in_another_unit(tmp_path, scale, unit, expected):
+    run, changes = positions(scale, unit=unit)
+    folder = good_folder(tmp_path, run, **changes)
+    if expected is None:
+        load_dataset(folder)
+        return
+    message = refusal(folder)
+    assert all(words in message for words in ("run r01", "column x", expected))
+
+
+def test_a_depth_above_the_surface(tmp_path):
+    run, changes = positions(-1.0, "depth")
+    assert "is outside -0.5 to inf" in refusal(
+        good_folder(tmp_path, run + "6.0,-0.7,0.4\n", **changes)
+    )
+
+
+def test_a_quaternion_with_its_scalar_last(tmp_path):
+    yaw = np.linspace(-3.0, 3.0, 40)
+    columns = np.column_stack([np.cos(yaw / 2), 0 * yaw, 0 * yaw, np.sin(yaw / 2)])
+    changes = {
+        "channels": dict.fromkeys(("qw", "qx", "qy", "qz"), "1"),
+        "commands": {},
+        "constant_commands": dict.fromkeys(DESCRIPTION["commands"], 0.0),
+    }
+    for order, right in ((slice(None), True), ([1, 2, 3, 0], False)):
+        rows = "".join(
+            f"{0.1 * i:.1f}," + ",".join(map(repr, row)) + "\n"
+            for i, row in enumerate(columns[:, order].tolist())
+        )
+        folder = good_folder(tmp_path, f"t,qw,qx,qy,qz\n{rows}", **changes)
+        if right:
+            load_dataset(folder)
+        else:
+            assert "scalar as the last" in refusal(folder)
+
+
+def test_one_file_under_two_paths(tmp_path):
+    entries = [RUN_ENTRY, RUN_ENTRY | {"id": "r02", "file": "./r01.csv"}]
+    assert "two runs have the file" in refusal(good_folder(tmp_path, runs=entries))
+
+
 def test_contradicting_depth(tmp_path):
     run = RUN.replace(",x,", ",depth,")
     message = refusal(good_folder(tmp_path, run, channels={"depth": "m", "z": "m"}))

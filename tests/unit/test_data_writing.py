@@ -28,10 +28,13 @@ from fish_env.errors import DatasetError
 IDS = st.text("abcXYZ019_-+ é", min_size=1, max_size=8).filter(lambda text: text == text.strip())
 # Within what a yaw can be, without jumps that would look like degrees.
 YAW_LIMIT = 0.5
+# Within half a second, slower than would look like millimetres.
+WAY_LIMIT = 1.2
 
 
 def values(quantity, rows, missing=True, name=""):
     limit = YAW_LIMIT if name == "yaw" or quantity.dimension == "rate" else 1e6
+    limit = WAY_LIMIT if quantity.dimension == "length" else limit
     lower, upper = max(quantity.lower, -limit), min(quantity.upper, limit)
     numbers = st.floats(lower, upper)
     elements = st.one_of(numbers, st.just(math.nan)) if missing else numbers

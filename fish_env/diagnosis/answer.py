@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fish_env.diagnosis import consistency, noise_floor
 from fish_env.diagnosis.causes import PARAMETER
 from fish_env.diagnosis.gain import Gain, Pair
 from fish_env.diagnosis.preconditions import Precondition
+from fish_env.diagnosis.regimes import as_plain
 from fish_env.effects.extended import PREFIX
 from fish_env.identification.estimator import Fit
 
@@ -42,10 +44,13 @@ def as_dict(diagnosis: Diagnosis) -> Plain:
         "alternatives": alternatives,
         "parameters": coefficients(diagnosis.accepted),
         "noise": _noise(diagnosis.accepted),
+        "noise_floor": [noise_floor.as_dict(floor) for floor in diagnosis.floors],
+        "consistency": consistency.as_dict(diagnosis.consistency),
         "misfit": {name: _pair(pair, "noise sd") for name, pair in diagnosis.misfit.items()},
         "gain": _gain(diagnosis.gain),
         "preconditions": [_precondition(p) for p in diagnosis.preconditions],
         "ranking": [{"name": n, "score": s} for n, s in diagnosis.attribution.ranking],
+        "localisation": as_plain(diagnosis.localisation),
         "unexplained": [] if diagnosis.adequacy.reached else _unexplained(diagnosis),
         "next_experiment": _experiment(diagnosis),
         "notes": list(diagnosis.dataset.notes),

@@ -19,7 +19,8 @@ from fish_env.diagnosis.causes import effect_values
 from fish_env.diagnosis.manoeuvres import DURATION_S, MENU, Manoeuvre
 from fish_env.diagnosis.preconditions import Precondition
 from fish_env.diagnosis.verdict import Verdict
-from fish_env.identification.estimator import Z_STEP, Fit
+from fish_env.identification.estimator import Fit
+from fish_env.identification.free import Z_STEP
 from fish_env.identification.problem import Point, Problem
 from fish_env.identification.runs import RunData
 

@@ -10,16 +10,21 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from fish_env.data import Dataset, load_dataset, split_runs
 from fish_env.diagnosis.adequacy import Adequacy, adequacy
 from fish_env.diagnosis.answer import as_dict
 from fish_env.diagnosis.attribution import Attribution, attribute
 from fish_env.diagnosis.causes import causes_of
+from fish_env.diagnosis.consistency import Consistency, check_consistency
 from fish_env.diagnosis.extended_file import extended_fish
 from fish_env.diagnosis.gain import Gain, Pair, measure_gain, misfit_of
 from fish_env.diagnosis.next_experiment import Proposal, propose
+from fish_env.diagnosis.noise_floor import Floor, noise_floors
 from fish_env.diagnosis.preconditions import Precondition, preconditions
+from fish_env.diagnosis.regimes import Localisation, localise_fits
+from fish_env.diagnosis.report import ReportSeries, series_from, write_report
 from fish_env.diagnosis.steady.pipeline import diagnose_steady
 from fish_env.diagnosis.suitability import check_runs
 from fish_env.diagnosis.verdict import Verdict, decide
@@ -41,11 +46,14 @@ class Diagnosis:
     Attributes:
         dataset: the measured runs.
         final_runs: ids of the runs kept for judging.
+        floors: noise of each channel, from the data alone.
+        consistency: whether the channels agree among themselves.
         problem: the others.
         attribution: search among causes.
         adequacy: whether the accepted explanation reaches the floor.
         preconditions: what the runs could show.
         verdict: the answer.
+        localisation: where in the regime the baseline's misfit sits.
         misfit: whitened one-step errors by channel, baseline and accepted.
         gain: on the final runs; None without an extension, or without final runs.
         next_experiment: manoeuvre that separates what is still open; None where nothing is.
@@ -56,11 +64,14 @@ class Diagnosis:
 
     dataset: Dataset
     final_runs: tuple[str, ...]
+    floors: tuple[Floor, ...]
+    consistency: Consistency
     problem: Problem
     attribution: Attribution
     adequacy: Adequacy
     preconditions: tuple[Precondition, ...]
     verdict: Verdict
+    localisation: Localisation
     misfit: dict[str, Pair]
     gain: Gain | None
     next_experiment: Proposal | None
@@ -86,8 +97,8 @@ def diagnose(
 
     Args:
         folder: folder with a dataset.yaml, or the name of a shipped dataset.
-        out: folder for ``diagnosis.json`` and, where there is something to extend,
-            ``extended.yaml``; nothing is written without it.
+        out: folder for ``diagnosis.json``, ``report.html`` with its figures and, where there is
+            something to extend, ``extended.yaml``; nothing is written without it.
         seed: of the split and of the null distributions.
         quick: refit fewer causes.
         fish: another fish than the dataset names: parameters, preset or file.
@@ -109,12 +120,13 @@ def diagnose(
     diagnosis = diagnose_runs(dataset, chosen, seed, quick, tell)
     answer = as_dict(diagnosis)
     if out is not None:
+        tell("writing the report")
         write(diagnosis, answer, Path(out))
     return answer
 
 
 def write(diagnosis: Diagnosis, answer: dict[str, Any], folder: Path) -> None:
-    """Writes ``diagnosis.json`` and, where there is something to extend, ``extended.yaml``."""
+    """Writes ``diagnosis.json``, ``report.html`` and, if something extends, ``extended.yaml``."""
     folder.mkdir(parents=True, exist_ok=True)
     text = json.dumps(answer, indent=1, allow_nan=False)
     (folder / "diagnosis.json").write_text(text + "\n", encoding="utf-8")
@@ -124,6 +136,17 @@ def write(diagnosis: Diagnosis, answer: dict[str, Any], folder: Path) -> None:
     else:
         # One of an earlier diagnosis would contradict this one.
         extended.unlink(missing_ok=True)
+    write_report(answer, _series(diagnosis), folder)
+
+
+def _series(diagnosis: Diagnosis) -> ReportSeries:
+    return series_from(
+        dataset=diagnosis.dataset,
+        baseline=diagnosis.attribution.baseline.fit,
+        accepted=diagnosis.accepted,
+        final_runs=diagnosis.final_runs,
+        localisation=diagnosis.localisation,
+    )
 
 
 def diagnose_runs(
@@ -145,10 +168,21 @@ def diagnose_runs(
     Raises:
         DatasetError: no diagnosis should be built on these runs.
     """
+    # The filter has its own threads; those of the linear algebra would wait for each other.
+    with threadpool_limits(1, "blas"):
+        return _diagnose_runs(dataset, fish, seed, quick, progress)
+
+
+def _diagnose_runs(
+    dataset: Dataset, fish: FishParams | None, seed: int, quick: bool, progress: Progress
+) -> Diagnosis:
     begin = time.perf_counter()
     rng = np.random.default_rng(seed)
     progress("checking the runs")
     check_runs(dataset)
+    progress("comparing the channels with each other")
+    floors = noise_floors(dataset)
+    agreed = check_consistency(dataset, np.random.default_rng([seed, 2]), floors)
     fitted, final = _split(dataset, seed)
     progress("refitting the baseline")
     problem = Problem(dataset, fish, fitted)
@@ -167,12 +201,14 @@ def diagnose_runs(
     if verdict.name in EXTENDING and final:
         progress("measuring the gain on final runs")
         gain = measure_gain(Problem(dataset, fish, final), baseline, accepted, rng)
+    progress("locating the misfit")
+    place = localise_fits(problem, baseline, accepted, np.random.default_rng([seed, 3]))
     progress("choosing the next experiment")
     proposal = propose(attribution, verdict, shown)
     misfit = misfit_of(problem, baseline, accepted)
     return Diagnosis(
-        dataset, final, problem, attribution, left, shown, verdict, misfit, gain, proposal, seed,
-        quick, time.perf_counter() - begin,
+        dataset, final, floors, agreed, problem, attribution, left, shown, verdict, place, misfit,
+        gain, proposal, seed, quick, time.perf_counter() - begin,
     )  # fmt: skip
 
 
@@ -187,10 +223,14 @@ def _refitted(problem: Problem) -> Fit:
 
 
 def _split(dataset: Dataset, seed: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Runs to fit, and a quarter kept for judging where there are at least four."""
-    if len(dataset.runs) < 4:
+    """Runs to fit, and a quarter kept for judging where there are at least four.
+
+    Repeats of a condition stay together: a run whose twin was fitted judges nothing.
+    """
+    conditions = {run.condition or run.id for run in dataset.runs}
+    if len(conditions) < 4:
         return dataset.ids, ()
-    split = split_runs(dataset, seed, (0.75, 0.0, 0.25))
+    split = split_runs(dataset, seed, (0.75, 0.0, 0.25), by="condition")
     return (*split.fit, *split.select), split.final
 
 

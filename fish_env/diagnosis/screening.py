@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
+from scipy.special import chdtrc
 from scipy.stats import chi2, ncx2
 
 from fish_env.diagnosis.causes import Cause, effect_values
@@ -227,7 +228,7 @@ def null_threshold(signals: Sequence[Signal], rng: np.random.Generator, level: f
             part = slice(at, at + s.freedom)
             block = correlation[part, part] + 1e-9 * np.eye(s.freedom)
             statistic = np.einsum("ij,ij->j", draws[part], np.linalg.solve(block, draws[part]))
-            smallest = np.minimum(smallest, chi2.logsf(statistic, s.freedom))
+            smallest = np.minimum(smallest, np.log(chdtrc(s.freedom, statistic)))
             at += s.freedom
     coefficients = sum(s.probe < 0 for s in signals)
     if coefficients:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -10,31 +10,14 @@ import numpy as np
 import numpy.typing as npt
 
 from fish_env.identification.filtering import Filtered, NoiseModel
-from fish_env.identification.information import block_sums, information, prior_precision
-from fish_env.identification.noise import fit_noise
+from fish_env.identification.free import Free, Linearised, linearise, objective
+from fish_env.identification.information import block_sums, information
+from fish_env.identification.noise import disturbance_range, fit_noise
 from fish_env.identification.phases import settle_phases
 from fish_env.identification.problem import Point, Problem
 from fish_env.identification.products import inner
 
 FloatArray = npt.NDArray[np.float64]
-Z_STEP = 0.05
-
-
-@dataclass(frozen=True, eq=False)
-class Linearised:
-    """Residuals and their slopes at a point: all that estimates and tests need.
-
-    Attributes:
-        residuals: (D,) whitened innovations.
-        slopes: (D, n) derivative by each free parameter, baseline (in prior units) first.
-        run_of: (D,) index of the run of each residual.
-        time_of: (D,) time of each residual in its run (s).
-    """
-
-    residuals: FloatArray
-    slopes: FloatArray
-    run_of: npt.NDArray[np.int64]
-    time_of: FloatArray
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,74 +65,6 @@ class Fit:
         return float(self.estimates[i] - half), float(self.estimates[i] + half)
 
 
-class _Free:
-    """Bookkeeping of the vector [z, effect parameters]."""
-
-    def __init__(self, problem: Problem, effects: Iterable[str], released: Iterable[str]) -> None:
-        self.problem = problem
-        self.freedoms = problem.freedoms(effects)
-        self.count = len(problem.baseline)
-        self.names = (*problem.baseline.paths, *(f.path for f in self.freedoms))
-        self.prior = prior_precision(problem.baseline, len(self.freedoms), released)
-        self.steps = np.r_[np.full(self.count, Z_STEP), [f.step for f in self.freedoms]]
-
-    def pack(self, point: Point) -> FloatArray:
-        return np.asarray(np.r_[point.z, [point.effects[f.path] for f in self.freedoms]], float)
-
-    def unpack(self, vector: FloatArray) -> Point:
-        values = vector[self.count :].tolist()
-        paths = [f.path for f in self.freedoms]
-        return Point(vector[: self.count].copy(), dict(zip(paths, values, strict=True)))
-
-    def clip(self, vector: FloatArray) -> FloatArray:
-        lower = np.array([f.lower for f in self.freedoms])
-        upper = np.array([f.upper for f in self.freedoms])
-        result = vector.copy()
-        result[self.count :] = np.clip(vector[self.count :], lower, upper)
-        result[: self.count] = self._physical(vector[: self.count])
-        return result
-
-    def _physical(self, z: FloatArray) -> FloatArray:
-        """Shrink coefficients that would leave their physical bounds."""
-        baseline = self.problem.baseline
-        low, high = baseline.bounds
-        values = baseline.values(z[:, None])[:, 0]
-        inside = np.clip(values, low + 1e-3 * baseline.sd, high - 1e-3 * baseline.sd)
-        return np.asarray(np.linalg.solve(baseline.factor, inside - baseline.mean))
-
-    def lanes(self, vector: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Perturbed vectors (n, 1 + n), the centre first, and the signed steps (n,)."""
-        steps = self.steps.copy()
-        for i, freedom in enumerate(self.freedoms, start=self.count):
-            if vector[i] + steps[i] > freedom.upper:
-                steps[i] = -steps[i]
-        return np.column_stack([vector, vector[:, None] + np.diag(steps)]), steps
-
-    def scale(self) -> FloatArray:
-        """Physical units per unit of the vector, as a matrix (n, n)."""
-        matrix = np.eye(len(self.names))
-        matrix[: self.count, : self.count] = self.problem.baseline.factor
-        return matrix
-
-
-def linearise(
-    problem: Problem,
-    free: _Free,
-    vector: FloatArray,
-    noise: NoiseModel,
-    filtered: Sequence[Filtered],
-) -> Linearised:
-    """Residuals and slopes by one batch of filter lanes."""
-    lanes, steps = free.lanes(vector)
-    effects = {f.path: lanes[free.count + i] for i, f in enumerate(free.freedoms)}
-    innovations = problem.innovations(lanes[: free.count], effects, noise, filtered)
-    slopes = (innovations[1:] - innovations[0]).T / steps
-    channels = len(problem.channels)
-    run_of = np.repeat(np.arange(len(problem.runs)), [run.measured.size for run in problem.runs])
-    time_of = np.concatenate([np.repeat(run.clock, channels) for run in problem.runs])
-    return Linearised(innovations[0], slopes, run_of, time_of)
-
-
 def fit(
     problem: Problem,
     effects: Sequence[str] | None = None,
@@ -177,7 +92,7 @@ def fit(
         report: told what is being done.
     """
     names = problem.effects if effects is None else tuple(effects)
-    free = _Free(problem, names, released)
+    free = Free(problem, names, released)
     given = start or problem.start
     values = {**problem.neutral(names), **given.effects}
     vector = free.clip(free.pack(Point(given.z, values)))
@@ -193,47 +108,35 @@ def fit(
         noise = _noise_at(problem, free.unpack(vector), noise, final=round_ > 0)
         if _settled(last, noise):
             break
-    value, filtered = _objective(problem, free, vector, noise)
+    value, filtered = objective(problem, free, vector, noise)
     return _finish(problem, free, names, tuple(released), vector, noise, value, filtered)
-
-
-def _objective(
-    problem: Problem, free: _Free, vector: FloatArray, noise: NoiseModel
-) -> tuple[float, list[Filtered]]:
-    """-2 log likelihood + prior, and the filter results it comes from."""
-    results = problem.filtered(free.unpack(vector), noise)
-    value = -2.0 * sum(r.log_likelihood for r in results) + free.prior @ (vector * vector)
-    return float(value), results
 
 
 def _gauss_newton(
     problem: Problem,
-    free: _Free,
+    free: Free,
     vector: FloatArray,
     noise: NoiseModel,
     iterations: int,
     tolerance: float,
 ) -> tuple[FloatArray, list[Filtered]]:
-    """Damped Gauss-Newton steps with the noise model held."""
-    value, filtered = _objective(problem, free, vector, noise)
-    damping = 0.0
+    """Gauss-Newton steps with the noise model held."""
+    value, filtered = objective(problem, free, vector, noise)
+    if not np.isfinite(value):
+        raise np.linalg.LinAlgError("the simulation diverges at the start of the fit")
     for _ in range(iterations):
         lin = linearise(problem, free, vector, noise, filtered)
         hessian = information(lin.slopes, free.prior)
         gradient = inner(lin.slopes, lin.residuals[:, None])[:, 0] + free.prior * vector
-        for _ in range(5):
-            damped = hessian + damping * np.diag(np.diag(hessian))
-            trial = free.clip(vector - np.linalg.solve(damped, gradient))
-            trial_value, trial_filtered = _objective(problem, free, trial, noise)
+        before, settled = vector, True
+        for trial, whole in free.trials(hessian, gradient, vector):
+            trial_value, trial_filtered = objective(problem, free, trial, noise)
             if trial_value < value:
+                vector, value, filtered = trial, trial_value, trial_filtered
+                moved = np.abs(vector - before) * np.sqrt(np.diag(hessian))
+                settled = whole and moved.max() < tolerance
                 break
-            damping = max(10 * damping, 1e-2)
-        else:
-            return vector, filtered
-        moved = np.abs(trial - vector) * np.sqrt(np.diag(hessian))
-        vector, value, filtered = trial, trial_value, trial_filtered
-        damping = 0.0 if damping < 1e-2 else damping / 10
-        if moved.max() < tolerance:
+        if settled:
             break
     return vector, filtered
 
@@ -256,11 +159,11 @@ def objective_at(
     released: Sequence[str] = (),
 ) -> float:
     """-2 log likelihood + prior at a point, without any fitting."""
-    free = _Free(problem, effects, released)
+    free = Free(problem, effects, released)
     values = {**problem.neutral(effects), **point.effects}
     vector = free.clip(free.pack(Point(point.z, values)))
     problem = settle_phases(problem, free.unpack(vector), noise)
-    return _objective(problem, free, vector, noise)[0]
+    return objective(problem, free, vector, noise)[0]
 
 
 def default_noise(problem: Problem) -> NoiseModel:
@@ -269,20 +172,20 @@ def default_noise(problem: Problem) -> NoiseModel:
 
 
 def _noise_at(problem: Problem, point: Point, noise: NoiseModel, final: bool) -> NoiseModel:
-    """Noise model of largest likelihood at a point, from at most six runs.
+    """Noise model of largest likelihood at a point, from at most four runs.
 
     The search starts from the present one and from a small disturbance, so that a disturbance
     which once stood in for a misfit does not stay.
     """
-    few = problem.subset(6)
+    few = problem.subset(4)
+    within = disturbance_range(problem.fish)
     found = noise
     for _ in range(3):
         filtered, made_with = few.filtered(point, found, keep_slopes=True), found
         replay = partial(few.filter_for(point.effects).replay, filtered, made_with)
         small = NoiseModel(found.sensor_sd, 3e-3, 1e-4, 1.0)
-        found = fit_noise(
-            replay, max((found, small), key=replay), 45, problem.sensor_sd if final else None
-        )
+        start = max((found, small), key=replay)
+        found = fit_noise(replay, start, within, 45, problem.sensor_sd if final else None)
         if _settled(made_with, found, 0.4):
             break
     return found
@@ -290,7 +193,7 @@ def _noise_at(problem: Problem, point: Point, noise: NoiseModel, final: bool) ->
 
 def _finish(
     problem: Problem,
-    free: _Free,
+    free: Free,
     effects: tuple[str, ...],
     released: tuple[str, ...],
     vector: FloatArray,
@@ -324,7 +227,7 @@ def _coefficients_at_bounds(problem: Problem, estimates: FloatArray) -> list[str
     return [path for path, at in zip(baseline.paths, stuck, strict=True) if at]
 
 
-def _effects_at_bounds(free: _Free, vector: FloatArray) -> list[str]:
+def _effects_at_bounds(free: Free, vector: FloatArray) -> list[str]:
     values = zip(free.freedoms, vector[free.count :], strict=True)
     return [f.path for f, value in values if value <= f.lower or value >= f.upper]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cache
 from math import comb
 
@@ -12,9 +13,9 @@ from scipy.optimize import minimize
 
 from fish_env.data.schema import Dataset
 from fish_env.identification.filtering import NoiseModel
+from fish_env.params.schema import FishParams
 
 FloatArray = npt.NDArray[np.float64]
-
 
 ORDER = 4
 WINDOW = 30
@@ -59,9 +60,46 @@ def _quantile_of_white_noise() -> float:
     return float(np.quantile(_window_spreads(normals), QUANTILE))
 
 
+@dataclass(frozen=True)
+class DisturbanceRange:
+    """What a disturbance without a cause may be.
+
+    A tank at rest pushes a fish with some thousandths of its thrust. A disturbance that must be
+    stronger or slower than this to explain the data is a misfit with another name.
+
+    Attributes:
+        force: smallest and largest standard deviation (N).
+        moment: of the moment (N m).
+        correlation: shortest and longest correlation time (s).
+    """
+
+    force: tuple[float, float]
+    moment: tuple[float, float]
+    correlation: tuple[float, float]
+
+    def clip(self, force: float, moment: float, correlation: float) -> tuple[float, float, float]:
+        """The nearest values within."""
+        pairs = ((force, self.force), (moment, self.moment), (correlation, self.correlation))
+        clipped = [float(np.clip(value, *bounds)) for value, bounds in pairs]
+        return clipped[0], clipped[1], clipped[2]
+
+
+def disturbance_range(fish: FishParams) -> DisturbanceRange:
+    """Up to a thousandth of the weight, at a quarter of the hull's width, for up to ten seconds.
+
+    For the 2 kg fish that is 20 mN, against 150 mN of thrust; its width is taken as the edge of a
+    cube of the same volume.
+    """
+    mass = fish.get("mass.total")
+    force = 1e-3 * mass * fish.get("water.gravity")
+    moment = 0.25 * float(np.cbrt(mass / fish.get("water.density"))) * force
+    return DisturbanceRange((1e-4, force), (1e-6, moment), (0.05, 10.0))
+
+
 def fit_noise(
     log_likelihood: Callable[[NoiseModel], float],
     start: NoiseModel,
+    within: DisturbanceRange,
     evaluations: int = 40,
     largest_sensor_sd: FloatArray | None = None,
 ) -> NoiseModel:
@@ -70,19 +108,14 @@ def fit_noise(
     Args:
         log_likelihood: of a noise model, the parameters of the fish being fixed.
         start: first guess.
+        within: what the disturbance may be.
         evaluations: effort for the three numbers of the disturbance.
         largest_sensor_sd: (C,) bound on each channel's noise; the noise is then fitted too.
             Without it the sensors keep theirs: a misfit of the model must not pass for noise.
     """
 
     def model(x: FloatArray, sensor: FloatArray) -> NoiseModel:
-        force, moment, correlation = np.exp(x)
-        return NoiseModel(
-            sensor,
-            float(np.clip(force, 1e-4, 5.0)),
-            float(np.clip(moment, 1e-6, 0.5)),
-            float(np.clip(correlation, 0.05, 30.0)),
-        )
+        return NoiseModel(sensor, *within.clip(*np.exp(x)))
 
     def start_of(noise: NoiseModel) -> FloatArray:
         return np.log([noise.force_sd, noise.moment_sd, noise.correlation_s])

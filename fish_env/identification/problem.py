@@ -110,8 +110,12 @@ class Problem:
         """The same problem on at most ``count`` runs, spread over all of them."""
         if len(self.runs) <= count:
             return self
-        chosen = np.linspace(0, len(self.runs) - 1, count).round().astype(int)
-        return self.with_runs([self.runs[i] for i in chosen])
+        return self.with_runs([self.runs[i] for i in self.spread(count)])
+
+    def spread(self, count: int) -> list[int]:
+        """Which runs stand for all: at most ``count`` of them, spread over the list."""
+        last = len(self.runs) - 1
+        return sorted(set(np.linspace(0, last, min(count, last + 1)).round().astype(int).tolist()))
 
     def with_runs(self, runs: Sequence[RunData]) -> Problem:
         """The same problem on other runs."""

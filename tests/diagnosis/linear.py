@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from fish_env.diagnosis.causes import Cause
-from fish_env.identification.estimator import Linearised
+from fish_env.identification.free import Linearised
 
 BLOCKS, PER_BLOCK, COEFFICIENTS = 60, 20, 4
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fish_env.diagnosis.adequacy import adequacy, regressors
-from fish_env.identification.estimator import Linearised
+from fish_env.identification.free import Linearised
 from tests.diagnosis.linear import Sized
 
 SAMPLES = 400

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fish_env.identification import Problem
-from fish_env.identification.estimator import _Free, linearise
+from fish_env.identification.free import Free, linearise
 from fish_env.identification.phases import settle_phases
 from fish_env.identification.problem import Point
 from fish_env.sensing.channels import channels_from_states
@@ -137,7 +137,7 @@ def test_lanes_repeat_the_filter_and_slope_with_its_likelihood():
     setup = Setup(changes={"tail.lift.c1": 2.6})
     problem = problem_of(setup)
     filtered = problem.filtered(problem.start, setup.noise)
-    free, zero = _Free(problem, (), ()), np.zeros(len(PATHS))
+    free, zero = Free(problem, (), ()), np.zeros(len(PATHS))
     lin = linearise(problem, free, zero, setup.noise, filtered)
     own = np.concatenate([r.innovations.ravel() for r in filtered])
     np.testing.assert_allclose(lin.residuals, own, atol=1e-7)

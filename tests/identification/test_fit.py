@@ -10,7 +10,8 @@ from fish_env.cli import app
 from fish_env.data import write_dataset
 from fish_env.errors import EffectError
 from fish_env.identification import Problem, fit, identified_fish
-from fish_env.identification.estimator import Linearised, default_noise, sandwich
+from fish_env.identification.estimator import default_noise, sandwich
+from fish_env.identification.free import Linearised
 from fish_env.identification.products import inner
 from fish_env.params import load_fish, save_fish
 from fish_env.simulator import Simulator

@@ -1,0 +1,233 @@
+"""Fits with one more cause: sketched for all that deserve it, in full for the few that lead."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fish_env.diagnosis.causes import effect_values
+from fish_env.diagnosis.screening import Signal
+from fish_env.identification.estimator import Fit, fit
+from fish_env.identification.filtering import NoiseModel
+from fish_env.identification.problem import Point, Problem
+from fish_env.identification.sketch import Sketch, Sketcher
+
+FloatArray = npt.NDArray[np.float64]
+Report = Callable[[str], None]
+FAR = 2.0
+"""A baseline coefficient this many prior deviations off may be so to make up for a cause."""
+FINALISTS = 4
+BEHIND = 0.25
+"""A sketch that gains less by more than this share of the best one's gain is not fitted in full."""
+LEEWAY = 100.0
+"""... unless the difference in -2 log likelihood is smaller than this: sketches are not fits."""
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """A fit with some causes in it.
+
+    Attributes:
+        causes: names, in the order they were added.
+        fit: the fit.
+    """
+
+    causes: tuple[str, ...]
+    fit: Fit
+
+
+def score(problem: Problem, explanation: Explanation) -> float:
+    """-2 log likelihood and prior, with Schwarz' penalty for what the causes added."""
+    own = explanation.fit
+    added = len(own.names) - len(problem.baseline) + len(own.released)
+    return own.objective + added * float(np.log(problem.samples))
+
+
+def refits(
+    current: Explanation, chosen: Sequence[Signal], report: Report
+) -> tuple[list[Explanation], Explanation | None]:
+    """Fits with one more cause each, best first, and the present one under the best one's noise.
+
+    All share the noise model that the best of them leaves: the disturbance it needs is the
+    smallest, and only under one yardstick can fits be compared.
+
+    Args:
+        current: causes accepted so far.
+        chosen: causes to add.
+        report: told what is being done.
+    """
+    base = current.fit
+    sketcher = Sketcher(base)
+    sketches = []
+    for signal in chosen:
+        report(f"trying {signal.cause.name}")
+        sketches += _sketches(sketcher, base, signal, starts(base, signal))
+    finalists = _finalists(_improved(sketcher, sketches, base.noise), sketcher.base(), BEHIND)
+    if not finalists:
+        return [], None
+    name, sketch = finalists[0]
+    report(f"fitting {name}")
+    leader = Explanation((*current.causes, name), _in_full(base.problem, sketch, base.noise))
+    tried = [leader, *_rest(current, finalists[1:], leader.fit, report)]
+    tried, noise = _best_first(tried)
+    return tried, Explanation(current.causes, _again(base.problem, base, noise))
+
+
+def second_look(
+    current: Explanation, tried: list[Explanation], chosen: Sequence[Signal], report: Report
+) -> list[Explanation]:
+    """The same contest, seen from its winner: it may have won from where the misfit had led.
+
+    Baseline coefficients near a good explanation are near those of a better one, and so is the
+    disturbance; from there, every other cause is sketched in the winner's place.
+
+    Args:
+        current: causes accepted before the contest.
+        tried: result of the contest, best first.
+        chosen: causes to put in the winner's place.
+        report: told what is being done.
+    """
+    best = tried[0].fit
+    sketcher = Sketcher(best, kept=current.fit.effects)
+    done = {e.causes[-1] for e in tried}
+    sketches = []
+    for signal in chosen:
+        if signal.cause.is_effect and signal.cause.name not in done:
+            report(f"trying {signal.cause.name} again")
+            begin = starts(current.fit, signal, best.point.z)
+            sketches += _sketches(sketcher, current.fit, signal, begin)
+    finalists = _finalists(_improved(sketcher, sketches, best.noise), sketcher.base(), 0.0)
+    finalists = [f for f in finalists if f[1].objective < sketcher.base() + LEEWAY]
+    more = _rest(current, finalists, best, report)
+    return _best_first([*tried, *more])[0]
+
+
+def without(current: Explanation, name: str) -> Explanation:
+    """The fit when one of its causes is dropped, under the same noise model."""
+    own = current.fit
+    effects = tuple(e for e in own.effects if e != name)
+    released = tuple(p for p in own.released if f"parameter:{p}" != name)
+    values = {p: v for p, v in own.point.effects.items() if p.split(".")[1] != name}
+    smaller = fit(
+        own.problem, effects, Point(own.point.z, values), own.noise, released, refit_noise=False,
+        iterations=4,
+    )  # fmt: skip
+    return Explanation(tuple(c for c in current.causes if c != name), smaller)
+
+
+def _sketches(
+    sketcher: Sketcher, base: Fit, signal: Signal, begin: Sequence[Point]
+) -> list[tuple[str, Sketch]]:
+    """The sketch of one cause; none where the simulation diverges from every start."""
+    cause = signal.cause
+    effects = (*base.effects, cause.name) if cause.is_effect else base.effects
+    released = base.released if cause.is_effect else (*base.released, cause.path or "")
+    try:
+        return [(cause.name, sketcher.sketch(effects, released, begin))]
+    except np.linalg.LinAlgError:
+        return []
+
+
+def _improved(
+    sketcher: Sketcher, sketches: list[tuple[str, Sketch]], noise: NoiseModel
+) -> list[tuple[str, Sketch]]:
+    """The leading sketches with some steps that compute every slope."""
+    better = []
+    for name, sketch in _finalists(sketches, sketcher.base(), 2.0 * BEHIND):
+        own = fit(
+            sketcher.few, sketch.effects, sketch.point, noise, sketch.released, refit_noise=False,
+            iterations=4, tolerance=0.5,
+        )  # fmt: skip
+        better.append((name, Sketch(own.effects, own.released, own.point, own.objective)))
+    return better
+
+
+def starts(base: Fit, signal: Signal, z: FloatArray | None = None) -> list[Point]:
+    """Where to begin: the linear estimate and every probe, with baselines near and far.
+
+    A baseline refitted without the cause may have gone far to make up for it, so the nominal one
+    is a start of its own. With ``z`` given, that is the only one.
+    """
+    problem, cause = base.problem, signal.cause
+    if not cause.is_effect:
+        return [base.point]
+    neutral = problem.neutral([cause.name])
+    size = np.linalg.solve(signal.projected, signal.score)
+    linear = dict(neutral)
+    for factor, probe in zip(size, cause.probes[signal.probe], strict=True):
+        for path, value in effect_values(problem, cause.name, probe).items():
+            finite = np.isfinite(neutral[path])
+            linear[path] = linear[path] + factor * (value - neutral[path]) if finite else value
+    probes = [effect_values(problem, cause.name, p) for p in cause.probes[signal.probe]]
+    bounds = {f.path: (f.lower, f.upper) for f in problem.freedoms([cause.name])}
+    clipped = [
+        {path: float(np.clip(value, *bounds[path])) for path, value in values.items()}
+        for values in (linear, *probes)
+    ]
+    far = np.abs(base.point.z).max() > FAR
+    near = (base.point.z, np.zeros_like(base.point.z)) if far else (base.point.z,)
+    baselines = near if z is None else (z,)
+    return [Point(z, {**base.point.effects, **values}) for z in baselines for values in clipped]
+
+
+def _finalists(
+    sketches: list[tuple[str, Sketch]], base: float, behind: float
+) -> list[tuple[str, Sketch]]:
+    """The sketches that may still be the best fit, best first."""
+    if not sketches:
+        return []
+    ranked = sorted(sketches, key=lambda s: s[1].objective)
+    best = ranked[0][1].objective
+    margin = max(LEEWAY, behind * (base - best))
+    return [s for s in ranked[:FINALISTS] if s[1].objective <= best + margin]
+
+
+def _rest(
+    current: Explanation, finalists: list[tuple[str, Sketch]], leader: Fit, report: Report
+) -> list[Explanation]:
+    """Full fits under the leader's noise."""
+    result = []
+    for name, sketch in finalists:
+        report(f"fitting {name}")
+        result.append(
+            Explanation((*current.causes, name), _at_noise(leader.problem, sketch, leader.noise))
+        )
+    return result
+
+
+def _best_first(tried: list[Explanation]) -> tuple[list[Explanation], NoiseModel]:
+    """Explanations by score, the first with the noise it leaves, and the others under that."""
+    leader = tried[0]
+    problem = leader.fit.problem
+    ranked = sorted(tried, key=lambda e: score(problem, e))
+    if ranked[0] is leader:
+        return ranked, leader.fit.noise
+    first = _noise_too(problem, ranked[0].fit)
+    others = [Explanation(e.causes, _again(problem, e.fit, first.noise)) for e in ranked[1:]]
+    return [Explanation(ranked[0].causes, first), *others], first.noise
+
+
+def _in_full(problem: Problem, sketch: Sketch, noise: NoiseModel) -> Fit:
+    few = problem.subset(3)
+    first = fit(few, sketch.effects, sketch.point, noise, sketch.released, rounds=2)
+    return fit(problem, first.effects, first.point, first.noise, first.released, rounds=2)
+
+
+def _at_noise(problem: Problem, sketch: Sketch, noise: NoiseModel) -> Fit:
+    return fit(
+        problem, sketch.effects, sketch.point, noise, sketch.released, refit_noise=False,
+        iterations=4,
+    )  # fmt: skip
+
+
+def _noise_too(problem: Problem, own: Fit) -> Fit:
+    return fit(problem, own.effects, own.point, own.noise, own.released, rounds=2)
+
+
+def _again(problem: Problem, own: Fit, noise: NoiseModel) -> Fit:
+    return fit(
+        problem, own.effects, own.point, noise, own.released, refit_noise=False, iterations=2
+    )

@@ -1,0 +1,177 @@
+"""The vector of all free parameters: baseline coefficients in prior units, then effect parameters.
+
+With what estimates are made of: the objective at a vector, residuals and their slopes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import numpy.typing as npt
+
+from fish_env.identification.bounded import bounded_step
+from fish_env.identification.filtering import Filtered, NoiseModel
+from fish_env.identification.information import prior_precision
+from fish_env.identification.problem import Point, Problem
+
+FloatArray = npt.NDArray[np.float64]
+Z_STEP = 0.05
+SHARES = (0.5, 0.2)
+DAMPINGS = (0.1, 10.0)
+LARGEST_SLOPE = 1e9
+"""In standard deviations of the noise per unit; what exceeds it has diverged."""
+
+
+@dataclass(frozen=True, eq=False)
+class Linearised:
+    """Residuals and their slopes at a point: all that estimates and tests need.
+
+    Attributes:
+        residuals: (D,) whitened innovations.
+        slopes: (D, n) derivative by each free parameter, baseline (in prior units) first.
+        run_of: (D,) index of the run of each residual.
+        time_of: (D,) time of each residual in its run (s).
+    """
+
+    residuals: FloatArray
+    slopes: FloatArray
+    run_of: npt.NDArray[np.int64]
+    time_of: FloatArray
+
+
+class Free:
+    """Bookkeeping of the vector [z, effect parameters].
+
+    Args:
+        problem: the problem.
+        effects: names of effects whose parameters are free.
+        released: baseline coefficients whose prior is lifted.
+    """
+
+    def __init__(self, problem: Problem, effects: Iterable[str], released: Iterable[str]) -> None:
+        self.problem = problem
+        self.freedoms = problem.freedoms(effects)
+        self.count = len(problem.baseline)
+        self.names = (*problem.baseline.paths, *(f.path for f in self.freedoms))
+        self.prior = prior_precision(problem.baseline, len(self.freedoms), released)
+        self.steps = np.r_[np.full(self.count, Z_STEP), [f.step for f in self.freedoms]]
+
+    def pack(self, point: Point) -> FloatArray:
+        """The vector (n,) of a point."""
+        return np.asarray(np.r_[point.z, [point.effects[f.path] for f in self.freedoms]], float)
+
+    def unpack(self, vector: FloatArray) -> Point:
+        """The point of a vector (n,)."""
+        values = vector[self.count :].tolist()
+        paths = [f.path for f in self.freedoms]
+        return Point(vector[: self.count].copy(), dict(zip(paths, values, strict=True)))
+
+    def clip(self, vector: FloatArray) -> FloatArray:
+        """The vector (n,) moved within physical bounds."""
+        lower = np.array([f.lower for f in self.freedoms])
+        upper = np.array([f.upper for f in self.freedoms])
+        result = vector.copy()
+        result[self.count :] = np.clip(vector[self.count :], lower, upper)
+        result[: self.count] = self._physical(vector[: self.count])
+        return result
+
+    def _physical(self, z: FloatArray) -> FloatArray:
+        """Shrink coefficients that would leave their physical bounds."""
+        baseline = self.problem.baseline
+        low, high = baseline.bounds
+        values = baseline.values(z[:, None])[:, 0]
+        inside = np.clip(values, low + 1e-3 * baseline.sd, high - 1e-3 * baseline.sd)
+        return np.asarray(np.linalg.solve(baseline.factor, inside - baseline.mean))
+
+    def trials(
+        self, hessian: FloatArray, gradient: FloatArray, vector: FloatArray
+    ) -> Iterator[tuple[FloatArray, bool]]:
+        """Where to look for a lower objective: a Gauss-Newton step within bounds, then less of it.
+
+        Shorter steps come before damped ones: damping would hold back directions that only the
+        prior decides, such as the difference of two coefficients that act alike.
+
+        Yields:
+            A vector (n,), and whether it is the whole step.
+        """
+        low, high = self._bounds
+        rows = self.scale()
+        whole = bounded_step(hessian, gradient, vector, rows, low, high)
+        yield self.clip(whole), True
+        for share in SHARES:
+            yield self.clip(vector + share * (whole - vector)), False
+        for damping in DAMPINGS:
+            damped = hessian + damping * np.diag(np.diag(hessian))
+            yield self.clip(bounded_step(damped, gradient, vector, rows, low, high)), False
+
+    @cached_property
+    def _bounds(self) -> tuple[FloatArray, FloatArray]:
+        baseline = self.problem.baseline
+        low, high = baseline.bounds
+        margin = 1e-3 * baseline.sd
+        return (
+            np.r_[low + margin - baseline.mean, [f.lower for f in self.freedoms]],
+            np.r_[high - margin - baseline.mean, [f.upper for f in self.freedoms]],
+        )
+
+    def lanes(self, vector: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Perturbed vectors (n, 1 + n), the centre first, and the signed steps (n,)."""
+        steps = self.steps.copy()
+        for i, freedom in enumerate(self.freedoms, start=self.count):
+            if vector[i] + steps[i] > freedom.upper:
+                steps[i] = -steps[i]
+        return np.column_stack([vector, vector[:, None] + np.diag(steps)]), steps
+
+    def scale(self) -> FloatArray:
+        """Physical units per unit of the vector, as a matrix (n, n)."""
+        matrix = np.eye(len(self.names))
+        matrix[: self.count, : self.count] = self.problem.baseline.factor
+        return matrix
+
+
+def linearise(
+    problem: Problem,
+    free: Free,
+    vector: FloatArray,
+    noise: NoiseModel,
+    filtered: Sequence[Filtered],
+) -> Linearised:
+    """Residuals and slopes by one batch of filter lanes."""
+    residuals, slopes = slopes_of(problem, free, vector, noise, filtered, range(len(vector)))
+    channels = len(problem.channels)
+    run_of = np.repeat(np.arange(len(problem.runs)), [run.measured.size for run in problem.runs])
+    time_of = np.concatenate([np.repeat(run.clock, channels) for run in problem.runs])
+    return Linearised(residuals, slopes, run_of, time_of)
+
+
+def slopes_of(
+    problem: Problem,
+    free: Free,
+    vector: FloatArray,
+    noise: NoiseModel,
+    filtered: Sequence[Filtered],
+    chosen: Sequence[int],
+) -> tuple[FloatArray, FloatArray]:
+    """Residuals (D,) and their slopes (D, m) by some of the parameters.
+
+    A parameter that cannot be moved without the simulation diverging gets no slope: it stays.
+    """
+    lanes, steps = free.lanes(vector)
+    lanes = lanes[:, [0, *(1 + i for i in chosen)]]
+    effects = {f.path: lanes[free.count + i] for i, f in enumerate(free.freedoms)}
+    innovations = problem.innovations(lanes[: free.count], effects, noise, filtered)
+    slopes = (innovations[1:] - innovations[0]).T / steps[list(chosen)]
+    slopes[:, ~np.all(np.abs(slopes) < LARGEST_SLOPE, axis=0)] = 0.0
+    return innovations[0], slopes
+
+
+def objective(
+    problem: Problem, free: Free, vector: FloatArray, noise: NoiseModel
+) -> tuple[float, list[Filtered]]:
+    """-2 log likelihood + prior, and the filter results it comes from."""
+    results = problem.filtered(free.unpack(vector), noise)
+    value = -2.0 * sum(r.log_likelihood for r in results) + free.prior @ (vector * vector)
+    return float(value), results

@@ -130,17 +130,17 @@ class Localisation:
 
     @property
     def places(self) -> tuple[Place, ...]:
-        """Cells that stand out, the most significant first, then the one with most energy."""
+        """Cells that stand out, the one with most energy above its channel's mean first."""
         found = [
             self._place(c, regime, b)
             for regime in self.regimes
             for c, b in np.argwhere(self.p_values[regime.name] < LEVEL)
         ]
-        return tuple(sorted(found, key=lambda place: (place.p, -place.energy)))
+        return tuple(sorted(found, key=lambda p: self.overall[p.channel] - p.energy))
 
     @property
     def sits_in(self) -> Place | None:
-        """The place that stands out most; None where none does."""
+        """The place with most misfit of its own; None where none stands out."""
         return self.places[0] if self.places else None
 
     @property

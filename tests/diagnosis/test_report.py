@@ -50,7 +50,16 @@ def test_the_network_check_notices_a_link():
 
 def test_figures_are_files_too(full):
     _, folder = full
-    names = {"misfit", "regimes", "ranking", "gain", "next_experiment", "run_r01", "run_r02"}
+    names = {
+        "misfit",
+        "paths",
+        "regimes",
+        "ranking",
+        "gain",
+        "next_experiment",
+        "run_r01",
+        "run_r02",
+    }
     for name in names:
         assert (folder / "figures" / f"{name}.png").read_bytes()[:4] == b"\x89PNG"
         assert "<text" in (folder / "figures" / f"{name}.svg").read_text()

@@ -27,6 +27,11 @@ BASELINE, EXTENDED = VERMILION, BLUE
 Plain = Mapping[str, Any]
 WIDE = 30.0
 """Largest ratio of bars on a linear axis."""
+LOOKS: dict[str, dict[str, Any]] = {
+    "measured": {"color": MEASURED, "lw": 3.5, "alpha": 0.3},
+    "baseline": {"color": BASELINE, "ls": "--"},
+    "extended": {"color": EXTENDED},
+}
 LIKELIHOOD_GAIN = "gain in -2 log likelihood over the refitted baseline (larger is better)"
 LEFT_OUT_GAIN = "log score on conditions left out, above the refitted baseline's"
 
@@ -54,6 +59,29 @@ def _saved(figure: Figure, folder: Path, name: str) -> Path:
     return vector
 
 
+def draw_paths(runs: Sequence[RunSeries], folder: Path) -> Path:
+    """Paths of whole runs from above, and their depth over time."""
+    with _page(0.6 + 2.6 * max(len(runs), 2), 4.4) as figure:
+        axes = figure.subplots(2, len(runs), squeeze=False, height_ratios=(3, 2))
+        for (above, depth), run in zip(axes.T, runs, strict=True):
+            for motion in run.motions:
+                frames = motion.frames
+                look = LOOKS[motion.role]
+                above.plot(frames.position[:, 1], frames.position[:, 0], label=motion.role, **look)
+                time = frames.start_s + frames.step_s * np.arange(len(frames.position))
+                depth.plot(time, frames.position[:, 2], **look)
+            above.set_title(run.id, loc="left")
+            above.set_aspect("equal", adjustable="datalim")
+            above.set_xlabel("y, east (m)")
+            depth.set_xlabel("time (s)")
+            depth.invert_yaxis()
+        axes[0, 0].set_ylabel("x, north (m)")
+        axes[1, 0].set_ylabel("z, depth (m)")
+        handles, words = axes[0, 0].get_legend_handles_labels()
+        figure.legend(handles, words, loc="outside upper center", ncols=3)
+        return _saved(figure, folder, "paths")
+
+
 def draw_run(run: RunSeries, window_s: float, folder: Path) -> Path:
     """Channels of a run over time: measured, and predicted over windows."""
     names = list(run.measured)
@@ -78,9 +106,8 @@ def _draw_channel(ax: Axes, run: RunSeries, name: str, window_s: float) -> None:
     factor = shown_unit(name)[1]
     # A gap where a window begins, so that no line joins two predictions.
     begins = np.diff(np.floor(run.time_s / window_s + 1e-9), prepend=-1.0) > 0.0
-    ax.plot(
-        run.time_s, factor * run.measured[name], color=MEASURED, lw=3.5, alpha=0.3, label="measured"
-    )
+    look = LOOKS["measured"]
+    ax.plot(run.time_s, factor * run.measured[name], label="measured", **look)
     before = np.where(begins, np.nan, factor * run.baseline[name])
     ax.plot(run.time_s, before, "--", color=BASELINE, label="baseline")
     if name in run.extended:

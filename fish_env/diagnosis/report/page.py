@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from fish_env.diagnosis.report import sections
+from fish_env.diagnosis.report.blind import unseen
 from fish_env.diagnosis.report.html import text
 from fish_env.diagnosis.report.series import ReportSeries, SteadySeries
 from fish_env.replay import component_scripts, component_style
@@ -24,7 +25,7 @@ PARTS: tuple[Part, ...] = (
     sections.gain,
     sections.where,
     sections.ranking,
-    sections.unseen,
+    unseen,
     sections.experiment,
     sections.coefficients,
     sections.about,

@@ -21,7 +21,7 @@ from fish_env.diagnosis.report.html import (
     table,
     text,
 )
-from fish_env.diagnosis.report.series import SETTLED_S, ReportSeries, SteadySeries
+from fish_env.diagnosis.report.series import SETTLED_S, ReportSeries, RunSeries, SteadySeries
 from fish_env.diagnosis.report.units import shown_unit
 from fish_env.plotting.comparison import COMMAND_UNITS
 from fish_env.replay import Group, component
@@ -31,8 +31,6 @@ Series = ReportSeries | SteadySeries | None
 FloatArray = npt.NDArray[np.float64]
 MOST_DRAWN = 3
 """Runs with a drawing of their own; the replay has them all."""
-MOST_NAMED = 8
-"""Names in one sentence."""
 VERDICTS = {
     "no_misfit": "Nothing is wrong that these runs could show",
     "parameters": "Right structure, wrong numbers",
@@ -79,6 +77,8 @@ def swimming(answer: Answer, series: Series, folder: Path) -> str:
         return ""
     groups = [Group(_run_name(r.id, r.final), r.motions) for r in series.runs]
     notes = [f"{run.id}: {note}" for run in series.runs for note in run.notes]
+    drawn = [run for run in _drawn(answer, series) if {"x", "y"} <= set(run.measured)]
+    caption = "The same paths from above, and their depth."
     return section(
         "How it swims",
         paragraph(
@@ -87,6 +87,7 @@ def swimming(answer: Answer, series: Series, folder: Path) -> str:
             "predictions further down start afresh every few seconds."
         ),
         component(groups, series.fish, "runs"),
+        figure(draw.draw_paths(drawn, folder), caption) if drawn else "",
         *(paragraph(note, "rp-note") for note in notes),
         key="replay",
     )
@@ -94,6 +95,10 @@ def swimming(answer: Answer, series: Series, folder: Path) -> str:
 
 def _run_name(id: str, final: bool) -> str:
     return f"{id} (kept for judging)" if final else id
+
+
+def _drawn(answer: Answer, series: ReportSeries) -> tuple[RunSeries, ...]:
+    return series.runs[: 1 if answer.get("quick") else MOST_DRAWN]
 
 
 def channels(answer: Answer, series: Series, folder: Path) -> str:
@@ -105,7 +110,7 @@ def channels(answer: Answer, series: Series, folder: Path) -> str:
         parts.append(figure(picture, f"{errors} in units of the noise."))
     if isinstance(series, ReportSeries):
         window = series.window_s
-        for i, run in enumerate(series.runs[: 1 if answer.get("quick") else MOST_DRAWN]):
+        for i, run in enumerate(_drawn(answer, series)):
             caption = (
                 f"{_run_name(run.id, run.final)}: measured, and predicted over windows of "
                 f"{window:g} s."
@@ -260,72 +265,6 @@ def ranking(answer: Answer, series: Series, folder: Path) -> str:
         return ""
     caption = "Gain of each refitted cause; blue: accepted."
     return section("Ranking", figure(draw.draw_ranking(answer, folder), caption), key="ranking")
-
-
-def unseen(answer: Answer, series: Series, folder: Path) -> str:
-    """What these runs could have shown of each effect, and what they confuse it with."""
-    found = answer.get("preconditions", [])
-    if not found:
-        return ""
-    blind = [p["name"] for p in found if not p["excited"]]
-    said = _blind_words(blind, len(found), "This table" if answer.get("kind") else "These runs")
-    heads = (
-        "effect", "would be seen", "smallest size seen (power 0.8)", "a plausible robot has",
-        "swallowed by a refit", "looks most like",
-    )  # fmt: skip
-    order = sorted(found, key=lambda p: (p["excited"], p["name"]))
-    parts = [paragraph(said), table(heads, [_seen(p) for p in order])]
-    if all(p.get("confusability") for p in found):
-        names = [p["name"] for p in found]
-        cosines = np.array([[_cosine(p, name) for name in names] for p in found])
-        caption = "How alike the signals of two effects are, after a refit of the baseline."
-        parts.append(figure(draw.draw_confusability(names, cosines, folder), caption))
-    return section("What could not have been seen", *parts, key="unseen")
-
-
-def _blind_words(blind: list[str], known: int, subject: str) -> str:
-    if not blind:
-        return "Every known effect of a plausible size would have been seen."
-    if len(blind) > MOST_NAMED:
-        return f"{subject} could not have shown {len(blind)} of {known} known effects, as follows."
-    return f"{subject} could not have shown: {', '.join(blind)}."
-
-
-def _cosine(precondition: Answer, other: str) -> float:
-    own = precondition["name"] == other
-    return 1.0 if own else float(precondition["confusability"].get(other, 0.0))
-
-
-def _seen(p: Answer) -> tuple[str, ...]:
-    sizes, plausible = [], []
-    known = _known_parameters(p["name"])
-    for name, size in p["smallest_detectable"].items():
-        unit, around, upto = "", "", ""
-        if name in known:
-            parameter = known[name]
-            unit = "" if parameter.unit == "-" else f" {parameter.unit.replace('^2', '²')}"
-            neutral = parameter.neutral
-            around = f" from {neutral:g}" if np.isfinite(neutral) and neutral else ""
-            upto = "up to " if np.isposinf(neutral) else ""
-            low, high = parameter.plausible
-            plausible.append(text(f"{low:g} to {high:g}{unit}"))
-        sizes.append(text(f"{name} {upto}{number(size)}{unit}{around}"))
-    near = p.get("most_confusable")
-    return (
-        text(p["name"]),
-        "yes" if p["excited"] else '<strong class="rp-no">no</strong>',
-        "<br>".join(sizes) or "–",
-        "<br>".join(plausible) or "–",
-        f"{100 * p['absorbed_share']:.0f} %",
-        text(f"{near[0]} ({near[1]:.2f})") if near else "–",
-    )
-
-
-def _known_parameters(name: str) -> dict[str, Any]:
-    from fish_env.effects import catalogue
-
-    effect = catalogue().get(name)
-    return {p.name: p for p in effect.parameters} if effect else {}
 
 
 def experiment(answer: Answer, series: Series, folder: Path) -> str:

@@ -59,6 +59,7 @@ def swim(
     seed: int,
     options: dict[str, Any] | None = None,
     report: Callable[[], object] = lambda: None,
+    finished: Callable[[], bool] = lambda: False,
 ) -> Episode:
     """Swims one episode to its end.
 
@@ -68,6 +69,7 @@ def swim(
         seed: seed of the episode.
         options: reset options, see the environment.
         report: called after each step.
+        finished: asked after each step whether to end the episode before its time.
     """
     fish = env.unwrapped
     assert isinstance(fish, RoboticFish3DEnv)
@@ -83,8 +85,8 @@ def swim(
         rows.append(info)
         actions.append(action)
         actuators.append(fish.actuators)
-        over = terminated or truncated
         report()
+        over = terminated or truncated or finished()
     share = (np.array(actions, float) + 1.0) / 2.0
     return Episode(
         {key: np.array([row[key] for row in rows], float) for key in rows[0]},

@@ -79,21 +79,38 @@ def draw_actuators(episode: Episode, config: EnvConfig, folder: Path, name: str)
         return save(figure, folder, name, ("png",))
 
 
-def draw_path(episode: Episode, config: EnvConfig, title: str, folder: Path, name: str) -> Path:
-    """The path in three dimensions, with its last goal: depth as a plane, heading as an arrow."""
+def draw_path(
+    episode: Episode,
+    config: EnvConfig,
+    title: str,
+    folder: Path,
+    name: str,
+    waypoints: FloatArray | None = None,
+) -> Path:
+    """The path in three dimensions.
+
+    With waypoints (n, 3) north, east, depth (m): the legs between them. Without: the last goal,
+    depth as a plane, heading as an arrow.
+    """
     points = np.column_stack([episode["east"], episode["north"], episode["depth"]])
-    goal, heading = float(episode["goal_depth"][-1]), float(episode["goal_heading"][-1])
-    way = 0.25 * np.linalg.norm(points[-1] - points[0])
-    tip = np.array([np.sin(heading) * way, np.cos(heading) * way, 0.0])
-    east, north = _square(np.vstack([points, points[-1] + tip])[:, :2])
+    if waypoints is None:
+        arrow = _last_goal(episode, points)
+        shown = np.vstack([points, arrow.sum(axis=0)])
+    else:
+        legs = waypoints[:, [1, 0, 2]]
+        shown = np.vstack([points, legs])
+    east, north = _square(shown[:, :2])
     with drawing(6.6, 4.6) as figure:
         ax: Any = figure.add_subplot(projection="3d", computed_zorder=False)
-        corners = np.meshgrid(east, north)
-        ax.plot_surface(*corners, np.full((2, 2), goal), color=BLACK, alpha=0.08, lw=0)
+        if waypoints is None:
+            plane = np.full((2, 2), arrow[0, 2])
+            ax.plot_surface(*np.meshgrid(east, north), plane, color=BLACK, alpha=0.08, lw=0)
+            ax.quiver(*arrow.ravel(), color=BLACK, lw=1.4)
+        else:
+            ax.plot(*legs.T, color=BLACK, ls="--", lw=1.1)
         line = _draw_line(ax, points, episode["time_s"])
         ax.plot(*points[0], "o", color=BLACK, ms=5)
         ax.text(*(points[0] + (0.0, 0.0, 0.1)), "start", fontsize=8, ha="center")
-        ax.quiver(points[-1, 0], points[-1, 1], goal, *tip, color=BLACK, lw=1.4)
         ax.set(xlim=east, ylim=north, zlim=(config.tree["tank"]["depth"], 0.0))
         ax.set(xlabel="east (m)", ylabel="north (m)", zlabel="depth (m)")
         ax.set_box_aspect((1.0, 1.0, 0.5), zoom=1.05)
@@ -101,6 +118,14 @@ def draw_path(episode: Episode, config: EnvConfig, title: str, folder: Path, nam
         figure.suptitle(title, fontsize=9.5)
         figure.colorbar(line, ax=ax, label="time (s)", shrink=0.6, pad=0.1)
         return save(figure, folder, name, ("png",))
+
+
+def _last_goal(episode: Episode, points: FloatArray) -> FloatArray:
+    """Foot and direction (2, 3) of an arrow at the end of the path, in the goal's plane."""
+    goal, heading = float(episode["goal_depth"][-1]), float(episode["goal_heading"][-1])
+    way = 0.25 * np.linalg.norm(points[-1] - points[0])
+    foot = np.array([points[-1, 0], points[-1, 1], goal])
+    return np.stack([foot, [np.sin(heading) * way, np.cos(heading) * way, 0.0]])
 
 
 def _draw_line(ax: Any, points: FloatArray, time: FloatArray) -> Any:

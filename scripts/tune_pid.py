@@ -33,23 +33,24 @@ FIRST_SEED, CHECK_SEED = 3_000_000, 3_500_000
 assert FIRST_SEED not in RESERVED_SEEDS
 assert CHECK_SEED not in RESERVED_SEEDS
 BOUNDS = {
-    "depth": (0.05, 1.0),
-    "depth_integral": (0.0, 0.6),
+    "depth": (0.05, 2.0),
+    "depth_integral": (0.0, 1.5),
     "depth_windup": (0.1, 1.0),
-    "climb_limit": (0.02, 0.08),
-    "climb_damping": (0.0, 1.5),
-    "pitch": (0.0, 8.0),
+    "climb_limit": (0.02, 0.12),
+    "climb_damping": (0.0, 3.0),
+    "pitch": (0.0, 16.0),
     "pitch_error": (0.0, 4.0),
     "pitch_rate": (0.0, 3.0),
-    "heading": (0.3, 4.0),
-    "heading_rate": (0.0, 1.0),
+    "heading": (0.3, 10.0),
+    "heading_rate": (0.0, 2.0),
     "heading_feedforward": (0.0, 6.0),
     "heading_integral": (0.0, 1.0),
-    "frequency": (-0.3, 1.0),
-    "speed": (0.0, 8.0),
-    "speed_integral": (0.0, 4.0),
+    "frequency": (-0.6, 1.0),
+    "speed": (0.0, 30.0),
+    "speed_integral": (0.0, 8.0),
+    "speed_for_climb": (0.0, 0.05),
     "amplitude": (-0.3, 1.0),
-    "roll": (-0.5, 2.0),
+    "roll": (-2.0, 2.0),
 }
 
 
@@ -93,7 +94,7 @@ def tune(start: FloatArray, options: argparse.Namespace, console: Console) -> Fl
     """Gains found by differential evolution that begins around the present ones."""
     low, high = np.array([BOUNDS[name] for name in GAIN_NAMES]).T
     rng = np.random.default_rng(options.seed)
-    near = start + 0.15 * (high - low) * rng.standard_normal((options.candidates, len(start)))
+    near = start + 0.1 * (high - low) * rng.standard_normal((options.candidates, len(start)))
     first = np.clip(near, low, high)
     first[0] = np.clip(start, low, high)
     swims = trials(options.candidates, options.episodes, FIRST_SEED)

@@ -29,6 +29,8 @@ DEPTH_WINDOW, HEADING_WINDOW = 0.15, 0.3
 """Errors (m, rad) within which the integrals grow."""
 HEADING_WINDUP, SPEED_WINDUP = 0.3, 0.6
 """The action that the integrals of heading and speed may amount to."""
+LARGEST_EXTRA_SPEED = 0.015
+"""Most (m/s) that is asked for beyond the goal speed."""
 SLOWEST_SURGE = 0.05
 """Least surge speed (m/s) that a wanted climb is divided by to give a pitch."""
 
@@ -53,6 +55,8 @@ class PIDGains:
         frequency: tail frequency action at the goal speed 0.10 m/s.
         speed: frequency action per m/s of speed error.
         speed_integral: frequency action per m/s and second.
+        speed_for_climb: speed asked for beyond the goal (m/s) per block action beyond its range: a
+            block at its end lifts more at more speed.
         amplitude: constant tail amplitude action.
         roll: block angle action per radian of roll.
     """
@@ -72,6 +76,7 @@ class PIDGains:
     frequency: Gain
     speed: Gain
     speed_integral: Gain
+    speed_for_climb: Gain
     amplitude: Gain
     roll: Gain
 
@@ -123,10 +128,12 @@ class PIDController:
         """Actions (N, 5) for observations (N, 33)."""
         seen = Seen.of(observations)
         actions = np.zeros((len(seen.depth_error), 5))
+        block = self._block_displacement(seen)
+        beyond = self.gains.speed_for_climb * np.maximum(np.abs(block) - 1.0, 0.0)
         actions[:, 0] = self._tail_offset(seen)
         actions[:, 1] = self.gains.amplitude
-        actions[:, 2] = self._tail_frequency(seen)
-        actions[:, 3] = self._block_displacement(seen)
+        actions[:, 2] = self._tail_frequency(seen, np.minimum(beyond, LARGEST_EXTRA_SPEED))
+        actions[:, 3] = block
         actions[:, 4] = -self.gains.roll * seen.roll
         return np.asarray(np.clip(actions, -1.0, 1.0), np.float32)
 
@@ -157,13 +164,13 @@ class PIDController:
         turn = turn + gains.heading_feedforward * seen.goal_heading_rate + self._heading
         return np.asarray(-turn)
 
-    def _tail_frequency(self, seen: Seen) -> FloatArray:
+    def _tail_frequency(self, seen: Seen, extra: FloatArray) -> FloatArray:
         gains = self.gains
         rest = (seen.goal_speed <= 0.0) & (seen.speed_error <= 0.0)
-        step = gains.speed_integral * seen.speed_error * self.period_s
+        goal, error = (np.where(rest, 0.0, x + extra) for x in (seen.goal_speed, seen.speed_error))
+        step = gains.speed_integral * error * self.period_s
         self._speed = _integrated(self._speed, step, ~rest, SPEED_WINDUP)
-        feedforward = (gains.frequency + 1.0) * seen.goal_speed / 0.1 - 1.0
-        action = feedforward + gains.speed * seen.speed_error + self._speed
+        action = (gains.frequency + 1.0) * goal / 0.1 - 1.0 + gains.speed * error + self._speed
         return np.where(rest, -1.0, action)
 
 

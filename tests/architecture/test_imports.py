@@ -19,6 +19,7 @@ OPEN_TO_AGENTS = {
     "envs",
     "plotting",
     "rendering",
+    "replay",
 }
 NOT_ON_IMPORT = ("torch", "matplotlib", "pandas", "stable_baselines3", "pyarrow", "pygame")
 

@@ -1,0 +1,41 @@
+"""`robofish swim`: an agent swims one episode."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+
+def register(app: typer.Typer) -> None:
+    """Adds the command to `robofish`."""
+    app.command()(swim)
+
+
+def swim(
+    agent: Annotated[str, typer.Option(help="pid, mppi, pretrained, or a policy file.")] = "pid",
+    task: Annotated[str, typer.Option(help="hold or track.")] = "track",
+    suite: Annotated[
+        str, typer.Option(help="In what water: calm, current, noisy, hard, or a file.")
+    ] = "calm",
+    seed: Annotated[int, typer.Option(min=0, help="Of the episode.")] = 4,
+    path: Annotated[
+        Path | None,
+        typer.Option(help="CSV file with north, east, depth (m): a path to follow instead."),
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder for pictures.")] = Path("out/swim"),
+    video: Annotated[Path | None, typer.Option(help="A film to write, .mp4.")] = None,
+    replay: Annotated[Path | None, typer.Option(help="HTML page that shows it swim.")] = None,
+) -> None:
+    """Let an agent swim one episode, and save pictures of it.
+
+    On a path, line-of-sight guidance tells the agent where to steer.
+
+    **Example:** `robofish swim --agent pid --task track --replay swim.html`
+    """
+    from agents.swimming import Wish, swim_and_show
+
+    wish = Wish(agent, task, suite, seed, path, out, video, replay)
+    swim_and_show(Console(), wish)

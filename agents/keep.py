@@ -1,0 +1,83 @@
+"""Keeps what a fish did while it swam, for films and replay pages."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from fish_env.envs.robotic_fish_3d import RoboticFish3DEnv
+from fish_env.rendering import Scene, write_video
+from fish_env.replay import Group, motion_from_trajectory, write_replay
+from fish_env.trajectory import Trajectory
+
+FloatArray = npt.NDArray[np.float64]
+REPLAY_HZ = 50.0
+"""Samples a second of a replay: a beat at 2 Hz has 25."""
+
+
+class Keeper:
+    """Call it after each step of an episode.
+
+    Args:
+        fish: the environment below its wrappers.
+        scenes: whether to keep what a film needs.
+    """
+
+    def __init__(self, fish: RoboticFish3DEnv, scenes: bool) -> None:
+        self.fish = fish
+        self.scenes: list[Scene] = []
+        self._keep_scenes = scenes
+        self._states: list[list[float]] = []
+        self._inputs: list[FloatArray] = []
+
+    def __call__(self) -> None:
+        """Keep the present state."""
+        self._states.append(list(self.fish.state.values()))
+        self._inputs.append(self.fish.actuators)
+        if self._keep_scenes:
+            self.scenes.append(self.fish.scene())
+
+    def trajectory(self) -> Trajectory:
+        """The motion, with straight lines between control steps."""
+        period = self.fish.options.config.control_period
+        known = np.linspace(period, period * len(self._states), len(self._states))
+        times = np.arange(known[0], known[-1], 1.0 / REPLAY_HZ)
+        names = self.fish.options.model.kernels.state_names
+        states = np.array(self._states)
+        states[:, names.index("tail_phase")] = np.unwrap(states[:, names.index("tail_phase")])
+        return Trajectory(
+            times,
+            _between(times, known, _one_sign(states, names.index("qw"))),
+            names,
+            _between(times, known, np.array(self._inputs)),
+            self.fish.options.model.fish.name,
+            self.fish.options.config.dt,
+        )
+
+    def write_video(self, path: Path) -> Path:
+        """Writes a film.
+
+        Raises:
+            MissingExtraError: what draws it is not installed.
+        """
+        return write_video(path, self.scenes, self.fish.setting)
+
+    def write_replay(self, path: Path, name: str) -> Path:
+        """Writes a page with the swimming fish."""
+        motion = motion_from_trajectory(self.trajectory(), name)
+        groups = [Group(name, (motion,))]
+        return write_replay(groups, self.fish.options.model.fish, path, f"Replay of {name}")
+
+
+def _one_sign(states: FloatArray, first: int) -> FloatArray:
+    """Quaternions that do not jump to their negatives, so that lines between them are short."""
+    quaternions = states[:, first : first + 4]
+    turns = np.sign((quaternions[1:] * quaternions[:-1]).sum(axis=1))
+    quaternions[1:] *= np.cumprod(np.where(turns == 0, 1.0, turns))[:, None]
+    return states
+
+
+def _between(times: FloatArray, known: FloatArray, columns: FloatArray) -> FloatArray:
+    return np.stack([np.interp(times, known, column) for column in columns.T], axis=1)

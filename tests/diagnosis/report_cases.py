@@ -43,6 +43,11 @@ def answer(verdict: str = "cause", **changes: Any) -> dict[str, Any]:
             "sensor_sd": {"x": 0.002},
             "disturbance": {"force_sd": 0.002, "moment_sd": 1e-4, "correlation_s": 0.5},
         },
+        "noise_floor": [{
+            "channel": "yaw", "white": {"sd": 0.002, "ci95": [0.0019, 0.0021]},
+            "upper_bound": False,
+        }],
+        "consistency": {"sentences": ["roll, p agree with each other."]},
         "misfit": {name: {**pair, "unit": "noise sd"} for name in CHANNELS},
         "gain": {
             "final_runs": ["r01"], "fit_percent": {"baseline": 40.0, "extended": 90.0},

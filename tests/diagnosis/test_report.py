@@ -30,6 +30,7 @@ def test_the_page_has_every_part(full):
         "Where the misfit sits", "tail phase 0 to 45 deg", "never visited", "Ranking",
         "could not have shown: surface_drag", "tether (0.61)", "0.004 m/s", "Next experiment",
         "mass.total", "closes 96 %", "a note about this run", "one note",
+        "roll, p agree with each other", "0.109 to 0.12",
     ):  # fmt: skip
         assert part in page, part
 

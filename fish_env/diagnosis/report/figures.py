@@ -178,6 +178,7 @@ def draw_ranking(answer: Plain, folder: Path) -> Path:
                 ax.plot(ends, [i, i], color=MEASURED, lw=1.4, marker="|")
         names = [row["name"].removeprefix(PARAMETER) for row in rows]
         ax.set_yticks(range(len(rows)), names)
+        ax.set_ylim(-0.7, len(rows) - 0.3)
         if min(gains) > 0 and max(gains) / min(gains) > WIDE:
             ax.set_xscale("log")
         ax.axvline(0.0, color=MEASURED, lw=0.8)

@@ -9,6 +9,7 @@ from typing import Any
 from fish_env.diagnosis.report import sections
 from fish_env.diagnosis.report.blind import unseen
 from fish_env.diagnosis.report.html import text
+from fish_env.diagnosis.report.measurements import measurements
 from fish_env.diagnosis.report.series import ReportSeries, SteadySeries
 from fish_env.replay import component_scripts, component_style
 
@@ -27,6 +28,7 @@ PARTS: tuple[Part, ...] = (
     sections.ranking,
     unseen,
     sections.experiment,
+    measurements,
     sections.coefficients,
     sections.about,
 )

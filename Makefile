@@ -8,7 +8,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint docs bench benchmark-diagnosis clean
+.PHONY: help setup demo test lint docs bench benchmark-diagnosis benchmark-agents clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 28
@@ -45,6 +45,9 @@ bench: $(VENV)/.with-bench  ## measure speed beside other environments, and put 
 
 benchmark-diagnosis: setup  ## hide effects in made-up measurements, and count what is found
 	$(BIN)/python scripts/benchmark_diagnosis.py
+
+benchmark-agents: setup  ## measure controllers and shipped policies on the frozen suites
+	$(BIN)/python -m scripts.benchmark_agents
 
 clean:  ## remove .venv and everything that builds and tests leave behind
 	rm -rf $(VENV) build dist out .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

@@ -1,4 +1,4 @@
-"""Measures the agents on all suites and writes results/agents.json: `make benchmark-agents`.
+"""Measures the shipped agents on all suites for `robofish leaderboard`: `make benchmark-agents`.
 
 Each finished combination is kept, so a stopped run goes on where it was:
 
@@ -20,6 +20,7 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
+from agents.evaluation.leaderboard import SHIPPED
 from agents.evaluation.results import Result, evaluate, read_results, write_results
 from agents.evaluation.suites import Suite, load_suite, suite_names
 from agents.registry import load_agents
@@ -27,7 +28,6 @@ from fish_env.envs.tasks import TASKS
 from scripts.bench.harness import machine
 
 ROOT = Path(__file__).resolve().parents[1]
-RESULT = ROOT / "results" / "agents.json"
 AGENTS = ("pid", "mppi", "pretrained")
 SOURCES = {
     "pid": ("agents/controllers/pid.py", "agents/controllers/seen.py", "configs/controllers"),
@@ -99,7 +99,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     add = parser.add_argument
     add("--agents", default=",".join(AGENTS), help=f"some of {', '.join(AGENTS)}")
     add("--work", type=Path, default=ROOT / "out" / "benchmark-agents")
-    add("--out", type=Path, default=RESULT)
+    add("--out", type=Path, default=SHIPPED)
     options, console = parser.parse_args(arguments), Console()
     agents = options.agents.split(",")
     options.work.mkdir(parents=True, exist_ok=True)

@@ -8,6 +8,8 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
+from scripts import agents_report
+
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "benchmarks.md"
 SPEED = ROOT / "scripts" / "bench" / "results"
@@ -24,6 +26,9 @@ SPEED_HEAD = """\
 
 `make bench` runs this simulator and others in one process, in turn.
 """
+AGENTS_HEAD = """\
+## Agents
+"""
 DIAGNOSIS_HEAD = """\
 ## Diagnosis
 
@@ -35,7 +40,8 @@ in made-up measurements, which another implementation of the physics computes, a
 
 def page(speed: Path = SPEED, diagnosis: Path = DIAGNOSIS) -> str:
     """The page as Markdown."""
-    parts = [HEAD, SPEED_HEAD, _latest(speed, "speed"), DIAGNOSIS_HEAD]
+    parts = [HEAD, SPEED_HEAD, _latest(speed, "speed"), AGENTS_HEAD, agents_report.section()]
+    parts.append(DIAGNOSIS_HEAD)
     return "\n".join([*parts, _latest(diagnosis, "diagnosis"), ""]).rstrip() + "\n"
 
 

@@ -90,13 +90,15 @@ def trials(candidates: int, episodes: int, seed: int) -> dict[str, Trial]:
     }
 
 
-def tune(start: FloatArray, options: argparse.Namespace, console: Console) -> FloatArray:
-    """Gains found by differential evolution that begins around the present ones."""
+def tune(starts: FloatArray, options: argparse.Namespace, console: Console) -> FloatArray:
+    """Gains found by differential evolution that begins at and between known ones."""
     low, high = np.array([BOUNDS[name] for name in GAIN_NAMES]).T
     rng = np.random.default_rng(options.seed)
-    near = start + 0.1 * (high - low) * rng.standard_normal((options.candidates, len(start)))
-    first = np.clip(near, low, high)
-    first[0] = np.clip(start, low, high)
+    count = len(starts)
+    shares = np.vstack([np.eye(count), rng.dirichlet(np.ones(count), options.candidates - count)])
+    noise = rng.standard_normal((options.candidates, len(low)))
+    noise[:count] = 0.0
+    first = np.clip(shares @ starts + options.spread * (high - low) * noise, low, high)
     swims = trials(options.candidates, options.episodes, FIRST_SEED)
     with Progress(console=console) as progress:
         bar = progress.add_task("tuning", total=options.generations + 1)
@@ -120,7 +122,7 @@ def check(columns: dict[str, FloatArray], episodes: int, console: Console) -> No
     for name, trial in trials(len(columns), episodes, CHECK_SEED).items():
         success, reward = trial.scores(gains)
         for label, s, r in zip(columns, success, reward, strict=True):
-            console.print(f"{name:12} {label:7} success {s:.3f}  return per step {r:.4f}")
+            console.print(f"{name:12} {label:30} success {s:.3f}  return per step {r:.4f}")
 
 
 def write(gains: FloatArray, options: argparse.Namespace, file: Path) -> None:
@@ -141,14 +143,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
     add("--candidates", type=int, default=64)
     add("--episodes", type=int, default=16, help="of each suite and task, for each candidate")
     add("--seed", type=int, default=0, help="of the search")
-    add("--start", type=Path, default=FILE, help="gains to begin with")
+    add("--start", type=Path, nargs="+", default=[FILE], help="gains to begin with")
+    add("--spread", type=float, default=0.1, help="of the first candidates, share of the bounds")
     add("--out", type=Path, default=FILE)
     options, console = parser.parse_args(arguments), Console()
-    present = load_gains(options.start)
-    start = np.array([getattr(present, name) for name in GAIN_NAMES], float)
-    found = tune(start, options, console)
+    known = [load_gains(file) for file in options.start]
+    starts = np.array([[getattr(gains, name) for name in GAIN_NAMES] for gains in known], float)
+    found = tune(starts, options, console)
     write(found, options, options.out)
-    check({"before": start, "tuned": found}, 100, console)
+    before = {str(file): start for file, start in zip(options.start, starts, strict=True)}
+    check(before | {"tuned": found}, 200, console)
     console.print(f"written: {options.out}")
 
 

@@ -1,7 +1,7 @@
 """Writes the generated parts of README.md: `python -m scripts.update_readme`.
 
 They stand between the comments `<!-- NAME -->` and `<!-- end of NAME -->`: the headlines of the
-latest measurements of speed and of the diagnosis, and how many of the paper's statements are held.
+latest measurements of speed, agents and diagnosis, and how many of the paper's statements are held.
 The tables themselves are on docs/benchmarks.md and docs/paper-statements.md.
 """
 
@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from scripts import agents_report
 from scripts.bench.report import short
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -116,6 +117,7 @@ def statements(page: Path = STATEMENTS) -> str:
 
 BLOCKS: dict[str, Callable[[], str]] = {
     "speed": speed,
+    "agents": agents_report.headline,
     "diagnosis": diagnosis,
     "statements": statements,
 }

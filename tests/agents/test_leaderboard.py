@@ -1,0 +1,90 @@
+"""The leaderboard orders agents, names what is not measured, and is what the README shows."""
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from agents.evaluation.intervals import Interval
+from agents.evaluation.labels import LABELS
+from agents.evaluation.leaderboard import MISSING, SHIPPED, by_metric, overview
+from agents.evaluation.metrics import STEP_METRICS
+from agents.evaluation.results import Result, read_results, write_results
+from agents.evaluation.suites import load_suite, suite_names
+from fish_env import cli
+from fish_env.envs.registration import ENV_ID
+from fish_env.envs.tasks import TASKS
+from fish_env.errors import ConfigError
+from scripts import agents_report
+
+
+def result(agent: str, suite: str, task: str, level: float, seeds: int = 1) -> Result:
+    metrics = {
+        name: None
+        if name in STEP_METRICS and task == "track"
+        else Interval(level, 0.9 * level, 1.1 * level)
+        for name in LABELS
+    }
+    return Result(agent, suite, 1, task, ENV_ID, seeds, 100, metrics)
+
+
+RESULTS = [
+    result("pid", "hard", "hold", 0.5),
+    result("learned", "calm", "hold", 1.0, seeds=5),
+    result("pid", "calm", "hold", 0.25),
+    result("pid", "calm", "track", 0.125),
+]
+
+
+def test_suites_go_from_easy_to_hard_and_the_best_return_comes_first():
+    assert overview(RESULTS).splitlines() == [
+        "| task | agent | calm | hard |",
+        "| --- | --- | --- | --- |",
+        f"| hold | learned, 5 seeds | 100 %, 100 cm, 57.3°, 1000 mW | {MISSING} |",
+        "| hold | pid | 25 %, 25.0 cm, 14.3°, 250 mW | 50 %, 50.0 cm, 28.6°, 500 mW |",
+        f"| track | pid | 12.5 %, 12.5 cm, 7.16°, 125 mW | {MISSING} |",
+    ]
+
+
+def test_one_metric_comes_with_its_intervals():
+    table = by_metric(RESULTS, "depth_overshoot")
+    assert "| hold | pid | 25.0 (22.5 to 27.5) | 50.0 (45.0 to 55.0) |" in table
+    assert f"| track | pid | - | {MISSING} |" in table
+    with pytest.raises(ConfigError, match="metric 'luck': one of success_rate"):
+        by_metric(RESULTS, "luck")
+
+
+def test_the_command_prints_the_table_of_the_readme_and_what_is_added(tmp_path):
+    mine = tmp_path / "mine.json"
+    write_results(mine, [result("mine", "calm", "hold", 0.5)])
+    printed = CliRunner().invoke(cli.app, ["leaderboard"]).output
+    assert printed.strip() == overview(read_results(SHIPPED))
+    assert printed.strip() in (agents_report.ROOT / "README.md").read_text(encoding="utf-8")
+    more = CliRunner().invoke(cli.app, ["leaderboard", "--add", str(mine)]).output
+    assert "| hold | mine | 50 %," in more
+
+
+def test_the_shipped_results_are_of_the_suites_as_they_are():
+    results = read_results(SHIPPED)
+    of_now = {name: load_suite(name).version for name in suite_names()}
+    assert all(r.suite_version == of_now[r.suite] and r.episodes == 100 for r in results)
+    for agent in {r.agent for r in results}:
+        measured = {(r.suite, r.task) for r in results if r.agent == agent}
+        assert measured == {(suite, task) for suite in of_now for task in TASKS}
+
+
+def test_without_results_the_pages_say_so(tmp_path):
+    none = tmp_path / "none.json"
+    assert agents_report.headline(none) == agents_report.NOT_YET
+    assert agents_report.NOT_YET in agents_report.section(none)
+
+
+def test_the_section_has_every_metric_and_the_times(tmp_path):
+    file = tmp_path / "results.json"
+    times = {"pid": {f"{c}_ms_{q}": 0.1234 for c in ("wall", "process") for q in ("median", "p99")}}
+    machine = {"cores": 2, "cpu": "a CPU"}
+    write_results(file, RESULTS, date="2026-01-02", machine=machine, decision_times=times)
+    assert json.loads(file.read_text())["date"] == "2026-01-02"
+    text = agents_report.section(file)
+    assert "| pid | 0.123 | 0.123 | 0.123 | 0.123 |" in text
+    assert all(f"### {label[0].upper()}{label[1:]}" in text for label, _ in LABELS.values())

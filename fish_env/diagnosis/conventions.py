@@ -21,6 +21,7 @@ from fish_env.errors import DatasetError
 FloatArray = npt.NDArray[np.float64]
 STRIDE_S = 0.3
 """s. Over such a time the increments of swimming are well above the noise."""
+FEWEST = 30
 CLOSE = 0.75
 """Correlation above which two series are the same motion, whatever their scale and sign."""
 SLOWEST, SMOOTHING_S = 0.05, 1.0
@@ -30,6 +31,8 @@ ALIGNED, ASTRAY = 0.9, 0.5
 
 In the simulated datasets of the test suite it is above 0.9.
 """
+CLIMBING = 0.003
+"""m/s by which the climb must vary for its sign to be told."""
 SINKING = -0.4
 """Mean correlation, within runs, of the climb with what pitch and speed make of it; where signs are
 right it is between 0.2 and 0.8 in these datasets."""
@@ -44,22 +47,29 @@ def check_conventions(dataset: Dataset) -> None:
     for relation in relations_of(dataset.channels):
         strides = [_strides(relation, run) for run in dataset.runs]
         together = np.concatenate(strides) if strides else np.zeros((0, 2, 0))
-        for row, output in enumerate(relation.outputs):
-            source = relation.inputs[row] if relation.name == "attitude" else "u, v, w"
-            _check_scale(f"{dataset.name}: {output} changes", together[:, :, row], output, source)
+        likeness = [_likeness(together[:, :, row]) for row in range(len(relation.outputs))]
+        for row in sorted(range(len(likeness)), key=lambda i: -likeness[i]):
+            if likeness[row] > CLOSE:
+                output = relation.outputs[row]
+                source = relation.inputs[row] if relation.name == "attitude" else "u, v, w"
+                place = f"{dataset.name}: {output} changes"
+                _check_scale(place, together[:, :, row], output, source)
     if {"x", "y", "yaw"} <= {*dataset.channels}:
         _check_heading(dataset)
     if {"x", "y", "z", "pitch"} <= {*dataset.channels}:
         _check_climb(dataset)
 
 
+def _likeness(strides: FloatArray) -> float:
+    """Correlation of measured and integrated increments, whatever its sign; 0 if there is none."""
+    if len(strides) < FEWEST or not strides.std(axis=0).all():
+        return 0.0
+    return float(abs(np.corrcoef(strides.T)[0, 1]))
+
+
 def _check_scale(place: str, strides: FloatArray, output: str, source: str) -> None:
     """Refuse an output that follows its source at another scale, or against it."""
     measured, integrated = strides.T
-    if len(measured) < 30 or not measured.std() or not integrated.std():
-        return
-    if abs(np.corrcoef(measured, integrated)[0, 1]) < CLOSE:
-        return
     # Symmetric in the two, as both are noisy.
     ratio = float(measured.std() / integrated.std())
     if not 0.5 < ratio < 2.0:
@@ -105,7 +115,7 @@ def _likely(ratio: float, output: str, source: str) -> str:
     """What a ratio far from one points to."""
     large, small = (output, source) if ratio > 1.0 else (source, output)
     for factor, (fine, coarse) in UNITS.items():
-        if abs(abs(math.log(ratio)) - math.log(factor)) < 0.3:
+        if abs(abs(math.log(ratio)) - math.log(factor)) < 0.35:
             return (
                 f"{large} is in {fine} but declared as {coarse}, or {small} is in {coarse} but "
                 f"declared as {fine}; correct the units under channels"
@@ -199,7 +209,7 @@ def _check_climb(dataset: Dataset) -> None:
         assert t.sinking is not None
         assert t.pitch is not None
         expected = -t.speed * np.tan(t.pitch)
-        if len(expected) >= 50 and expected.std() > 0.005 and t.sinking.std() > 0.0:
+        if len(expected) >= 50 and expected.std() > CLIMBING and t.sinking.std() > 0.0:
             found.append(float(np.corrcoef(expected, t.sinking)[0, 1]))
     if len(found) >= 2 and np.mean(found) < SINKING and np.mean(np.array(found) < 0.0) > 0.8:
         raise DatasetError(

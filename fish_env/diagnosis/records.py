@@ -13,8 +13,9 @@ FEWEST_STUCK = 10
 """Samples in a row of one value; fewer may be coarse digits."""
 CHANCE = 1e-6
 """How likely such a row may be by coarse digits alone."""
-LEAP = 6.0
-"""Usual steps by which a channel leaps into or out of a row of one value."""
+LEAP = 0.5
+"""Usual steps by which a channel leaps into or out of a row of one value; a fish that comes to
+move after a rest does so more smoothly."""
 GAP = 5.0
 """Usual sample intervals, beyond which an interval is looked at for a jump of the clock."""
 SIDE = 6
@@ -38,7 +39,8 @@ def check_stuck(place: str, run: Run, channel: str) -> None:
     steps = np.diff(values)
     begin, length = _longest_row(steps == 0.0)
     rows = length + 1
-    if rows < FEWEST_STUCK:
+    resting = run.start == "rest" and begin == 0
+    if rows < FEWEST_STUCK or resting:
         return
     others = np.delete(steps, np.s_[begin : begin + length])
     repeated = max(float(np.mean(others == 0.0)) if others.size else 1.0, 1.0 / len(values))
@@ -50,7 +52,7 @@ def check_stuck(place: str, run: Run, channel: str) -> None:
         return
     raise DatasetError(
         f"{place}: {channel} is {values[begin]:g} in {rows} samples in a row, from t = "
-        f"{time[begin]:.4g} s to {time[begin + length]:.4g} s, and leaps from there; leave its "
+        f"{time[begin]:.4g} s to {time[begin + length]:.4g} s, as if it were stuck; leave its "
         "cells empty where it was not measured"
     )
 

@@ -46,7 +46,7 @@ def check_conventions(dataset: Dataset) -> None:
     """
     for relation in relations_of(dataset.channels):
         strides = [_strides(relation, run) for run in dataset.runs]
-        together = np.concatenate(strides) if strides else np.zeros((0, 2, 0))
+        together: FloatArray = np.concatenate(strides)
         likeness = [_likeness(together[:, :, row]) for row in range(len(relation.outputs))]
         for row in sorted(range(len(likeness)), key=lambda i: -likeness[i]):
             if likeness[row] > CLOSE:
@@ -64,7 +64,7 @@ def _likeness(strides: FloatArray) -> float:
     """Correlation of measured and integrated increments, whatever its sign; 0 if there is none."""
     if len(strides) < FEWEST or not strides.std(axis=0).all():
         return 0.0
-    return float(abs(np.corrcoef(strides.T)[0, 1]))
+    return float(abs(np.corrcoef(strides[:, 0], strides[:, 1])[0, 1]))
 
 
 def _check_scale(place: str, strides: FloatArray, output: str, source: str) -> None:

@@ -324,14 +324,15 @@ def _shuffled(energies: Sequence[FloatArray], rng: np.random.Generator) -> Float
 def _family_wise(energy: FloatArray, null: FloatArray, judged: npt.NDArray[np.bool_]) -> FloatArray:
     """P-value of each cell against the largest departure of all cells in each shuffle."""
     p_values: FloatArray = np.full(energy.shape, np.nan)
-    centre, spread = null.mean(axis=0), null.std(axis=0)
+    # The data are one of the arrangements that could have been, so they count among them.
+    every = np.concatenate([energy[None], null])
+    centre, spread = every.mean(axis=0), every.std(axis=0)
     used = judged & np.isfinite(centre) & (spread > 0.0)
     if not used.any():
         return p_values
-    departures = (energy[used] - centre[used]) / spread[used]
-    largest = ((null[:, used] - centre[used]) / spread[used]).max(axis=1)
-    above = (largest[:, None] >= departures).sum(axis=0)
-    p_values[used] = (1.0 + above) / (1.0 + len(null))
+    departures = (every[:, used] - centre[used]) / spread[used]
+    above = departures.max(axis=1)[:, None] >= departures[0]
+    p_values[used] = above.mean(axis=0)
     return p_values
 
 

@@ -16,8 +16,9 @@ from fish_env.rendering.swimmer import Side, Swimmer
 from fish_env.rendering.water import paint
 
 Frame = npt.NDArray[np.uint8]
-FULL_SAMPLING = 1_000_000
-"""Pixels up to which a picture is drawn at twice its size; a larger one is smooth enough."""
+SAMPLING = ((500_000, 2.0, 2), (1_500_000, 1.5, 3), (np.inf, 1.0, 3))
+"""Up to how many pixels a picture is drawn how much larger than shown, for smooth edges, and its
+water how much coarser, for speed."""
 
 
 def as_array(surface: pygame.Surface) -> Frame:
@@ -59,15 +60,15 @@ class View:
 
     def _water_and_fish(self, scene: Scene) -> pygame.Surface:
         width, height = self.size
-        unit = 2 if width * height <= FULL_SAMPLING else 1
-        large = (unit * width, unit * height)
+        unit, coarser = next(how for most, *how in SAMPLING if width * height <= most)
+        large = (round(unit * width), round(unit * height))
         tank = self.setting.tank
         camera = self.follower.camera(large, tank.top, tank.bottom)
-        coarse = (max(2, width // 2), max(2, height // 2))
+        coarse = (max(2, round(width / coarser)), max(2, round(height / coarser)))
         water = paint(camera, coarse, scene.time_s, tank.top, tank.bottom)
         canvas = Canvas(pygame.transform.smoothscale(water, large), camera, unit)
         self._draw(canvas, scene)
-        if unit == 1:
+        if large == self.size:
             return canvas.surface
         return pygame.transform.smoothscale(canvas.surface, self.size)
 

@@ -51,11 +51,10 @@ class Rays:
 
     def __init__(self, camera: Camera, size: tuple[int, int]) -> None:
         width, height = size
-        factor = camera.width / width
         self.camera = camera
-        right = ((np.arange(width) + 0.5) * factor - 0.5 * camera.width) / camera.scale
+        right = ((np.arange(width) + 0.5) / width - 0.5) * camera.width / camera.scale
         self.right = right.astype(np.float32)
-        self.down = ((np.arange(height) + 0.5) * factor - 0.5 * camera.height) / camera.scale
+        self.down = ((np.arange(height) + 0.5) / height - 0.5) * camera.height / camera.scale
         ahead, _, below = camera.axes
         self.slope = ahead[2] + self.down * below[2]
         self.steep = self.slope / np.sqrt(1.0 + self.down**2)

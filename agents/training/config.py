@@ -10,11 +10,13 @@ from typing import Any
 
 import yaml
 
+from agents.controllers.pid import GAIN_NAMES
 from agents.evaluation.suites import load_suite
 from agents.policies.files import ACTIONS
 from agents.policies.history import HistorySpec
 from agents.policies.network import ACTIVATIONS
 from agents.training.schema import build
+from fish_env.envs.config_checks import is_number
 from fish_env.envs.options import env_options
 from fish_env.errors import ConfigError
 from fish_env.params.io import config_root
@@ -91,6 +93,8 @@ class Ppo:
     vf_coef: float = 0.5
     max_grad_norm: float = 0.5
     target_kl: float | None = None
+    use_sde: bool = False
+    sde_sample_freq: int = -1
 
     def __post_init__(self) -> None:
         positive = (self.n_steps, self.batch_size, self.n_epochs, self.clip_range)
@@ -124,13 +128,19 @@ class Imitation:
     Attributes:
         rounds: episodes that all fish swim for it, the first by the controller; 0: none.
         epochs: passes through what was collected, after each round.
+        gains: gains of the controller that differ from those it comes with.
     """
 
     rounds: int = 0
     epochs: int = 8
+    gains: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         _check(self.rounds >= 0 and self.epochs > 0, "imitate: rounds >= 0 and epochs > 0")
+        for name, value in self.gains.items():
+            known = ", ".join(GAIN_NAMES)
+            _check(name in GAIN_NAMES, f"imitate.gains: unknown gain '{name}'; known: {known}")
+            _check(is_number(value), f"imitate.gains.{name} must be a finite number")
 
 
 @dataclass(frozen=True)

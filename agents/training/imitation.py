@@ -8,7 +8,7 @@ returns of the last round, so that the first updates do not spoil what was learn
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ import torch
 from stable_baselines3 import PPO
 from torch import nn
 
-from agents.controllers import PIDController
+from agents.controllers.pid import PIDController, tuned_gains
 from agents.training.config import Imitation, TrainConfig
 from agents.training.stack import Stack
 from fish_env.envs.layout import OBSERVATION
@@ -52,9 +52,10 @@ def imitate(model: PPO, stack: Stack, config: TrainConfig, settings: Imitation) 
     """Fits policy and values of a learner that knows nothing yet to the PID controller."""
     rng = np.random.default_rng(config.seed)
     outside: Any = stack.outside
+    teacher = PIDController(replace(tuned_gains(), **settings.gains))
     swims: list[Swim] = []
     for round_ in range(settings.rounds):
-        swims.append(_swim(model, stack, rng, by_controller=round_ == 0))
+        swims.append(_swim(model, stack, teacher, rng, by_controller=round_ == 0))
         seen = np.concatenate([_rows(swim.seen) for swim in swims])
         wanted = np.concatenate([_rows(swim.wanted) for swim in swims])
         _fit(model, _policy, outside.normalize_obs(seen), wanted, settings.epochs)
@@ -66,9 +67,10 @@ def imitate(model: PPO, stack: Stack, config: TrainConfig, settings: Imitation) 
     _fit(model, _values, values, returns.astype(np.float32), settings.epochs)
 
 
-def _swim(model: PPO, stack: Stack, rng: np.random.Generator, by_controller: bool) -> Swim:
+def _swim(
+    model: PPO, stack: Stack, teacher: PIDController, rng: np.random.Generator, by_controller: bool
+) -> Swim:
     outside: Any = stack.outside
-    teacher = PIDController()
     normal = outside.reset()
     teacher.reset(outside.num_envs)
     rows: list[tuple[Any, ...]] = []

@@ -79,3 +79,14 @@ def test_a_name_cannot_break_out_of_the_data():
     assert text.count("<script") == 1
     data = re.search(r'application/json"[^>]*>(.*)</script>', text, re.DOTALL)
     assert json.loads(data.group(1))["groups"][0]["name"] == name
+
+
+def test_every_part_of_three_that_is_used_is_joined_into_its_file():
+    used = {
+        name
+        for script in STATIC.glob("*.js")
+        for name in re.findall(r"THREE\.(\w+)", script.read_text())
+    }
+    parts = (STATIC / "vendor" / "three-parts.js").read_text()
+    named = set(re.findall(r"\w+", " ".join(re.findall(r"\{(.*?)\}", parts, re.DOTALL))))
+    assert used == named

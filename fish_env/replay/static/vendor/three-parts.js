@@ -1,8 +1,8 @@
 export {
-  AmbientLight, BoxGeometry, BufferAttribute, BufferGeometry, CanvasTexture, CircleGeometry, Color, ConeGeometry,
-  DirectionalLight, DoubleSide, Float32BufferAttribute, GridHelper, Group, HemisphereLight, Line,
-  LineBasicMaterial, LineDashedMaterial, LineSegments, Matrix4, Mesh, MeshBasicMaterial, MeshStandardMaterial, PerspectiveCamera,
-  PlaneGeometry, Quaternion, Scene, SphereGeometry, Sprite, SpriteMaterial, Vector3, WebGLRenderer,
+  BoxGeometry, BufferGeometry, CanvasTexture, CircleGeometry, DirectionalLight, DoubleSide,
+  Float32BufferAttribute, GridHelper, Group, HemisphereLight, Line, LineBasicMaterial, Mesh,
+  MeshBasicMaterial, MeshStandardMaterial, PerspectiveCamera, PlaneGeometry, Scene, SphereGeometry,
+  Sprite, SpriteMaterial, Vector3, WebGLRenderer,
 } from "three";
 export { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 export { Line2 } from "three/examples/jsm/lines/Line2.js";

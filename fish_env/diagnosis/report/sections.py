@@ -29,7 +29,7 @@ from fish_env.replay import Group, component
 Answer = Mapping[str, Any]
 Series = ReportSeries | SteadySeries | None
 FloatArray = npt.NDArray[np.float64]
-MOST_DRAWN = 3
+MOST_DRAWN = 2
 """Runs with a drawing of their own; the replay has them all."""
 VERDICTS = {
     "no_misfit": "Nothing is wrong that these runs could show",

@@ -53,6 +53,11 @@ def read_replay_file(
         DatasetError: It is no such file; names what is wrong and where.
         MissingExtraError: A Parquet file, but pyarrow is not installed.
     """
+    if file.is_dir():
+        raise DatasetError(
+            f"{file}: a folder; name one of its files, or see all of a dataset with "
+            f"`robofish compare {file} --replay page.html`"
+        )
     if not file.is_file():
         raise DatasetError(f"{file}: there is no such file; name a .csv or .parquet file")
     found = _dataset_run(file)

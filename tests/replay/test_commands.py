@@ -76,6 +76,7 @@ def test_compare_shows_every_run_measured_beside_simulated(run, tmp_path):
     ("words", "said"),
     [
         (("replay", "none.csv"), "no such file"),
+        (("replay", "table"), "robofish compare table --replay"),
         (("replay", "case.json"), "reads .csv and .parquet"),
         (("compare", "table", "--replay", "a.html"), "no runs to replay"),
     ],

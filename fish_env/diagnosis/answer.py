@@ -101,6 +101,7 @@ def _noise(fit: Fit) -> Plain:
             "force_sd": fit.noise.force_sd,
             "moment_sd": fit.noise.moment_sd,
             "correlation_s": fit.noise.correlation_s,
+            "phase_sd": fit.noise.phase_sd,
         },
     }
 

@@ -35,6 +35,8 @@ class Attribution:
         accepted: explanation of the last step (the baseline itself when nothing was added).
         rivals: explanations that fit as well as the accepted one.
         ranking: (name, score) of the first step, score in -2 log likelihood against the baseline.
+        tolerated: what the simulation of the accepted causes may get wrong itself, in the same
+            unit.
     """
 
     baseline: Explanation
@@ -42,6 +44,7 @@ class Attribution:
     accepted: Explanation
     rivals: tuple[Explanation, ...]
     ranking: tuple[tuple[str, float], ...]
+    tolerated: float
 
 
 def attribute(
@@ -93,7 +96,10 @@ def attribute(
             if alike(problem, best, e) and explained_away(e.causes[-1], screens[-2], screens[-1])
         )
     current = pruned(problem, current)
-    return Attribution(Explanation((), baseline), tuple(screens), current, rivals, ranking)
+    tolerated = rough * total
+    return Attribution(
+        Explanation((), baseline), tuple(screens), current, rivals, ranking, tolerated
+    )
 
 
 def _new(after: Screen, chosen: Sequence[Signal]) -> list[Signal]:

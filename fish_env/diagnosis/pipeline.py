@@ -195,7 +195,7 @@ def _diagnose_runs(
     shown = preconditions(problem, attribution.screens[0], causes)
     progress("testing what is left")
     accepted = attribution.accepted.fit
-    left = adequacy(accepted, rng)
+    left = adequacy(accepted, rng, attribution.tolerated)
     verdict = decide(attribution, left, shown)
     gain = None
     if verdict.name in EXTENDING and final:

@@ -101,6 +101,7 @@ class Projector:
         slopes = self.lin.slopes
         baseline = fit.problem.baseline
         self.prior = prior_precision(baseline, slopes.shape[1] - len(baseline), fit.released)
+        self.vector = np.concatenate([fit.point.z, np.zeros(slopes.shape[1] - len(baseline))])
         self.hessian = information(slopes, self.prior)
         self.factor = np.linalg.cholesky(self.hessian)
 
@@ -118,7 +119,9 @@ class Projector:
         if np.any(np.diag(projected) < 1e-4) or np.any(energy < 1e-3):
             return None
         projected += 1e-9 * np.diag(np.diag(projected))
-        score = -left.T @ self.lin.residuals
+        # A misfit that the coefficients follow shows in how far they left their priors.
+        pull = followed.T @ (self.prior * self.vector)
+        score = pull - left.T @ self.lin.residuals
         step = np.linalg.solve(projected, score)
         remaining = self.lin.residuals + left @ step
         inflation = self._inflation(left, remaining)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -18,6 +18,10 @@ from fish_env.identification.problem import Point, Problem
 from fish_env.identification.products import inner
 
 FloatArray = npt.NDArray[np.float64]
+WANDERS = (1e-3, 0.03, 0.3)
+"""Where the search for the wandering of the tail's phase begins (rad/s^0.5)."""
+SURE_PHASE = 3e-3
+"""Wandering too small to matter (rad/s^0.5)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,6 +151,7 @@ def _settled(before: NoiseModel, after: NoiseModel, share: float = 0.1) -> bool:
         (before.force_sd, after.force_sd),
         (before.moment_sd, after.moment_sd),
         (before.correlation_s, after.correlation_s),
+        (max(before.phase_sd, SURE_PHASE), max(after.phase_sd, SURE_PHASE)),
     ]
     return all(abs(np.log(b / a)) < share for a, b in pairs)
 
@@ -174,8 +179,8 @@ def default_noise(problem: Problem) -> NoiseModel:
 def _noise_at(problem: Problem, point: Point, noise: NoiseModel, final: bool) -> NoiseModel:
     """Noise model of largest likelihood at a point, from at most four runs.
 
-    The search starts from the present one and from a small disturbance, so that a disturbance
-    which once stood in for a misfit does not stay.
+    The search starts from the likeliest of the present one, small and large ones, so that a
+    disturbance which once stood in for a misfit does not stay.
     """
     few = problem.subset(4)
     within = disturbance_range(problem.fish)
@@ -184,7 +189,8 @@ def _noise_at(problem: Problem, point: Point, noise: NoiseModel, final: bool) ->
         filtered, made_with = few.filtered(point, found, keep_slopes=True), found
         replay = partial(few.filter_for(point.effects).replay, filtered, made_with)
         small = NoiseModel(found.sensor_sd, 3e-3, 1e-4, 1.0)
-        start = max((found, small), key=replay)
+        starts = [replace(n, phase_sd=p) for n in (found, small) for p in WANDERS]
+        start = max((found, *starts), key=replay)
         found = fit_noise(replay, start, within, 45, problem.sensor_sd if final else None)
         if _settled(made_with, found, 0.4):
             break
@@ -209,27 +215,13 @@ def _finish(
     physical = scale @ covariance @ scale.T
     point = free.unpack(vector)
     estimates = np.r_[problem.baseline.values(point.z[:, None])[:, 0], vector[free.count :]]
-    bounds = (*_coefficients_at_bounds(problem, estimates), *_effects_at_bounds(free, vector))
+    bounds = (*free.coefficients_at_bounds(estimates), *free.effects_at_bounds(vector))
     diagonal = np.sqrt(np.diag(hessian))
     condition = float(np.linalg.cond(hessian / np.outer(diagonal, diagonal)))
     return Fit(
         problem, effects, released, point, noise, free.names, estimates, physical,
         float(sum(r.log_likelihood for r in filtered)), value, bounds, condition, filtered, lin,
     )  # fmt: skip
-
-
-def _coefficients_at_bounds(problem: Problem, estimates: FloatArray) -> list[str]:
-    """Coefficients that ended at the edge of what is physically possible."""
-    baseline = problem.baseline
-    low, high = baseline.bounds
-    values, margin = estimates[: len(baseline)], 2e-3 * baseline.sd
-    stuck = (values <= low + margin) | (values >= high - margin)
-    return [path for path, at in zip(baseline.paths, stuck, strict=True) if at]
-
-
-def _effects_at_bounds(free: Free, vector: FloatArray) -> list[str]:
-    values = zip(free.freedoms, vector[free.count :], strict=True)
-    return [f.path for f, value in values if value <= f.lower or value >= f.upper]
 
 
 def sandwich(lin: Linearised, inverse: FloatArray, prior: FloatArray) -> FloatArray:

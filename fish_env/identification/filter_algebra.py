@@ -65,7 +65,7 @@ def cholesky_inverse(s, w):
 
 
 @kernel
-def predict_covariance(p, f, keep, variance, scratch):
+def predict_covariance(p, f, keep, variance, wander, scratch):
     """p = F p F' + Q in place, F = [f; keep on the wrench; 1 on the phase].
 
     Args:
@@ -73,6 +73,7 @@ def predict_covariance(p, f, keep, variance, scratch):
         f: (12, 19) slopes of the moving rows.
         keep: what is left of the wrench after the interval.
         variance: (6,) stationary variance of the wrench.
+        wander: variance that the tail phase gains over the interval (rad^2).
         scratch: (19, 19).
     """
     for i in range(N_MOVING):
@@ -99,6 +100,7 @@ def predict_covariance(p, f, keep, variance, scratch):
             p[j, i] = total
     for j in range(6):
         p[N_MOVING + j, N_MOVING + j] += variance[j] * (1.0 - keep * keep)
+    p[N_ERROR - 1, N_ERROR - 1] += wander
 
 
 @kernel

@@ -74,8 +74,8 @@ def slopes_of_interval(
 @entry_point
 def ekf_run(
     state0, par, pace_one, delay_one, gain, bias, clock, substeps, times, values, measured, codes,
-    noise_variance, covariance0, wrench_variance, wrench_decay_s, history_rows, tables, k_out,
-    w_out, e_out, x_out, d_out, f_out, h_out, raw_out,
+    noise_variance, covariance0, wrench_variance, wrench_decay_s, wander, history_rows, tables,
+    k_out, w_out, e_out, x_out, d_out, f_out, h_out, raw_out,
 ):  # fmt: skip
     """Extended Kalman filter over one run, relinearised at every sample.
 
@@ -96,6 +96,7 @@ def ekf_run(
         covariance0: (19, 19) of the initial error state.
         wrench_variance: (6,) stationary variance of the wrench.
         wrench_decay_s: its correlation time (s).
+        wander: variance that the tail phase gains in a second (rad^2/s).
         history_rows: room for late tail commands, 0 for none.
         tables: packed coefficient curves.
         k_out: (T, 19, C) gains.
@@ -148,7 +149,7 @@ def ekf_run(
             keep = math.exp(-span / wrench_decay_s)
             for j in range(6):
                 work[(WRENCH + j) * width] *= keep
-            predict_covariance(p, f, keep, wrench_variance, scratch)
+            predict_covariance(p, f, keep, wrench_variance, wander * span, scratch)
         observation_rows(work, width, codes, gain, measured[sample], rows)
         innovations_of(work, width, measured[sample], codes, gains, biases, e)
         log_det = update_covariance(

@@ -35,12 +35,14 @@ class NoiseModel:
         force_sd: stationary standard deviation of the disturbance force, each axis (N).
         moment_sd: of the disturbance moment, each axis (N m).
         correlation_s: correlation time of the disturbance (s).
+        phase_sd: how far the tail's phase wanders from its command in a second (rad/s^0.5).
     """
 
     sensor_sd: FloatArray
     force_sd: float
     moment_sd: float
     correlation_s: float
+    phase_sd: float = 0.0
 
     @property
     def wrench_variance(self) -> FloatArray:
@@ -163,7 +165,7 @@ class RunFilter:
                 state0, record, measurement.pace[0], measurement.delay[0], measurement.gain[:, 0],
                 measurement.bias[:, 0], data.clock, data.substeps, data.command_times,
                 data.command_values, data.measured, self.codes, noise.sensor_sd**2,
-                data.covariance0, noise.wrench_variance, noise.correlation_s,
+                data.covariance0, noise.wrench_variance, noise.correlation_s, noise.phase_sd**2,
                 self._history_rows(record, data), self.model.tables, k, w, e, x, d,
                 slopes.motion, slopes.channels, slopes.raw,
             )  # fmt: skip
@@ -190,7 +192,7 @@ class RunFilter:
             value = entry(
                 data.clock, data.measured, slopes.motion, slopes.channels, slopes.raw, result.gains,
                 result.wrench, made_with.correlation_s, noise.sensor_sd**2, data.covariance0,
-                noise.wrench_variance, noise.correlation_s,
+                noise.wrench_variance, noise.correlation_s, noise.phase_sd**2,
             )  # fmt: skip
             return float(value)
 

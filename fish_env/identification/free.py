@@ -19,6 +19,8 @@ from fish_env.identification.problem import Point, Problem
 
 FloatArray = npt.NDArray[np.float64]
 Z_STEP = 0.05
+REACH = 5.0
+"""Prior standard deviations that a coefficient may move, unless its prior is lifted."""
 SHARES = (0.5, 0.2)
 DAMPINGS = (0.1, 10.0)
 LARGEST_SLOPE = 1e9
@@ -53,6 +55,7 @@ class Free:
 
     def __init__(self, problem: Problem, effects: Iterable[str], released: Iterable[str]) -> None:
         self.problem = problem
+        self.released = tuple(released)
         self.freedoms = problem.freedoms(effects)
         self.count = len(problem.baseline)
         self.names = (*problem.baseline.paths, *(f.path for f in self.freedoms))
@@ -81,7 +84,7 @@ class Free:
     def _physical(self, z: FloatArray) -> FloatArray:
         """Shrink coefficients that would leave their physical bounds."""
         baseline = self.problem.baseline
-        low, high = baseline.bounds
+        low, high = self._range
         values = baseline.values(z[:, None])[:, 0]
         inside = np.clip(values, low + 1e-3 * baseline.sd, high - 1e-3 * baseline.sd)
         return np.asarray(np.linalg.solve(baseline.factor, inside - baseline.mean))
@@ -108,14 +111,39 @@ class Free:
             yield self.clip(bounded_step(damped, gradient, vector, rows, low, high)), False
 
     @cached_property
-    def _bounds(self) -> tuple[FloatArray, FloatArray]:
+    def _range(self) -> tuple[FloatArray, FloatArray]:
+        """Coefficients stay within physical bounds, and within reach of their prior.
+
+        One that runs away makes up for something else; to claim it, its prior must be lifted.
+        """
         baseline = self.problem.baseline
         low, high = baseline.bounds
+        reach = np.array([np.inf if p in self.released else REACH for p in baseline.paths])
+        reach = reach * baseline.sd
+        return np.maximum(low, baseline.mean - reach), np.minimum(high, baseline.mean + reach)
+
+    @cached_property
+    def _bounds(self) -> tuple[FloatArray, FloatArray]:
+        baseline = self.problem.baseline
+        low, high = self._range
         margin = 1e-3 * baseline.sd
         return (
             np.r_[low + margin - baseline.mean, [f.lower for f in self.freedoms]],
             np.r_[high - margin - baseline.mean, [f.upper for f in self.freedoms]],
         )
+
+    def coefficients_at_bounds(self, estimates: FloatArray) -> list[str]:
+        """Coefficients (in physical units) that ended at the edge of what they may be."""
+        baseline = self.problem.baseline
+        low, high = self._range
+        values, margin = estimates[: len(baseline)], 2e-3 * baseline.sd
+        stuck = (values <= low + margin) | (values >= high - margin)
+        return [path for path, at in zip(baseline.paths, stuck, strict=True) if at]
+
+    def effects_at_bounds(self, vector: FloatArray) -> list[str]:
+        """Effect parameters that ended at the edge of what they may be."""
+        values = zip(self.freedoms, vector[self.count :], strict=True)
+        return [f.path for f, value in values if value <= f.lower or value >= f.upper]
 
     def lanes(self, vector: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Perturbed vectors (n, 1 + n), the centre first, and the signed steps (n,)."""

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 from math import comb
 
@@ -71,17 +71,20 @@ class DisturbanceRange:
         force: smallest and largest standard deviation (N).
         moment: of the moment (N m).
         correlation: shortest and longest correlation time (s).
+        phase: least and most that the tail's phase wanders in a second (rad/s^0.5).
     """
 
     force: tuple[float, float]
     moment: tuple[float, float]
     correlation: tuple[float, float]
+    phase: tuple[float, float] = (1e-4, 1.0)
 
-    def clip(self, force: float, moment: float, correlation: float) -> tuple[float, float, float]:
-        """The nearest values within."""
-        pairs = ((force, self.force), (moment, self.moment), (correlation, self.correlation))
-        clipped = [float(np.clip(value, *bounds)) for value, bounds in pairs]
-        return clipped[0], clipped[1], clipped[2]
+    def nearest(self, sensor_sd: FloatArray, values: Sequence[float]) -> NoiseModel:
+        """The noise model with the nearest values within."""
+        bounds = (self.force, self.moment, self.correlation, self.phase)
+        return NoiseModel(
+            sensor_sd, *(float(np.clip(v, *b)) for v, b in zip(values, bounds, strict=True))
+        )
 
 
 def disturbance_range(fish: FishParams) -> DisturbanceRange:
@@ -109,19 +112,20 @@ def fit_noise(
         log_likelihood: of a noise model, the parameters of the fish being fixed.
         start: first guess.
         within: what the disturbance may be.
-        evaluations: effort for the three numbers of the disturbance.
+        evaluations: effort for the four numbers of the disturbance.
         largest_sensor_sd: (C,) bound on each channel's noise; the noise is then fitted too.
             Without it the sensors keep theirs: a misfit of the model must not pass for noise.
     """
 
     def model(x: FloatArray, sensor: FloatArray) -> NoiseModel:
-        return NoiseModel(sensor, *within.clip(*np.exp(x)))
+        return within.nearest(sensor, np.exp(x).tolist())
 
     def start_of(noise: NoiseModel) -> FloatArray:
-        return np.log([noise.force_sd, noise.moment_sd, noise.correlation_s])
+        phase = max(noise.phase_sd, within.phase[0])
+        return np.log([noise.force_sd, noise.moment_sd, noise.correlation_s, phase])
 
     def disturbance(noise: NoiseModel, effort: int) -> NoiseModel:
-        simplex = start_of(noise) + np.vstack([np.zeros(3), 0.7 * np.eye(3)])
+        simplex = start_of(noise) + np.vstack([np.zeros(4), 0.7 * np.eye(4)])
         found = minimize(
             lambda x: -log_likelihood(model(x, noise.sensor_sd)),
             start_of(noise),
@@ -149,13 +153,9 @@ def _sensors(
         for sign in (-1.0, 1.0):
             trial = noise.sensor_sd.copy()
             trial[i] *= np.exp(sign * step)
-            values.append(
-                log_likelihood(
-                    NoiseModel(trial, noise.force_sd, noise.moment_sd, noise.correlation_s)
-                )
-            )
+            values.append(log_likelihood(replace(noise, sensor_sd=trial)))
         slope = (values[1] - values[0]) / (2 * step)
         curve = (values[1] - 2 * centre + values[0]) / step**2
         move = -slope / curve if curve < 0 else np.sign(slope) * 0.3
         sensor[i] = min(sensor[i] * np.exp(np.clip(move, -0.5, 0.5)), largest[i])
-    return NoiseModel(sensor, noise.force_sd, noise.moment_sd, noise.correlation_s)
+    return replace(noise, sensor_sd=sensor)

@@ -27,7 +27,7 @@ from fish_env.model.composed import entry_point
 @entry_point
 def replay_run(
     clock, measured, f_in, h_in, raw_in, k_in, d_in, decay_in_s, noise_variance, covariance0,
-    wrench_variance, wrench_decay_s,
+    wrench_variance, wrench_decay_s, wander,
 ):  # fmt: skip
     """Log likelihood (without its constant) of a run under another noise model.
 
@@ -44,6 +44,7 @@ def replay_run(
         covariance0: (19, 19) of the initial error state.
         wrench_variance: (6,) stationary variance of the wrench.
         wrench_decay_s: its correlation time (s).
+        wander: variance that the tail phase gains in a second (rad^2/s).
     """
     channels = measured.shape[1]
     p = covariance0.copy()
@@ -61,7 +62,7 @@ def replay_run(
             span = clock[sample] - clock[sample - 1]
             keep = math.exp(-span / wrench_decay_s)
             kept = math.exp(-span / decay_in_s)
-            predict_covariance(p, f_in[sample], keep, wrench_variance, scratch)
+            predict_covariance(p, f_in[sample], keep, wrench_variance, wander * span, scratch)
             for i in range(N_MOVING):
                 total = 0.0
                 for j in range(N_ERROR):

@@ -34,7 +34,7 @@ def explanation(objective, by_run, names=3):
     )
 
 
-PROBLEM = SimpleNamespace(samples=50_000)
+PROBLEM = SimpleNamespace(samples=50_000, baseline="n")
 
 
 @pytest.mark.parametrize(
@@ -59,7 +59,7 @@ def test_a_simpler_explanation_is_not_beaten_by_parameters_alone():
 
 def test_what_looks_like_the_first_is_always_tried():
     names = ["servo_lag", "tether", "wave", "current", "tail_flexibility"]
-    signals = [SimpleNamespace(cause=SimpleNamespace(name=n), p_value=-100.0 + i)
+    signals = [SimpleNamespace(cause=SimpleNamespace(name=n, is_effect=True), p_value=-100.0 + i)
                for i, n in enumerate(names)]  # fmt: skip
     problem = SimpleNamespace(known=catalogue())
     assert "tail_flexibility" in catalogue()["servo_lag"].confusable_with

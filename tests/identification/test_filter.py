@@ -85,6 +85,7 @@ def plain_filter(problem, noise):
             f[12:18, 12:18] = keep * np.eye(6)
             state, wrench, p = centre, keep * wrench, f @ p @ f.T
             p[12:18, 12:18] += np.diag(noise.wrench_variance) * (1.0 - keep**2)
+            p[18, 18] += noise.phase_sd**2 * (data.clock[k] - data.clock[k - 1])
         h_rows = np.column_stack(
             [
                 (seen(moved(state, s), problem.channels) - seen(moved(state, -s), problem.channels))
@@ -160,7 +161,7 @@ def test_a_replayed_noise_model_has_the_filters_likelihood():
     filtered = problem.filtered(problem.start, setup.noise, keep_slopes=True)
     same = problem.lean_filter.replay(filtered, setup.noise, setup.noise)
     assert same == pytest.approx(sum(r.log_likelihood for r in filtered), abs=1e-6)
-    other = replace(setup.noise, force_sd=0.006, moment_sd=5e-5, correlation_s=0.5)
+    other = replace(setup.noise, force_sd=0.006, moment_sd=5e-5, correlation_s=0.5, phase_sd=0.02)
     full = sum(r.log_likelihood for r in problem.filtered(problem.start, other))
     assert problem.lean_filter.replay(filtered, setup.noise, other) == pytest.approx(full, abs=0.5)
 

@@ -142,6 +142,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     add("--generations", type=int, default=60)
     add("--candidates", type=int, default=64)
     add("--episodes", type=int, default=16, help="of each suite and task, for each candidate")
+    add("--check", type=int, default=200, help="episodes each that the result is checked on")
     add("--seed", type=int, default=0, help="of the search")
     add("--start", type=Path, nargs="+", default=[FILE], help="gains to begin with")
     add("--spread", type=float, default=0.1, help="of the first candidates, share of the bounds")
@@ -152,7 +153,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     found = tune(starts, options, console)
     write(found, options, options.out)
     before = {str(file): start for file, start in zip(options.start, starts, strict=True)}
-    check(before | {"tuned": found}, 200, console)
+    check(before | {"tuned": found}, options.check, console)
     console.print(f"written: {options.out}")
 
 

@@ -46,6 +46,8 @@ _LABELS = {
     "yaw": "heading yaw",
     "tail_angle": "tail",
 }
+FEWEST_PLOTS = 4
+"""With fewer at first, everything that all motions have is shown."""
 _ORDER = ("z", "speed", "yaw", "pitch", "roll", "x", "y", "u", "v", "w", "p", "q", "r")
 _FIRST = ("z", "speed", "u", "yaw", "pitch", "roll")
 
@@ -125,17 +127,21 @@ def _thinned(count: int) -> slice:
 
 
 def _plots(group: Group) -> list[Plain]:
-    """Channels to plot, those that say most first and shown from the start."""
-    present = {name for motion in group.motions for name in motion.channels}
+    """Channels to plot: those that every motion has before the others, the telling ones shown."""
+    sets = [set(motion.channels) for motion in group.motions]
+    common, present = set.intersection(*sets), set.union(*sets)
     order = [name for name in (*_ORDER, "tail_angle") if name in present]
-    first = [
-        name for name in _FIRST if name in present and not (name == "u" and "speed" in present)
-    ]
+    order.sort(key=lambda name: name not in common)
+    shown = [name for name in _FIRST if name in common]
+    if "speed" in shown:
+        shown.remove("u")
+    if len(shown) < FEWEST_PLOTS:
+        shown = [name for name in order if name in common]
     return [
         {
             "channel": name,
             "label": f"{_LABELS.get(name, name.replace('_', ' '))} ({_unit(name)[0]})",
-            "shown": name in first or len(order) <= len(_FIRST),
+            "shown": name in shown,
             "down": name == "z",
         }
         for name in order

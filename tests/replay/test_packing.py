@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fish_env.params import load_fish
-from fish_env.replay import Group, motion_from_trajectory, write_replay
+from fish_env.replay import Group, motion_from_channels, motion_from_trajectory, write_replay
 from fish_env.replay.packing import COLOURS, colours_of, page_data
 from fish_env.replay.page import STATIC, component
 from fish_env.simulator import Simulator
@@ -52,6 +52,18 @@ def test_the_block_moves_aft_with_its_displacement():
         track = page_data([Group("one", (swim,))], FISH)["groups"][0]["tracks"][0]
         blocks.append(floats(track["block"]).reshape(-1, 4)[-1])
     assert blocks[1] - blocks[0] == pytest.approx([-0.005, 0.0, 0.0, 0.0], abs=1e-7)
+
+
+def test_channels_that_all_motions_have_are_plotted_first():
+    swim = motion(name="simulated")
+    few = {name: swim.channels[name] for name in ("x", "y", "yaw")}
+    camera = motion_from_channels(swim.time_s, few, "camera", "measured")
+    plots = page_data([Group("both", (camera, swim))], FISH)["groups"][0]["plots"]
+    assert [plot["channel"] for plot in plots if plot["shown"]] == ["yaw", "x", "y"]
+    assert {plot["channel"] for plot in plots} > {"z", "speed", "r"}
+    alone = page_data([Group("one", (swim,))], FISH)["groups"][0]["plots"]
+    shown = {plot["channel"] for plot in alone if plot["shown"]}
+    assert shown == {"z", "speed", "yaw", "pitch", "roll"}
 
 
 def test_a_minute_of_three_fish_stays_below_six_megabytes(tmp_path):

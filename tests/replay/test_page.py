@@ -151,6 +151,35 @@ def test_the_camera_is_dragged_and_zoomed(opened):
     assert opened.run(distance) > near
 
 
+def test_a_change_of_colours_keeps_time_camera_and_what_is_hidden(opened):
+    camera = "Robofish.replays[0].stage.camera.position.toArray()"
+    opened.run("Robofish.replays[0].clock.seek(5), 1")
+    opened.press("2")
+    before = opened.run(camera)
+    dark = {"name": "prefers-color-scheme", "value": "dark"}
+    opened.call("Emulation.setEmulatedMedia", features=[dark])
+    opened.run(DRAWN)
+    assert opened.run(TIME) == pytest.approx(5.0)
+    assert opened.run(camera) == pytest.approx(before)
+    assert opened.run("Robofish.replays[0].tracks[1].shown") is False
+    left, width = opened.run(
+        "[document.querySelector('.rf-now').getBoundingClientRect().left -"
+        " document.querySelector('.u-over').getBoundingClientRect().left,"
+        " document.querySelector('.u-over').clientWidth]"
+    )
+    assert left == pytest.approx(0.5 * width, abs=3.0)
+
+
+def test_nothing_covers_the_bar_when_everything_is_unfolded(opened):
+    opened.run("document.querySelectorAll('details').forEach(d => { d.open = true; })")
+    opened.run(DRAWN)
+    top, bottom = opened.run(
+        "[document.querySelector('.rf-bar').getBoundingClientRect().top,"
+        " document.querySelector('.rf-view').getBoundingClientRect().bottom]"
+    )
+    assert top >= bottom
+
+
 def test_another_run_can_be_chosen(opened):
     opened.run(
         "(() => { const s = document.querySelector('.rf-run select'); s.value = 1;"

@@ -48,6 +48,8 @@ Robofish.Plots = class {
       width: Math.max(this.holder.clientWidth, 200),
       height: Robofish.PLOT_HEIGHT,
       padding: [6, 18, 0, 0],
+      // Places are known only once a plot is drawn, which is later than it is made.
+      hooks: { draw: [() => this.update()] },
       legend: { show: false },
       cursor: { y: false, drag: { x: false, y: false }, sync: { key: "rf" }, points: { show: false } },
       scales: {

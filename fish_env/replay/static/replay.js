@@ -98,6 +98,7 @@ Robofish.Replay = class {
     if (!again) {
       this.clock.play(false);
       this.index = index;
+      this.parts.groups.value = String(index);
       this.tracks = packed.tracks.map((track) => new Robofish.Track(track));
       this.specs = this.specs ? this.sameChoice(packed.plots) : packed.plots.map((p) => ({ ...p }));
     }

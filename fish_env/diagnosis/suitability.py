@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -86,26 +87,47 @@ def _check_amount(dataset: Dataset) -> None:
             )
 
 
-ASTONISHING, MANY = 6.0, 4.0
-"""Prior standard deviations that one coefficient, and the root mean square of all, may move."""
+ASTONISHING = 6.0
+"""Prior standard deviations beyond which a refitted coefficient asks for another explanation."""
 
 
-def another_fish(prior_sds_off: Sequence[float]) -> str | None:
-    """A doubt to voice where a refit moved the coefficients further than the priors allow.
+def doubts(answer: Mapping[str, Any]) -> list[str]:
+    """Doubts to voice beside a verdict: signs that the parameter file is of another fish.
 
-    Data cannot tell for sure that the parameter file is of another fish: a wrong mass or size
-    comes out as coefficients that are all off at once.
+    Data cannot tell that for sure. A wrong geometry comes out as coefficients far from what was
+    known of them, and a wrong mass as an added mass that is the same in every direction.
 
     Args:
-        prior_sds_off: how far each refitted coefficient is from its nominal value, in standard
-            deviations of its prior.
+        answer: the content of ``diagnosis.json``.
     """
-    off = np.abs(np.asarray(prior_sds_off, dtype=np.float64))
-    far = int(np.sum(off > ASTONISHING))
-    if not off.size or (far < 2 and np.sqrt(np.mean(off**2)) < MANY):
-        return None
+    found = [_far_coefficients(answer["parameters"]), _mass_in_disguise(answer["causes"])]
+    return [doubt for doubt in found if doubt]
+
+
+def _far_coefficients(parameters: Sequence[Mapping[str, Any]]) -> str:
+    far = [p for p in parameters if abs(p["prior_sds_off"]) > ASTONISHING]
+    if not far:
+        return ""
+    far.sort(key=lambda p: -abs(p["prior_sds_off"]))
+    named = ", ".join(
+        f"{p['name'].removeprefix('parameter:')} by {abs(p['prior_sds_off']):.0f}" for p in far[:3]
+    )
     return (
-        f"The refit moved coefficients by up to {off.max():.0f} prior standard deviations "
-        f"({far} by more than {ASTONISHING:.0f}). Perhaps the parameter file is of another fish, "
-        "or mass, size or block were changed since: check `fish` in dataset.yaml, or give --fish."
+        "The refit moved coefficients much further than their priors allow, in standard deviations "
+        f"{named}. Perhaps the parameter file is of another fish, or the fish was rebuilt: check "
+        "`fish` in dataset.yaml, or give --fish."
+    )
+
+
+def _mass_in_disguise(causes: Sequence[Mapping[str, Any]]) -> str:
+    added = next((c["parameters"] for c in causes if c["name"] == "added_mass"), None)
+    if added is None:
+        return ""
+    lows, highs = zip(*(added[axis]["ci95"] for axis in ("surge", "sway", "heave")), strict=True)
+    if max(lows) >= min(highs) or max(lows) <= 0.0:
+        return ""
+    return (
+        f"An added mass that may be the same in every direction, {max(lows):.2g} to "
+        f"{min(highs):.2g} kg, is also what a fish heavier by as much looks like: weigh it, and "
+        "check mass.total and mass.buoyancy in its file."
     )

@@ -11,7 +11,8 @@ import pytest
 
 from fish_env.cli import main
 from fish_env.data import load_dataset
-from fish_env.diagnosis.suitability import another_fish, check_runs
+from fish_env.diagnosis import diagnose
+from fish_env.diagnosis.suitability import check_runs, doubts
 from fish_env.errors import DatasetError
 from fish_env.params import load_fish, save_fish
 from tests.diagnosis.pool import Pool, pool
@@ -334,34 +335,51 @@ def test_poor_data_of_a_sound_model_name_no_cause(name, tmp_path, capsys):
 
 
 @pytest.mark.slow
-def test_the_file_of_another_fish_is_not_blamed_on_one_cause(tmp_path, capsys):
-    """A third less mass, buoyancy and inertia: no effect of the catalogue is that."""
-    fish = load_fish("zheng-2021-a")
-    light = fish.replace({path: 0.66 * fish.get(path) for path in
-                          ("mass.total", "mass.buoyancy", "inertia.rest[2]")})  # fmt: skip
+@pytest.mark.parametrize(
+    ("factor", "paths"),
+    [
+        (0.66, ("mass.total", "mass.buoyancy", *(f"inertia.rest[{i}]" for i in range(3)))),
+        (0.5, ("tail.center_of_pressure",)),
+    ],
+)
+def test_the_file_of_another_fish_raises_a_doubt(factor, paths, tmp_path):
     data = pool()
-    data.description["fish"] = "light.yaml"
-    folder, out = data.write(tmp_path / "data"), tmp_path / "out"
-    save_fish(light, folder / "light.yaml")
-    status, err = robofish(capsys, "diagnose", str(folder), "--out", str(out), "--quick")
-    assert "Traceback" not in err
-    if status == 2:
-        assert "fish" in err
-        return
-    answer = json.loads((out / "diagnosis.json").read_text())
-    assert answer["verdict"] in ("parameters", "outside_library", "ambiguous", "not_excited")
-    assert another_fish([p["prior_sds_off"] for p in answer["parameters"]])
+    data.description["fish"] = "other.yaml"
+    folder = data.write(tmp_path / "data")
+    fish = load_fish("zheng-2021-a")
+    save_fish(
+        fish.replace({path: factor * fish.get(path) for path in paths}), folder / "other.yaml"
+    )
+    answer = diagnose(folder, quick=True)
+    assert answer["verdict"] not in ("no_misfit", "not_excited")
+    assert doubts(answer)
+
+
+def answer_of(off=(), surge=(0.1, 0.3), sway=(1.0, 1.4)):
+    masses = {"surge": surge, "sway": sway, "heave": (0.2, 1.2)}
+    parameters = {axis: {"ci95": list(interval)} for axis, interval in masses.items()}
+    return {
+        "causes": [{"name": "added_mass", "parameters": parameters}],
+        "parameters": [
+            {"name": f"parameter:c{i}", "prior_sds_off": value} for i, value in enumerate(off)
+        ],
+    }
 
 
 @pytest.mark.parametrize(
-    ("off", "doubtful"),
-    [([], False), ([0.5, -1.0, 2.0], False), ([6.5, 0.1, 0.2], False), ([8.0, -7.0, 0.0], True),
-     ([5.0, 4.5, -5.0], True)],
-)  # fmt: skip
-def test_a_doubt_is_voiced_when_everything_moves(off, doubtful):
-    said = another_fish(off)
-    assert (said is not None) is doubtful
-    assert not doubtful or "another fish" in said
+    ("answer", "expected"),
+    [
+        (answer_of(), []),
+        (answer_of([0.5, -1.0, 4.0]), []),
+        (answer_of([0.5, -7.0]), ["c1 by 7"]),
+        (answer_of(surge=(0.5, 0.8), sway=(0.6, 0.9)), ["0.6 to 0.8 kg"]),
+        (answer_of(surge=(-0.2, 0.2), sway=(-0.2, 0.2)), []),
+    ],
+)
+def test_doubts_are_voiced_when_they_should_be(answer, expected):
+    said = doubts(answer)
+    assert len(said) == len(expected)
+    assert all(words in doubt for words, doubt in zip(expected, said, strict=True))
 
 
 def test_each_check_is_what_refuses(tmp_path, monkeypatch):

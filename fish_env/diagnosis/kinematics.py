@@ -17,12 +17,16 @@ from scipy import sparse
 from scipy.interpolate import CubicSpline
 
 from fish_env.data.schema import Run
+from fish_env.data.vocabulary import COMMANDS
 
 FloatArray = npt.NDArray[np.float64]
 ANGLES, RATES = ("roll", "pitch", "yaw"), ("p", "q", "r")
+_BLOCK = [i for i, name in enumerate(COMMANDS) if name.startswith("block_")]
 POSITIONS, VELOCITIES = ("x", "y", "z"), ("u", "v", "w")
 LONGEST_BRIDGE = 3.5
 """Usual sample intervals. Across a longer gap nothing is integrated."""
+MOST_JERKED = 0.3
+"""Share of the increments that may be left out because the block moves."""
 CHUNK, MEMORY = 60, 24
 """Samples that are integrated at a time, and how many beside them a spline takes into account."""
 FEWEST_SAMPLES = 5
@@ -122,7 +126,7 @@ class Relation:
         if min(len(times) for times, _ in pairs) < FEWEST_SAMPLES:
             return None
         (t_out, outputs), (t_in, inputs), (t_angle, angles) = pairs
-        keep = _bridged(t_out, t_in)
+        keep = _bridged(t_out, t_in) & _unjerked(run, t_out)
         if not keep.any():
             return None
         integral = integrator(t_in, t_out, run.commands.times_s)
@@ -203,6 +207,19 @@ def _bridged(t_out: FloatArray, t_in: FloatArray) -> npt.NDArray[np.bool_]:
         inside &= (t_out[1:] <= t_in[gap]) | (t_out[:-1] >= t_in[gap + 1])
     whole: npt.NDArray[np.bool_] = inside & short
     return whole
+
+
+def _unjerked(run: Run, t_out: FloatArray) -> npt.NDArray[np.bool_]:
+    """Increments away from moves of the block, whose reaction makes rates leap between samples.
+
+    All of them if it moves so often that too few would be left.
+    """
+    moves = np.any(np.diff(run.commands.values[:, _BLOCK], axis=0) != 0.0, axis=1)
+    step = float(np.median(np.diff(t_out)))
+    keep = np.ones(len(t_out) - 1, bool)
+    for at in run.commands.times_s[1:][moves]:
+        keep &= (t_out[1:] < at - 0.5 * step) | (t_out[:-1] > at + 2.5 * step)
+    return keep if keep.mean() > 1.0 - MOST_JERKED else np.ones_like(keep)
 
 
 def integrator(t_in: FloatArray, t_out: FloatArray, breaks: FloatArray) -> sparse.csr_array:

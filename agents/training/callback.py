@@ -52,6 +52,10 @@ class Between(BaseCallback):
         self._now()
         self._rollout_from = self._cpu
 
+    def _on_training_start(self) -> None:
+        if self.config.imitate.rounds and not self.progress.evaluations:
+            self.evaluate()
+
     def _on_rollout_start(self) -> None:
         self._count()
         self.progress.steps = self.num_timesteps

@@ -10,7 +10,7 @@ from typing import Any
 
 import yaml
 
-from agents.controllers.pid import GAIN_NAMES
+from agents.controllers.pid import GAIN_NAMES, LARGEST_EXTRA_SPEED
 from agents.evaluation.suites import load_suite
 from agents.policies.files import ACTIONS
 from agents.policies.history import HistorySpec
@@ -123,20 +123,28 @@ class Sac:
 
 @dataclass(frozen=True)
 class Imitation:
-    """Before learning: fit the policy to the PID controller (PPO).
+    """Before learning: fit the policy to a teacher, see :mod:`agents.training.teacher` (PPO).
 
     Attributes:
-        rounds: episodes that all fish swim for it, the first by the controller; 0: none.
+        rounds: episodes that all fish swim for it, the first by the teacher; 0: none.
         epochs: passes through what was collected, after each round.
-        gains: gains of the controller that differ from those it comes with.
+        lead_s: how far the teacher looks ahead of the goal depth's rate (s).
+        hurry: speed beyond the goal where the teacher is short of force (m/s).
+        saving: speed below the goal elsewhere (m/s).
+        gains: gains of the teacher that differ from those of the PID controller.
     """
 
     rounds: int = 0
     epochs: int = 8
+    lead_s: float = 0.0
+    hurry: float = LARGEST_EXTRA_SPEED
+    saving: float = 0.0
     gains: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         _check(self.rounds >= 0 and self.epochs > 0, "imitate: rounds >= 0 and epochs > 0")
+        least = min(self.lead_s, self.hurry, self.saving)
+        _check(least >= 0.0, "imitate: lead_s, hurry and saving must not be negative")
         for name, value in self.gains.items():
             known = ", ".join(GAIN_NAMES)
             _check(name in GAIN_NAMES, f"imitate.gains: unknown gain '{name}'; known: {known}")

@@ -1,14 +1,14 @@
-"""Begins a training from the PID controller instead of from nothing.
+"""Begins a training from a teacher instead of from nothing.
 
-Rounds as in DAgger (Ross, Gordon and Bagnell 2011): the learner swims, the controller, which sees
-the same observations, says what it would have done, and the network is fitted to all that was said
-so far. The first round is swum by the controller. In the end the value network is fitted to the
+Rounds as in DAgger (Ross, Gordon and Bagnell 2011): the learner swims, the teacher, which knows the
+true state, says what it would have done, and the network is fitted to all that was said so far. The
+first round is swum by the teacher. In the end the value network is fitted to the
 returns of the last round, so that the first updates do not spoil what was learnt.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,9 +17,9 @@ import torch
 from stable_baselines3 import PPO
 from torch import nn
 
-from agents.controllers.pid import PIDController, tuned_gains
 from agents.training.config import Imitation, TrainConfig
 from agents.training.stack import Stack
+from agents.training.teacher import Teacher
 from fish_env.envs.layout import OBSERVATION
 from fish_env.envs.registration import MAX_EPISODE_STEPS
 
@@ -37,7 +37,7 @@ class Swim:
 
     Attributes:
         seen: (T, N, n) what the policy sees, not normalised.
-        wanted: (T, N, 5) what the controller would have done.
+        wanted: (T, N, 5) what the teacher would have done.
         reward: (T, N) normalised as the learner's.
         ended: (T, N).
     """
@@ -49,13 +49,13 @@ class Swim:
 
 
 def imitate(model: PPO, stack: Stack, config: TrainConfig, settings: Imitation) -> None:
-    """Fits policy and values of a learner that knows nothing yet to the PID controller."""
+    """Fits policy and values of a learner that knows nothing yet to a teacher."""
     rng = np.random.default_rng(config.seed)
     outside: Any = stack.outside
-    teacher = PIDController(replace(tuned_gains(), **settings.gains))
+    teacher = Teacher(stack.fish.parts, settings)
     swims: list[Swim] = []
     for round_ in range(settings.rounds):
-        swims.append(_swim(model, stack, teacher, rng, by_controller=round_ == 0))
+        swims.append(_swim(model, stack, teacher, rng, by_teacher=round_ == 0))
         seen = np.concatenate([_rows(swim.seen) for swim in swims])
         wanted = np.concatenate([_rows(swim.wanted) for swim in swims])
         _fit(model, _policy, outside.normalize_obs(seen), wanted, settings.epochs)
@@ -68,7 +68,7 @@ def imitate(model: PPO, stack: Stack, config: TrainConfig, settings: Imitation) 
 
 
 def _swim(
-    model: PPO, stack: Stack, teacher: PIDController, rng: np.random.Generator, by_controller: bool
+    model: PPO, stack: Stack, teacher: Teacher, rng: np.random.Generator, by_teacher: bool
 ) -> Swim:
     outside: Any = stack.outside
     normal = outside.reset()
@@ -77,7 +77,7 @@ def _swim(
     for _ in range(MAX_EPISODE_STEPS - 1):
         seen = outside.get_original_obs()
         wanted = teacher.act(seen[:, : len(OBSERVATION)])
-        action = wanted if by_controller else model.predict(normal, deterministic=True)[0]
+        action = wanted if by_teacher else model.predict(normal, deterministic=True)[0]
         action = np.clip(action + NOISE * rng.standard_normal(action.shape), -1.0, 1.0)
         normal, reward, ended, _ = outside.step(action.astype(np.float32))
         rows.append((seen, wanted, reward, ended))
@@ -108,9 +108,11 @@ def _values(policy: Any, inputs: torch.Tensor) -> Any:
 def _fit(model: PPO, output: Any, seen: np.ndarray, wanted: np.ndarray, epochs: int) -> None:
     inputs, targets = torch.as_tensor(seen), torch.as_tensor(wanted)
     optimiser = torch.optim.Adam(model.policy.parameters(), lr=STEP_SIZE)
+    slower = torch.optim.lr_scheduler.LinearLR(optimiser, 1.0, 1.0 / epochs, epochs)
     for _ in range(epochs):
         for rows in torch.split(torch.randperm(len(inputs)), BATCH):
             loss = nn.functional.mse_loss(output(model.policy, inputs[rows]), targets[rows])
             optimiser.zero_grad()
             loss.backward()  # type: ignore[no-untyped-call]
             optimiser.step()
+        slower.step()

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from agents.controllers import PIDController
+from agents.evaluation.suites import load_suite
 from agents.policies import PretrainedPolicy
 from agents.policies.export import export_policy
 from agents.training.config import Evaluation, Imitation, TrainConfig
 from agents.training.imitation import Swim, _returns, imitate
 from agents.training.model import make_model
 from agents.training.stack import make_stack, seed_episodes
+from agents.training.teacher import HurryingPID, true_observations
 from agents.training.trial import try_policy
 from fish_env.errors import ConfigError
 
@@ -53,3 +55,26 @@ def test_values_are_fitted_to_discounted_returns():
     ended = np.array([[False], [True], [False]])
     swim = Swim(np.zeros((3, 1, 1)), np.zeros((3, 1, 5)), reward, ended)
     np.testing.assert_allclose(_returns(swim, 0.5)[:, 0], [1.5, 1.0, 1.0])
+
+
+@pytest.mark.parametrize("suite", ["calm", "noisy"])
+def test_the_teacher_sees_what_sensors_show_without_noise_and_delay(suite):
+    env = load_suite(suite).make("track", 8, 1)
+    observations, _ = env.reset(seed=3)
+    rng = np.random.default_rng(0)
+    for _ in range(30):
+        observations, *_ = env.step(rng.uniform(-1.0, 1.0, (8, 5)).astype(np.float32))
+    exact = np.allclose(true_observations(observations, env.batch), observations, atol=1e-6)
+    assert exact == (suite == "calm")
+
+
+def test_the_teacher_hurries_in_a_turn_and_saves_speed_otherwise():
+    swift, plain = HurryingPID(0.015, 0.003), HurryingPID(0.0, 0.0)
+    frequency = {}
+    for name, error in (("on course", 0.0), ("in a turn", 1.0)):
+        seen = np.zeros((1, 33))
+        seen[0, [4, 6]], seen[0, [5, 7]] = np.sin(error), np.cos(error)
+        seen[0, [10, 12, 14, 15]] = 1.0, 1.0, 1.0, 0.5
+        frequency[name] = [pid.act(seen)[0, 2] for pid in (swift, plain)]
+    assert frequency["on course"][0] < frequency["on course"][1]
+    assert frequency["in a turn"][0] > frequency["in a turn"][1]

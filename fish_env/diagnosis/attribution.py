@@ -7,13 +7,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fish_env.diagnosis.adequacy import strains
 from fish_env.diagnosis.causes import Cause
 from fish_env.diagnosis.screening import Screen, Signal, screen
-from fish_env.diagnosis.search import Explanation, refits, score, second_look, without
+from fish_env.diagnosis.search import (
+    Explanation,
+    loosened,
+    refits,
+    score,
+    second_look,
+    without,
+)
 from fish_env.identification.estimator import Fit
 from fish_env.identification.problem import Problem
 
 MOST_CAUSES = 3
+MOST_LOOSE = 4
 DOUBT = 6.0
 """Difference of scores (-2 log likelihood, penalised) that decides nothing."""
 
@@ -71,8 +80,9 @@ def attribute(
     ranking: tuple[tuple[str, float], ...] = ()
     rough, total = 0.0, 0.0
     while len(current.causes) < MOST_CAUSES and not rivals:
-        chosen = shortlisted(problem, screens[-1], shortlist)
-        tried, base = refits(current, chosen, report)
+        chosen = shortlisted(problem, screens[-1], shortlist, rough * total)
+        loose = _with_wandering_phase(current, chosen, causes, rng)
+        tried, base = refits(current, chosen, report, loose)
         if base is None:
             break
         if not ranking:
@@ -82,14 +92,15 @@ def attribute(
             break
         total += gain
         after = screen(tried[0].fit, causes, rng)
-        if shortlisted(problem, after, 1):
+        rough = max(ACCURACY.get(name, 0.0) ** 2 for name in tried[0].causes)
+        if shortlisted(problem, after, 1, rough * total):
             again = second_look(current, tried, [*chosen, *_new(after, chosen)], report)
             if again[0] is not tried[0]:
                 after = screen(again[0].fit, causes, rng)
             tried = again
         current = best = tried[0]
-        screens.append(after)
         rough = max(ACCURACY.get(name, 0.0) ** 2 for name in best.causes)
+        screens.append(after)
         rivals = tuple(
             e
             for e in tried[1:]
@@ -100,6 +111,21 @@ def attribute(
     return Attribution(
         Explanation((), baseline), tuple(screens), current, rivals, ranking, tolerated
     )
+
+
+def _with_wandering_phase(
+    current: Explanation,
+    chosen: Sequence[Signal],
+    causes: Sequence[Cause],
+    rng: np.random.Generator,
+) -> tuple[Fit, Sequence[Signal]] | None:
+    """What shows when the tail's phase may wander: asked where no plausible disturbance is left."""
+    if not chosen or not strains(current.fit):
+        return None
+    loose = loosened(current)
+    shown = screen(loose, causes, rng)
+    leading = [s for s in shown.best() if s.p_value < shown.threshold and s.cause.is_effect]
+    return loose, leading[:MOST_LOOSE]
 
 
 def _new(after: Screen, chosen: Sequence[Signal]) -> list[Signal]:
@@ -118,14 +144,14 @@ def pruned(problem: Problem, current: Explanation) -> Explanation:
     return current
 
 
-def shortlisted(problem: Problem, screen: Screen, count: int) -> list[Signal]:
+def shortlisted(problem: Problem, screen: Screen, count: int, least: float = 0.0) -> list[Signal]:
     """The most significant causes, and among the others those known to look like the first.
 
     Effects and coefficients are two lists: what the tests of the two make of a large misfit does
     not compare. A strong effect is screened far from where it is, so its place among its like
     means little.
     """
-    leading = [s for s in screen.best() if s.p_value < screen.threshold]
+    leading = [s for s in screen.best() if s.p_value < screen.threshold and s.statistic >= least]
     effects = [s for s in leading if s.cause.is_effect]
     coefficients = [s for s in leading if not s.cause.is_effect]
     first = problem.known.get(effects[0].cause.name) if effects else None

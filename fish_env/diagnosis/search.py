@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,8 @@ from fish_env.identification.sketch import Sketch, Sketcher
 
 FloatArray = npt.NDArray[np.float64]
 Report = Callable[[str], None]
+WANDER = 0.3
+"""rad/s^0.5. Enough to stay in step with a beat that is a tenth off."""
 FAR = 2.0
 """A baseline coefficient this many prior deviations off may be so to make up for a cause."""
 FINALISTS = 4
@@ -46,8 +48,24 @@ def score(problem: Problem, explanation: Explanation) -> float:
     return own.objective + added * float(np.log(problem.samples))
 
 
+def loosened(current: Explanation) -> Fit:
+    """The fit on a few runs when the tail's phase may wander from its command.
+
+    A beat a little quicker or slower than commanded is soon out of step, and every slope along
+    the simulation is then wrong. A filter that lets the phase go follows the beat, and what drives
+    the phase away becomes plain; what only shifts it, as a delay does, is hidden instead.
+    """
+    own = current.fit
+    noise = replace(own.noise, phase_sd=WANDER)
+    few = own.problem.subset(3)
+    return fit(few, own.effects, own.point, noise, own.released, rounds=2)
+
+
 def refits(
-    current: Explanation, chosen: Sequence[Signal], report: Report
+    current: Explanation,
+    chosen: Sequence[Signal],
+    report: Report,
+    loose: tuple[Fit, Sequence[Signal]] | None = None,
 ) -> tuple[list[Explanation], Explanation | None]:
     """Fits with one more cause each, best first, and the present one under the best one's noise.
 
@@ -58,14 +76,21 @@ def refits(
         current: causes accepted so far.
         chosen: causes to add.
         report: told what is being done.
+        loose: fit with a wandering phase, and what it shows to be missing.
     """
     base = current.fit
     sketcher = Sketcher(base)
     sketches = []
+    wandering, shown = loose or (base, ())
+    for signal in shown:
+        report(f"trying {signal.cause.name} with a wandering phase")
+        first = _sketches(Sketcher(wandering), base, signal, starts(wandering, signal))
+        for _, found in first:
+            sketches += _sketches(sketcher, base, signal, [found.point])
     for signal in chosen:
         report(f"trying {signal.cause.name}")
         sketches += _sketches(sketcher, base, signal, starts(base, signal))
-    finalists = _finalists(_improved(sketcher, sketches, base.noise), sketcher.base(), BEHIND)
+    finalists = _finalists(sketches, sketcher.base(), BEHIND)
     if not finalists:
         return [], None
     name, sketch = finalists[0]
@@ -91,7 +116,7 @@ def second_look(
         report: told what is being done.
     """
     best = tried[0].fit
-    sketcher = Sketcher(best, kept=current.fit.effects)
+    sketcher = Sketcher(best)
     done = {e.causes[-1] for e in tried}
     sketches = []
     for signal in chosen:
@@ -99,7 +124,7 @@ def second_look(
             report(f"trying {signal.cause.name} again")
             begin = starts(current.fit, signal, best.point.z)
             sketches += _sketches(sketcher, current.fit, signal, begin)
-    finalists = _finalists(_improved(sketcher, sketches, best.noise), sketcher.base(), 0.0)
+    finalists = _finalists(sketches, sketcher.base(), 0.0)
     finalists = [f for f in finalists if f[1].objective < sketcher.base() + LEEWAY]
     more = _rest(current, finalists, best, report)
     return _best_first([*tried, *more])[0]
@@ -131,20 +156,6 @@ def _sketches(
         return []
 
 
-def _improved(
-    sketcher: Sketcher, sketches: list[tuple[str, Sketch]], noise: NoiseModel
-) -> list[tuple[str, Sketch]]:
-    """The leading sketches with some steps that compute every slope."""
-    better = []
-    for name, sketch in _finalists(sketches, sketcher.base(), 2.0 * BEHIND):
-        own = fit(
-            sketcher.few, sketch.effects, sketch.point, noise, sketch.released, refit_noise=False,
-            iterations=4, tolerance=0.5,
-        )  # fmt: skip
-        better.append((name, Sketch(own.effects, own.released, own.point, own.objective)))
-    return better
-
-
 def starts(base: Fit, signal: Signal, z: FloatArray | None = None) -> list[Point]:
     """Where to begin: the linear estimate and every probe, with baselines near and far.
 
@@ -161,16 +172,23 @@ def starts(base: Fit, signal: Signal, z: FloatArray | None = None) -> list[Point
         for path, value in effect_values(problem, cause.name, probe).items():
             finite = np.isfinite(neutral[path])
             linear[path] = linear[path] + factor * (value - neutral[path]) if finite else value
-    probes = [effect_values(problem, cause.name, p) for p in cause.probes[signal.probe]]
     bounds = {f.path: (f.lower, f.upper) for f in problem.freedoms([cause.name])}
     clipped = [
         {path: float(np.clip(value, *bounds[path])) for path, value in values.items()}
-        for values in (linear, *probes)
+        for values in (linear, *_probed(problem, signal))
     ]
     far = np.abs(base.point.z).max() > FAR
     near = (base.point.z, np.zeros_like(base.point.z)) if far else (base.point.z,)
     baselines = near if z is None else (z,)
     return [Point(z, {**base.point.effects, **values}) for z in baselines for values in clipped]
+
+
+def _probed(problem: Problem, signal: Signal) -> list[dict[str, float]]:
+    """Settings to begin from: of the best shape at every size, or of every alternative."""
+    cause = signal.cause
+    shaped = any(p.shapes for p in problem.known[cause.name].parameters)
+    alternatives = (cause.probes[signal.probe],) if shaped else cause.probes
+    return [effect_values(problem, cause.name, p) for probes in alternatives for p in probes]
 
 
 def _finalists(
@@ -180,6 +198,8 @@ def _finalists(
     if not sketches:
         return []
     ranked = sorted(sketches, key=lambda s: s[1].objective)
+    first = {name: i for i, (name, _) in reversed(list(enumerate(ranked)))}
+    ranked = [ranked[i] for i in sorted(first.values())]  # a cause may have several
     best = ranked[0][1].objective
     margin = max(LEEWAY, behind * (base - best))
     return [s for s in ranked[:FINALISTS] if s[1].objective <= best + margin]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
@@ -18,10 +18,6 @@ from fish_env.identification.problem import Point, Problem
 from fish_env.identification.products import inner
 
 FloatArray = npt.NDArray[np.float64]
-WANDERS = (1e-3, 0.03, 0.3)
-"""Where the search for the wandering of the tail's phase begins (rad/s^0.5)."""
-SURE_PHASE = 3e-3
-"""Wandering too small to matter (rad/s^0.5)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +100,7 @@ def fit(
     for round_ in range(rounds if refit_noise else 1):
         problem = settle_phases(problem, free.unpack(vector), noise)
         report(f"fitting parameters, round {round_ + 1}")
-        vector, filtered = _gauss_newton(problem, free, vector, noise, iterations, tolerance)
+        vector, value, filtered = gauss_newton(problem, free, vector, noise, iterations, tolerance)
         if not refit_noise:
             break
         report(f"fitting the noise, round {round_ + 1}")
@@ -116,15 +112,30 @@ def fit(
     return _finish(problem, free, names, tuple(released), vector, noise, value, filtered)
 
 
-def _gauss_newton(
+def gauss_newton(
     problem: Problem,
     free: Free,
     vector: FloatArray,
     noise: NoiseModel,
     iterations: int,
     tolerance: float,
-) -> tuple[FloatArray, list[Filtered]]:
-    """Gauss-Newton steps with the noise model held."""
+) -> tuple[FloatArray, float, list[Filtered]]:
+    """Gauss-Newton steps with the noise model held.
+
+    Args:
+        problem: the problem.
+        free: its free parameters.
+        vector: (n,) where to begin.
+        noise: noise model.
+        iterations: most steps.
+        tolerance: stop when no parameter moves by more of its standard deviation.
+
+    Returns:
+        The vector reached, the objective there, and the filter results.
+
+    Raises:
+        LinAlgError: the simulation diverges where the steps begin.
+    """
     value, filtered = objective(problem, free, vector, noise)
     if not np.isfinite(value):
         raise np.linalg.LinAlgError("the simulation diverges at the start of the fit")
@@ -142,7 +153,7 @@ def _gauss_newton(
                 break
         if settled:
             break
-    return vector, filtered
+    return vector, value, filtered
 
 
 def _settled(before: NoiseModel, after: NoiseModel, share: float = 0.1) -> bool:
@@ -151,7 +162,6 @@ def _settled(before: NoiseModel, after: NoiseModel, share: float = 0.1) -> bool:
         (before.force_sd, after.force_sd),
         (before.moment_sd, after.moment_sd),
         (before.correlation_s, after.correlation_s),
-        (max(before.phase_sd, SURE_PHASE), max(after.phase_sd, SURE_PHASE)),
     ]
     return all(abs(np.log(b / a)) < share for a, b in pairs)
 
@@ -179,8 +189,8 @@ def default_noise(problem: Problem) -> NoiseModel:
 def _noise_at(problem: Problem, point: Point, noise: NoiseModel, final: bool) -> NoiseModel:
     """Noise model of largest likelihood at a point, from at most four runs.
 
-    The search starts from the likeliest of the present one, small and large ones, so that a
-    disturbance which once stood in for a misfit does not stay.
+    The search starts from the present one and from a small disturbance, so that a disturbance
+    which once stood in for a misfit does not stay.
     """
     few = problem.subset(4)
     within = disturbance_range(problem.fish)
@@ -188,9 +198,8 @@ def _noise_at(problem: Problem, point: Point, noise: NoiseModel, final: bool) ->
     for _ in range(3):
         filtered, made_with = few.filtered(point, found, keep_slopes=True), found
         replay = partial(few.filter_for(point.effects).replay, filtered, made_with)
-        small = NoiseModel(found.sensor_sd, 3e-3, 1e-4, 1.0)
-        starts = [replace(n, phase_sd=p) for n in (found, small) for p in WANDERS]
-        start = max((found, *starts), key=replay)
+        small = NoiseModel(found.sensor_sd, 3e-3, 1e-4, 1.0, found.phase_sd)
+        start = max((found, small), key=replay)
         found = fit_noise(replay, start, within, 45, problem.sensor_sd if final else None)
         if _settled(made_with, found, 0.4):
             break

@@ -167,33 +167,19 @@ def linearise(
     noise: NoiseModel,
     filtered: Sequence[Filtered],
 ) -> Linearised:
-    """Residuals and slopes by one batch of filter lanes."""
-    residuals, slopes = slopes_of(problem, free, vector, noise, filtered, range(len(vector)))
-    channels = len(problem.channels)
-    run_of = np.repeat(np.arange(len(problem.runs)), [run.measured.size for run in problem.runs])
-    time_of = np.concatenate([np.repeat(run.clock, channels) for run in problem.runs])
-    return Linearised(residuals, slopes, run_of, time_of)
-
-
-def slopes_of(
-    problem: Problem,
-    free: Free,
-    vector: FloatArray,
-    noise: NoiseModel,
-    filtered: Sequence[Filtered],
-    chosen: Sequence[int],
-) -> tuple[FloatArray, FloatArray]:
-    """Residuals (D,) and their slopes (D, m) by some of the parameters.
+    """Residuals and slopes by one batch of filter lanes.
 
     A parameter that cannot be moved without the simulation diverging gets no slope: it stays.
     """
     lanes, steps = free.lanes(vector)
-    lanes = lanes[:, [0, *(1 + i for i in chosen)]]
     effects = {f.path: lanes[free.count + i] for i, f in enumerate(free.freedoms)}
     innovations = problem.innovations(lanes[: free.count], effects, noise, filtered)
-    slopes = (innovations[1:] - innovations[0]).T / steps[list(chosen)]
+    slopes = (innovations[1:] - innovations[0]).T / steps
     slopes[:, ~np.all(np.abs(slopes) < LARGEST_SLOPE, axis=0)] = 0.0
-    return innovations[0], slopes
+    channels = len(problem.channels)
+    run_of = np.repeat(np.arange(len(problem.runs)), [run.measured.size for run in problem.runs])
+    time_of = np.concatenate([np.repeat(run.clock, channels) for run in problem.runs])
+    return Linearised(innovations[0], slopes, run_of, time_of)
 
 
 def objective(

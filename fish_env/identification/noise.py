@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
 from math import comb
@@ -71,20 +71,16 @@ class DisturbanceRange:
         force: smallest and largest standard deviation (N).
         moment: of the moment (N m).
         correlation: shortest and longest correlation time (s).
-        phase: least and most that the tail's phase wanders in a second (rad/s^0.5).
     """
 
     force: tuple[float, float]
     moment: tuple[float, float]
     correlation: tuple[float, float]
-    phase: tuple[float, float] = (1e-4, 1.0)
 
-    def nearest(self, sensor_sd: FloatArray, values: Sequence[float]) -> NoiseModel:
-        """The noise model with the nearest values within."""
-        bounds = (self.force, self.moment, self.correlation, self.phase)
-        return NoiseModel(
-            sensor_sd, *(float(np.clip(v, *b)) for v, b in zip(values, bounds, strict=True))
-        )
+    def nearest(self, force: float, moment: float, correlation: float) -> tuple[float, ...]:
+        """The nearest values within."""
+        pairs = ((force, self.force), (moment, self.moment), (correlation, self.correlation))
+        return tuple(float(np.clip(value, *bounds)) for value, bounds in pairs)
 
 
 def disturbance_range(fish: FishParams) -> DisturbanceRange:
@@ -110,22 +106,22 @@ def fit_noise(
 
     Args:
         log_likelihood: of a noise model, the parameters of the fish being fixed.
-        start: first guess.
+        start: first guess; its wandering of the phase is kept.
         within: what the disturbance may be.
-        evaluations: effort for the four numbers of the disturbance.
+        evaluations: effort for the three numbers of the disturbance.
         largest_sensor_sd: (C,) bound on each channel's noise; the noise is then fitted too.
             Without it the sensors keep theirs: a misfit of the model must not pass for noise.
     """
 
     def model(x: FloatArray, sensor: FloatArray) -> NoiseModel:
-        return within.nearest(sensor, np.exp(x).tolist())
+        force, moment, correlation = within.nearest(*np.exp(x))
+        return NoiseModel(sensor, force, moment, correlation, start.phase_sd)
 
     def start_of(noise: NoiseModel) -> FloatArray:
-        phase = max(noise.phase_sd, within.phase[0])
-        return np.log([noise.force_sd, noise.moment_sd, noise.correlation_s, phase])
+        return np.log([noise.force_sd, noise.moment_sd, noise.correlation_s])
 
     def disturbance(noise: NoiseModel, effort: int) -> NoiseModel:
-        simplex = start_of(noise) + np.vstack([np.zeros(4), 0.7 * np.eye(4)])
+        simplex = start_of(noise) + np.vstack([np.zeros(3), 0.7 * np.eye(3)])
         found = minimize(
             lambda x: -log_likelihood(model(x, noise.sensor_sd)),
             start_of(noise),

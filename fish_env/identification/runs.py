@@ -25,6 +25,11 @@ CHANNEL_CODES = {
 POSITION, ROTATION, VELOCITY, RATE, PHASE = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), 18
 
 
+UNTOLD_S = 0.15
+"""A record does not say what a servo was told before it begins, and a late one still follows that:
+of a run from rest, the first samples judge nothing (s)."""
+
+
 @dataclass(frozen=True, eq=False)
 class RunData:
     """One run, ready for the filter.
@@ -85,6 +90,8 @@ def prepare_run(
     substeps = np.maximum(1, np.ceil(spans / dt - 1e-9)).astype(np.int64)
     measured = np.column_stack([run.channels[name] for name in channels])
     state0, covariance0 = _initial(run, channels, measured, clock, noise_sd)
+    if run.start == "rest":
+        measured[clock < UNTOLD_S] = np.nan
     return RunData(
         run.id,
         run.condition,
@@ -108,7 +115,8 @@ def _initial(
 ) -> tuple[FloatArray, FloatArray]:
     """Initial state and its spread: level and at rest, or a local line through the first samples.
 
-    At rest the first measured pose is off by the sensor noise only. An unknown start takes value
+    At rest the first measured pose is off by the sensor noise only; the velocities have the spread
+    that a first stroke gives in a tenth of a second. An unknown start takes value
     and slope of each channel over the first 0.6 s; a channel that is not measured starts at zero
     with a spread that covers a swimming fish.
     """
@@ -129,7 +137,7 @@ def _initial(
         spread[i] = 2.0 * noise.get(name, wide[name])
     if rest:
         spread[3:5] = np.minimum(spread[3:5], 0.02)
-        spread[VELOCITY], spread[RATE] = 0.003, 0.01
+        spread[VELOCITY], spread[RATE] = 0.02, 0.2
     else:
         ground = np.array([first.get(n, (0.0, 0.0))[1] for n in ("x", "y", "z")])
         state[7:10] = _into_body(euler, ground)

@@ -1,0 +1,77 @@
+"""How far chance carries the adequacy test when the disturbance is not of the kind it assumes.
+
+The filter takes a disturbance to forget exponentially. Gusts, swell and 1/f noise leave colour in
+its residuals, and a test that counts on white ones then asks for forces that are not there. For
+made-up measurements without any effect, under disturbances of four colours, the smallest p-value
+is set against the threshold for white residuals; the margin in `fish_env/diagnosis/adequacy.py`
+is the quantile of their ratio that `LEVEL` asks for. Cases are numbered from 1000 on, so that none
+of them is one that judges.
+
+    python scripts/calibrate_adequacy.py --cases 60
+"""
+
+from __future__ import annotations
+
+import argparse
+import datetime
+import json
+import os
+import sys
+import tempfile
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "ROBOFISH_THREADS"):
+    os.environ.setdefault(variable, "1")
+
+import numpy as np  # noqa: E402
+from rich.progress import track  # noqa: E402
+
+from fish_env.data import load_dataset  # noqa: E402
+from fish_env.data.schema import Dataset  # noqa: E402
+from fish_env.diagnosis.adequacy import strongest_alarm  # noqa: E402
+from fish_env.identification.estimator import fit  # noqa: E402
+from fish_env.identification.problem import Problem  # noqa: E402
+from tests.hidden.cases import make_case  # noqa: E402
+
+FIRST = 1000
+LEVELS = (0.8, 0.9, 0.95, 0.98)
+
+
+def ratio(seed: int) -> dict[str, object]:
+    """Smallest log p-value of a case over the threshold for white residuals."""
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place) / "data"
+        truth = make_case("null_strong", seed, folder)
+        dataset = load_dataset(folder)
+        assert isinstance(dataset, Dataset)
+        fitted = fit(Problem(dataset, None, dataset.ids[:6]), rounds=2)
+        smallest, threshold = strongest_alarm(fitted, np.random.default_rng(seed))
+    return {"seed": seed, **truth.disturbance, "ratio": smallest / threshold}
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--cases", type=int, default=60)
+    parser.add_argument("--processes", type=int, default=2)
+    parser.add_argument("--out", type=Path, default=ROOT / "results")
+    options = parser.parse_args(arguments)
+    with ProcessPoolExecutor(options.processes) as pool:
+        jobs = pool.map(ratio, range(FIRST, FIRST + options.cases))
+        rows = list(track(jobs, f"{options.cases} cases", total=options.cases))
+    ratios = np.array([row["ratio"] for row in rows], float)
+    quantiles = {str(level): float(np.quantile(ratios, level)) for level in LEVELS}
+    today = datetime.date.today().isoformat()
+    content = {"date": today, "quantiles": quantiles, "cases": rows}
+    options.out.mkdir(parents=True, exist_ok=True)
+    file = options.out / f"adequacy-{today}.json"
+    file.write_text(json.dumps(content, indent=1), encoding="utf-8")
+    for level, value in quantiles.items():
+        print(f"{level}: {value:.2f}")
+
+
+if __name__ == "__main__":
+    main()

@@ -9,14 +9,13 @@ before the common ones are solved for (separable least squares: Golub and Pereyr
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
-from fish_env.data.schema import Dataset, Run
 from fish_env.data.vocabulary import COMMANDS
 from fish_env.effects.extended import PREFIX, build_model
 from fish_env.effects.registry import catalogue
@@ -25,137 +24,22 @@ from fish_env.model.frames import euler_from_quaternion, quaternion_from_euler
 from fish_env.model.runtime import Grid
 from fish_env.model.state import BASE_STATES
 from fish_env.params.schema import FishParams
+from fish_env.studies.least_squares import bounded_step, without
+from fish_env.studies.tracks import CHANNELS, FREQUENCY, Track, Weights
 
 FloatArray = npt.NDArray[np.float64]
-CHANNELS = ("x", "y", "yaw")
 START = ("x", "y", "yaw", "u", "v", "r", "phase", "pace")
-"""Free numbers of a run: pose (m, rad), velocities (m/s, rad/s), tail phase (rad), and the
-tail frequency over the commanded one."""
+"""Free numbers of a run: pose (m, rad), velocities (m/s, rad/s), tail phase (rad), and the tail's
+frequency over the commanded one."""
 START_UNITS = np.array([2e-3, 2e-3, 0.02, 5e-3, 5e-3, 0.05, 0.3, 0.01])
 START_PRIOR = np.array([np.inf, np.inf, np.inf, 0.03, 0.02, 0.3, np.inf, 0.02])
-"""One sigma of what is known of them beforehand, from nominal start."""
-FREQUENCY = tuple(COMMANDS).index("tail_frequency")
+"""One sigma of what is known of them beforehand, around :attr:`Track.start`."""
+PHASE_AT, PACE = START.index("phase"), START.index("pace")
 PHASE = BASE_STATES.index("tail_phase")
 Z_STEP = 0.05
 PHASES = 8
-PACES = np.linspace(0.8, 1.2, 401)
 LOST = 1e3
 """m or rad. Error of a simulation that diverged."""
-
-
-@dataclass(frozen=True)
-class Weights:
-    """How far a run may stray from a perfect model.
-
-    Attributes:
-        position_sd, angle_sd: of the camera, m and rad.
-        speed_sd, rate_sd: of speed (m/s) and yaw rate (rad/s) errors.
-        memory_s: time after which such an error is forgotten.
-    """
-
-    position_sd: float = 0.0012
-    angle_sd: float = 0.02
-    speed_sd: float = 0.003
-    rate_sd: float = 0.02
-    memory_s: float = 3.0
-
-    def whitening(self, time_s: FloatArray, angle: bool) -> FloatArray:
-        """Matrix that makes errors at these times white, shape (n, n)."""
-        slow = self.rate_sd if angle else self.speed_sd
-        quick = self.angle_sd if angle else self.position_sd
-        covariance = slow**2 * integrated_ou(time_s, self.memory_s)
-        covariance += quick**2 * np.eye(len(time_s))
-        return np.asarray(np.linalg.inv(np.linalg.cholesky(covariance)))
-
-
-def integrated_ou(time_s: FloatArray, memory_s: float) -> FloatArray:
-    """Covariance of the integral from 0 of a unit process with exponential memory, (n, n)."""
-    early = np.minimum(time_s[:, None], time_s)
-    late = np.maximum(time_s[:, None], time_s)
-    m = memory_s
-    return np.asarray(
-        2.0 * m * early
-        + m**2 * (np.exp(-early / m) + np.exp(-late / m) - 1.0 - np.exp(-(late - early) / m))
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class Track:
-    """A measured run as the fit reads it.
-
-    Attributes:
-        id, condition: of the run.
-        time_s: from the first sample, shape (n,).
-        measured: x, y, unwrapped yaw, shape (n, 3), NaN where missing.
-        command: shape (5,).
-    """
-
-    id: str
-    condition: str
-    time_s: FloatArray
-    measured: FloatArray
-    command: FloatArray
-
-    def until(self, end_s: float) -> Track:
-        """The beginning of the run."""
-        kept = self.time_s <= end_s
-        return replace(self, time_s=self.time_s[kept], measured=self.measured[kept])
-
-    @cached_property
-    def pace(self) -> float:
-        """Tail frequency over the commanded one: that of the yaw's swaying."""
-        if self.command[FREQUENCY] * self.time_s[-1] < 2.0:
-            return 1.0
-        span = 2.0 * self.time_s / self.time_s[-1] - 1.0
-        slow = np.polynomial.legendre.legvander(span, min(8, 3 + int(self.time_s[-1] // 3.0)))
-        return float(min(PACES, key=lambda pace: self._left(slow, self.measured[:, 2], pace)))
-
-    def _left(self, slow: FloatArray, values: FloatArray, pace: float) -> float:
-        """Sum of squares beyond slow functions and a sine of this pace."""
-        beat = 2.0 * np.pi * self.command[FREQUENCY] * pace * self.time_s
-        basis = np.column_stack([slow, np.sin(beat), np.cos(beat)])
-        good = np.isfinite(values)
-        found = np.linalg.lstsq(basis[good], values[good], rcond=None)[0]
-        return float(np.sum((values[good] - basis[good] @ found) ** 2))
-
-    @cached_property
-    def start(self) -> FloatArray:
-        """Pose, velocity and yaw rate by lines through the first seconds; tail phase unknown."""
-        early = (self.time_s <= 2.0) & np.isfinite(self.measured).all(axis=1)
-        time = self.time_s[early]
-        beat = 2.0 * np.pi * self.command[FREQUENCY] * self.pace * time
-        basis = np.column_stack([np.ones_like(time), time, np.sin(beat), np.cos(beat)])
-        found = np.linalg.lstsq(basis, self.measured[early], rcond=None)[0]
-        (x, y, yaw), (vx, vy, rate) = found[0], found[1]
-        along = vx * np.cos(yaw) + vy * np.sin(yaw)
-        return np.array([x, y, yaw, max(along, 0.0), 0.0, rate, 0.0, self.pace])
-
-
-def track_of(run: Run) -> Track:
-    """A run with constant commands.
-
-    Raises:
-        ValueError: the commands change.
-    """
-    if len(run.commands.values) > 1:
-        raise ValueError(f"run {run.id}: whole runs are fitted under constant commands")
-    measured = np.column_stack([run.channels[name] for name in CHANNELS])
-    measured[:, 2] = np.unwrap(measured[:, 2])
-    time = run.time_s - run.time_s[0]
-    return Track(run.id, run.condition or run.id, time, measured, run.commands.values[0])
-
-
-def tracks_of(dataset: Dataset) -> tuple[Track, ...]:
-    """All runs of a dataset."""
-    return tuple(track_of(run) for run in dataset.runs)
-
-
-@dataclass(frozen=True, eq=False)
-class Values:
-    """Common numbers: coefficients in units of their prior, and effects."""
-
-    z: FloatArray
-    effects: Mapping[str, float]
 
 
 @dataclass(frozen=True)
@@ -210,6 +94,13 @@ class WholeRuns:
         effects = [e.neutral + e.sd * x[count + i] for i, e in enumerate(self.effects)]
         return np.concatenate([self.baseline.values(x[:count]), *(e[None] for e in effects)])
 
+    @property
+    def physical_bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Of the common free numbers in their own units, each (size,)."""
+        low, high = self.baseline.bounds
+        effects = self.effects
+        return np.r_[low, [e.lower for e in effects]], np.r_[high, [e.upper for e in effects]]
+
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Of normalised numbers, each (size,)."""
         baseline = self.baseline
@@ -234,7 +125,7 @@ class WholeRuns:
         changes = {p: v for p, v in values.items() if p not in self.sensing}
         record = np.ascontiguousarray(self.model.records(changes))
         inputs = np.repeat(track.command[:, None], count, axis=1)
-        inputs[FREQUENCY] *= starts[7]
+        inputs[FREQUENCY] *= starts[PACE]
         state = self._state(starts)
         self.model.kernels.initialise(state, inputs, record, np.zeros(count))
         steps = int(np.ceil(track.time_s[-1] / self.dt)) + 1
@@ -269,7 +160,7 @@ class WholeRuns:
         return state
 
     def _at(self, trace: FloatArray, time_s: FloatArray) -> FloatArray:
-        """Samples between physics steps, by the slope at both (cubic Hermite would be overkill)."""
+        """Samples between physics steps, linearly."""
         row = np.minimum((time_s / self.dt).astype(int), len(trace) - 2)
         share = (time_s / self.dt - row)[:, None]
         yaw = np.unwrap(euler_from_quaternion(np.moveaxis(trace[:, 3:7], 1, -1))[..., 2], axis=0)
@@ -363,7 +254,7 @@ def settle_phases(
     least = np.full(len(tracks), np.inf)
     for phase in np.arange(PHASES) * 2.0 * np.pi / PHASES:
         starts = np.array([t.start for t in tracks])
-        starts[:, 6] = phase
+        starts[:, PHASE_AT] = phase
         for _ in range(3):
             now = _Sum(model, tracks, white, x, starts)
             starts = now.step(1e-3, False)[1]
@@ -426,12 +317,12 @@ class _Sum:
         if common:
             left, right = np.eye(size) * (1.0 + damping), -self.x
             for residual, slopes, mine in self.parts:
-                kept = _without(mine, np.column_stack([slopes, residual]))
+                kept = without(mine, np.column_stack([slopes, residual]))
                 own = slopes.T @ kept[:, :-1]
                 left = left + own + damping * np.diag(np.diag(own))
                 right = right - slopes.T @ kept[:, -1]
             lower, upper = self.model.bounds()
-            move = _bounded_step(left, right, lower - self.x, upper - self.x)
+            move = bounded_step(left, right, lower - self.x, upper - self.x)
         starts = self.starts.copy()
         for i, (residual, slopes, mine) in enumerate(self.parts):
             rest = residual + slopes @ move
@@ -444,14 +335,14 @@ class _Sum:
         """Of the common numbers, priors included."""
         total = np.eye(self.model.size)
         for _, slopes, mine in self.parts:
-            total = total + slopes.T @ _without(mine, slopes)
+            total = total + slopes.T @ without(mine, slopes)
         return total
 
     def gradients(self) -> FloatArray:
         """Contribution of each run to the gradient of the common numbers."""
         return np.array(
             [
-                slopes.T @ _without(mine, residual[:, None])[:, 0]
+                slopes.T @ without(mine, residual[:, None])[:, 0]
                 for residual, slopes, mine in self.parts
             ]
         )
@@ -464,25 +355,29 @@ def _usual(track: Track) -> FloatArray:
     return usual
 
 
-def _without(mine: FloatArray, columns: FloatArray) -> FloatArray:
-    """Columns less what a run's own numbers can follow."""
-    basis, triangle = np.linalg.qr(mine)
-    basis = basis[:, np.abs(np.diag(triangle)) > 1e-10]
-    return np.asarray(columns - basis @ (basis.T @ columns))
-
-
-def _bounded_step(
-    left: FloatArray, right: FloatArray, lower: FloatArray, upper: FloatArray
+def predict(
+    model: WholeRuns, x: FloatArray, track: Track, weights: Weights, pace: float, first_s: float
 ) -> FloatArray:
-    """Solution of a quadratic problem within bounds, by holding what hits one."""
-    free = np.ones(len(right), bool)
-    move = np.zeros(len(right))
-    for _ in range(len(right)):
-        rest = right[free] - left[np.ix_(free, ~free)] @ move[~free]
-        move[free] = np.linalg.solve(left[np.ix_(free, free)], rest)
-        out = free & ((move < lower) | (move > upper))
-        if not out.any():
-            break
-        move[out] = np.clip(move[out], lower[out], upper[out])
-        free &= ~out
-    return move
+    """A run from start to end, of which only the beginning is known, shape (samples, 3).
+
+    Args:
+        model: the model.
+        x: its normalised common numbers.
+        track: the run; its commands and times are used throughout.
+        weights: of the errors of the beginning, by which the start is fitted.
+        pace: tail frequency over the commanded one.
+        first_s: how long a beginning is known.
+    """
+    early = track.until(first_s)
+    white = [weights.whitening(early.time_s, angle) for angle in (False, False, True)]
+    found = []
+    for phase in np.arange(PHASES) * 2.0 * np.pi / PHASES:
+        starts = early.start[None].copy()
+        starts[:, PHASE_AT], starts[:, PACE] = phase, pace
+        for _ in range(4):
+            starts = _Sum(model, [early], [white], x, starts).step(1e-3, False)[1]
+            starts[:, PACE] = pace
+        reached = _Sum(model, [early], [white], x, starts, slopes=False)
+        found.append((reached.objective, starts))
+    best = min(found, key=lambda pair: pair[0])[1]
+    return np.asarray(model.roll(track, x[:, None], best.T)[0])

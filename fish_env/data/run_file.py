@@ -14,6 +14,8 @@ from fish_env.data.units import Unit
 from fish_env.data.vocabulary import COMMANDS, FILE_CHANNELS, QUATERNION
 
 POSITION = ("x", "y", "z", "depth")
+LONG_GAP = 1.8
+"""Usual sample intervals. In a longer one a row is missing."""
 DEPTH_TOLERANCE = 0.05
 """m. Two sensors of one depth may differ by their offsets, but not by more."""
 
@@ -46,7 +48,12 @@ def read_run(description: Description, entry: RunEntry) -> tuple[Run, tuple[str,
     channels, depth_notes = depth_to_z(channels, table)
     steps = CommandSteps(time, commands)
     run = Run(entry.id, time, channels, steps, entry.start, phase, entry.condition)
-    return run, (*note_ignored(table, used), *depth_notes)
+    notes = (
+        *note_ignored(table, used),
+        *depth_notes,
+        *note_late_commands(steps, time, table.place),
+    )
+    return run, notes
 
 
 def read_time(table: Table) -> FloatArray:
@@ -65,6 +72,19 @@ def read_time(table: Table) -> FloatArray:
             "make two runs of it",
         )
     return time
+
+
+def note_late_commands(steps: CommandSteps, time: FloatArray, place: Place) -> tuple[str, ...]:
+    """Words a note if commands change after a gap: a lost row takes its command with it."""
+    switches = np.searchsorted(time, steps.times_s[1:])
+    gaps = np.diff(time)
+    late = int(np.sum(gaps[switches - 1] > LONG_GAP * np.median(gaps)))
+    if not late:
+        return ()
+    return (
+        f"{place}: {late} of {len(switches)} changes of command follow a gap, and may really have "
+        "come earlier; keep the rows in which a command changes, their channels may be empty",
+    )
 
 
 def check_turning_channels(

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from fish_env.cli import main
-from fish_env.data import load_dataset
+from fish_env.data import COMMANDS, load_dataset
 from fish_env.diagnosis import diagnose
 from fish_env.diagnosis.suitability import check_runs, doubts
 from fish_env.errors import DatasetError
@@ -286,6 +286,8 @@ def dropped(share: float, whole: bool) -> Spoil:
             lost = rng.random(len(columns["t"])) < share
             lost[[0, -1]] = False
             if whole:
+                # A row in which a command changes takes the command with it.
+                lost &= ~np.any([np.diff(columns[c], prepend=columns[c][0]) for c in COMMANDS], 0)
                 data.runs[id] = {name: values[~lost] for name, values in columns.items()}
                 continue
             for name in data.description["channels"]:
@@ -322,7 +324,7 @@ def test_merely_poor_data_are_not_refused(name, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["empty cells", "lost rows", "gap"])
+@pytest.mark.parametrize("name", ["empty cells", "lost rows"])
 def test_poor_data_of_a_sound_model_name_no_cause(name, tmp_path, capsys):
     data = pool()
     POOR[name](data)
@@ -335,14 +337,10 @@ def test_poor_data_of_a_sound_model_name_no_cause(name, tmp_path, capsys):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("factor", "paths"),
-    [
-        (0.66, ("mass.total", "mass.buoyancy", *(f"inertia.rest[{i}]" for i in range(3)))),
-        (0.5, ("tail.center_of_pressure",)),
-    ],
-)
-def test_the_file_of_another_fish_raises_a_doubt(factor, paths, tmp_path):
+def test_the_file_of_a_lighter_fish_raises_a_doubt(tmp_path):
+    """A third of the mass is missing from the file, which an added mass explains as well."""
+    factor = 0.66
+    paths = ("mass.total", "mass.buoyancy", *(f"inertia.rest[{i}]" for i in range(3)))
     data = pool()
     data.description["fish"] = "other.yaml"
     folder = data.write(tmp_path / "data")

@@ -84,6 +84,16 @@ def test_undeclared_columns_and_unlisted_files_are_noted(tmp_path):
     assert all(word in notes[1] for word in ("r01.csv", "run r01", "column z", "ignored"))
 
 
+def test_a_command_that_changes_after_a_gap_is_noted(tmp_path):
+    rows = [f"{t / 10},0.{t},0.5,0.1,0.2,0.3,{1 + (t > 6)}.0,0.0,0.0" for t in range(12)]
+    header = RUN.splitlines()[0]
+    whole = "\n".join([header, *rows]) + "\n"
+    assert load_runs(good_folder(tmp_path, whole)).notes == ()
+    lost = "\n".join([header, *rows[:6], *rows[8:]]) + "\n"
+    (note,) = load_runs(good_folder(tmp_path, lost)).notes
+    assert "1 of 1 changes of command follow a gap" in note
+
+
 def test_runs_that_were_copied_cut_or_moved_in_time_are_found():
     rng = np.random.default_rng(0)
     time, values = np.arange(100) / 10.0, rng.normal(0.0, 1.0, (3, 100))

@@ -32,9 +32,9 @@ AGENTS = ("pid", "mppi", "pretrained")
 SOURCES = {
     "pid": ("agents/controllers/pid.py", "agents/controllers/seen.py", "configs/controllers"),
     "mppi": ("agents/controllers/mppi.py", "agents/controllers/prediction.py"),
-    "pretrained": ("agents/pretrained", "agents/policies"),
+    "pretrained": ("agents/pretrained/*/*.npz",),
 }
-"""What an agent's numbers depend on."""
+"""What an agent's numbers depend on: files, folders, patterns."""
 
 
 def fingerprint(agent: str, suite: str) -> str:
@@ -42,11 +42,18 @@ def fingerprint(agent: str, suite: str) -> str:
     places = (*SOURCES[agent], f"configs/benchmarks/{suite}.yaml", "agents/evaluation/metrics.py")
     digest = hashlib.sha256()
     for place in places:
-        path = ROOT / place
-        for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
+        pattern = f"{place}/**/*" if (ROOT / place).is_dir() else place
+        for file in sorted(ROOT.glob(pattern)):
             if file.is_file() and file.suffix not in (".pyc", ".md"):
                 digest.update(file.read_bytes())
     return digest.hexdigest()[:12]
+
+
+def fingerprints(agents: Sequence[str]) -> dict[str, dict[str, str]]:
+    """Agent -> suite -> fingerprint."""
+    return {
+        agent: {suite: fingerprint(agent, suite) for suite in suite_names()} for agent in agents
+    }
 
 
 def measured(agents: Sequence[str], work: Path, console: Console) -> Iterator[Result]:
@@ -108,7 +115,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     console.print(json.dumps(times, indent=1))
     today = datetime.date.today().isoformat()
     more = {"date": today, "machine": machine(), "decision_times": times}
-    write_results(options.out, results, **more)
+    write_results(options.out, results, fingerprints=fingerprints(agents), **more)
     console.print(f"written: {options.out}")
 
 

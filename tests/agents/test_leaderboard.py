@@ -15,7 +15,7 @@ from fish_env import cli
 from fish_env.envs.registration import ENV_ID
 from fish_env.envs.tasks import TASKS
 from fish_env.errors import ConfigError
-from scripts import agents_report
+from scripts import agents_report, benchmark_agents
 
 
 def result(agent: str, suite: str, task: str, level: float, seeds: int = 1) -> Result:
@@ -71,6 +71,20 @@ def test_the_shipped_results_are_of_the_suites_as_they_are():
     for agent in {r.agent for r in results}:
         measured = {(r.suite, r.task) for r in results if r.agent == agent}
         assert measured == {(suite, task) for suite in of_now for task in TASKS}
+
+
+def test_the_shipped_results_are_of_the_agents_as_they_are():
+    measured = json.loads(SHIPPED.read_text(encoding="utf-8"))["fingerprints"]
+    assert measured == benchmark_agents.fingerprints(list(measured)), "run make benchmark-agents"
+    assert set(measured) == {r.agent for r in read_results(SHIPPED)}
+
+
+def test_a_fingerprint_changes_with_the_agent(monkeypatch):
+    before = benchmark_agents.fingerprint("pid", "calm")
+    assert before != benchmark_agents.fingerprint("pid", "hard")
+    places = (*benchmark_agents.SOURCES["pid"], "pyproject.toml")
+    monkeypatch.setitem(benchmark_agents.SOURCES, "pid", places)
+    assert before != benchmark_agents.fingerprint("pid", "calm")
 
 
 def test_without_results_the_pages_say_so(tmp_path):

@@ -42,7 +42,7 @@ OUT = Path(__file__).resolve().parents[1] / "configs" / "fish" / f"{NAME}.yaml"
 MODELS: dict[str, tuple[str, ...]] = {
     "with four effects": EFFECTS,
     "coefficients alone": (),
-    "with wake_fraction, tail_gain": EFFECTS[:2],
+    "without tail_reactive": EFFECTS[:3],
     "four effects and tail_bias": (*EFFECTS, "tail_bias.offset"),
 }
 """Models that are compared; the one with `EFFECTS` is written."""
@@ -59,13 +59,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     rows: dict[str, dict[str, float]] = {}
     kept: dict[str, list[RunError]] = {}
     first = fitted((), tracks, None)
+    second = fitted(EFFECTS[:3], tracks, first)
     nominal = WholeRuns(load_fish("msu-tail-fish"), PATHS)
     kept["starting values"] = errors_of(nominal, np.zeros(nominal.size), tracks, 1.0)
     for label, effects in MODELS.items():
         if options.quick and effects != EFFECTS:
             continue
         console.print(f"{label} ...")
-        whole = fitted(effects, tracks, first)
+        whole = fitted(effects, tracks, second if len(effects) > 3 else first)
         kept[label] = leave_out(whole.model, tracks, whole, console.print)
         if effects == EFFECTS:
             source = f"identified from {len(tracks)} runs of msu-tail-fish over their whole length"
@@ -98,15 +99,17 @@ def read(folder: Path) -> tuple[Track, ...]:
 
 
 def fitted(effects: tuple[str, ...], tracks: Sequence[Track], near: RunFit | None) -> RunFit:
-    """A fit of the coefficients and some effects to all runs, from a simpler fit."""
+    """A fit of the coefficients and some effects to all runs, from a simpler fit.
+
+    There is more than one optimum. Coefficients fitted without the effects have gone far to make
+    up for them, so half of that is taken back; from a fit with effects they go on as they are.
+    """
     model = WholeRuns(load_fish("msu-tail-fish"), PATHS, effects)
-    x = np.zeros(model.size)
     if near is None:
-        near = fit_runs(model, tracks, FORGIVING[0], x, None, STEPS)
-        x = near.x
-    else:
-        x[: len(PATHS)] = 0.5 * near.x[: len(PATHS)]
-        x[len(PATHS) :] = [0.3 if e.neutral <= e.lower else 0.0 for e in model.effects]
+        near = fit_runs(model, tracks, FORGIVING[0], np.zeros(model.size), None, STEPS)
+    share = 1.0 if near.model.effects or not effects else 0.5
+    known = dict(zip(near.model.names, share * near.x, strict=True))
+    x = np.array([known.get(name, 0.3) for name in model.names])
     near = fit_runs(model, tracks, FORGIVING[1], x, near.starts, STEPS)
     return fit_runs(model, tracks, WEIGHTS, near.x, near.starts, STEPS)
 

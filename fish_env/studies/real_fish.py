@@ -45,8 +45,8 @@ behind would let the fish sink, unseen by a camera overhead, and so find another
 EFFECTS = (
     "wake_fraction.fraction",
     "tail_gain.gain",
-    "tail_reactive.scale",
     "linear_drag.sway",
+    "tail_reactive.scale",
 )
 """Effects of the model that predicted conditions left out best."""
 WEIGHTS = Weights(

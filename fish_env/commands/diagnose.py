@@ -67,6 +67,8 @@ def print_answer(console: Console, answer: dict[str, Any]) -> None:
     if experiment["separates"]:
         aim = ", ".join(experiment["separates"])
         console.print(f"next experiment: {experiment['manoeuvre']}, to see {aim}", highlight=False)
+    for doubt in answer.get("doubts", ()):
+        console.print(f"doubt: {escape(doubt)}", highlight=False)
     for note in answer["notes"]:
         console.print(f"note: {note}", style="dim", highlight=False)
 

@@ -14,6 +14,7 @@ from fish_env.diagnosis.causes import PARAMETER
 from fish_env.diagnosis.gain import Gain, Pair
 from fish_env.diagnosis.preconditions import Precondition
 from fish_env.diagnosis.regimes import as_plain
+from fish_env.diagnosis.suitability import doubts
 from fish_env.effects.extended import PREFIX
 from fish_env.identification.estimator import Fit
 
@@ -32,7 +33,7 @@ def as_dict(diagnosis: Diagnosis) -> Plain:
         for rival in diagnosis.attribution.rivals
         if rival.causes in verdict.alternatives
     ]
-    return {
+    answer = {
         "format": FORMAT,
         "dataset": diagnosis.dataset.name,
         "fish": diagnosis.problem.fish.name,
@@ -53,8 +54,10 @@ def as_dict(diagnosis: Diagnosis) -> Plain:
         "localisation": as_plain(diagnosis.localisation),
         "unexplained": [] if diagnosis.adequacy.reached else _unexplained(diagnosis),
         "next_experiment": _experiment(diagnosis),
+        "strained": list(diagnosis.adequacy.strained),
         "notes": list(diagnosis.dataset.notes),
     }
+    return {**answer, "doubts": doubts(answer)}
 
 
 def _cause(fit: Fit, name: str) -> Plain:
@@ -139,7 +142,7 @@ def _precondition(p: Precondition) -> Plain:
 def _unexplained(diagnosis: Diagnosis) -> list[Plain]:
     """Forces the data still ask for, over and above the best explanation."""
     return [
-        {"depends_on": m.function, "direction": m.direction, "rms": m.size, "log_p": m.log_p}
+        {"depends_on": m.function, "direction": m.direction, "rms": float(m.size), "log_p": m.log_p}
         for m in diagnosis.adequacy.misfits
     ]
 

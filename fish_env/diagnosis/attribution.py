@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fish_env.diagnosis.adequacy import strains
-from fish_env.diagnosis.causes import Cause
+from fish_env.diagnosis.causes import Cause, same
 from fish_env.diagnosis.screening import Screen, Signal, screen
 from fish_env.diagnosis.search import (
     Explanation,
@@ -104,7 +104,9 @@ def attribute(
         rivals = tuple(
             e
             for e in tried[1:]
-            if alike(problem, best, e) and explained_away(e.causes[-1], screens[-2], screens[-1])
+            if alike(problem, best, e)
+            and not same(best.causes[-1], e.causes[-1])
+            and explained_away(e.causes[-1], screens[-2], screens[-1])
         )
     current = pruned(problem, current)
     tolerated = rough * total

@@ -14,6 +14,11 @@ from fish_env.model.effect import Effect, EffectParameter
 
 Probe = Mapping[str, float]
 PARAMETER = "parameter:"
+EQUAL = {
+    "buoyancy_offset": ("mass.buoyancy",),
+    "com_offset": tuple(f"mass.static_moment_rest[{axis}]" for axis in range(3)),
+}
+"""Effects that do exactly what other values of baseline coefficients do: no rivals, two words."""
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Sizes tried between small and large."""
 
@@ -126,3 +131,9 @@ def effect_values(problem: Problem, name: str, probe: Probe) -> dict[str, float]
     """A probe as paths of the problem."""
     neutral = problem.known[name].neutral
     return {f"{PREFIX}{name}.{key}": probe.get(key, value) for key, value in neutral.items()}
+
+
+def same(cause: str, other: str) -> bool:
+    """Whether two causes say the same in other words: an effect, and coefficients it stands for."""
+    pairs = ((cause, other), (other, cause))
+    return any(b.removeprefix(PARAMETER) in EQUAL.get(a, ()) for a, b in pairs)

@@ -87,7 +87,7 @@ def _check_amount(dataset: Dataset) -> None:
             )
 
 
-ASTONISHING = 6.0
+ASTONISHING = 4.9
 """Prior standard deviations beyond which a refitted coefficient asks for another explanation."""
 
 

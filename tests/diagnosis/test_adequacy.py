@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from fish_env.diagnosis.adequacy import adequacy, regressors
+from fish_env.identification.filtering import NoiseModel
 from fish_env.identification.free import Linearised
+from fish_env.params import load_fish
 from tests.diagnosis.linear import Sized
 
 SAMPLES = 400
@@ -34,6 +36,7 @@ class Answering:
 
     def __init__(self, run, residuals):
         self.runs, self.residuals, self.baseline = (run,), residuals, Sized(())
+        self.fish = load_fish("zheng-2021-a")
 
     def innovations(self, z, effects, noise, filtered, pushes):
         out = np.tile(self.residuals, (len(pushes.column), 1)).reshape(-1, SAMPLES, 6)
@@ -43,7 +46,10 @@ class Answering:
         return out.reshape(len(out), -1)
 
 
-def fit_with(missing, seed=0):
+QUIET = NoiseModel(np.ones(6), 3e-3, 1e-4, 1.0)
+
+
+def fit_with(missing, seed=0, noise=QUIET):
     """A fit whose residuals hold noise and a missing wrench: (function, channel, size)."""
     rng = np.random.default_rng(seed)
     run, filtered = swimming(np.random.default_rng(1))
@@ -56,7 +62,7 @@ def fit_with(missing, seed=0):
                      np.repeat(run.clock, 6))  # fmt: skip
     problem = Answering(run, flat)
     return SimpleNamespace(
-        problem=problem, filtered=[filtered], linearised=lin, released=(), noise=None,
+        problem=problem, filtered=[filtered], linearised=lin, released=(), noise=noise,
         point=SimpleNamespace(z=np.zeros(0), effects={}),
     )  # fmt: skip
 
@@ -64,6 +70,19 @@ def fit_with(missing, seed=0):
 def test_noise_alone_reaches_the_floor():
     reached = [adequacy(fit_with([], seed), np.random.default_rng(0)).reached for seed in range(3)]
     assert all(reached)
+
+
+def test_a_disturbance_that_no_tank_makes_is_a_misfit():
+    strong = fit_with([], noise=NoiseModel(np.ones(6), 0.5, 1e-4, 1.0))
+    answer = adequacy(strong, np.random.default_rng(0))
+    assert not answer.reached
+    assert "force" in answer.strained[0]
+
+
+def test_an_error_of_the_simulation_may_be_tolerated():
+    missing = fit_with([("u", 0, 0.5)])
+    assert not adequacy(missing, np.random.default_rng(0)).reached
+    assert adequacy(missing, np.random.default_rng(0), tolerated=1e4).reached
 
 
 @pytest.mark.parametrize(

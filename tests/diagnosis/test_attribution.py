@@ -59,8 +59,12 @@ def test_a_simpler_explanation_is_not_beaten_by_parameters_alone():
 
 def test_what_looks_like_the_first_is_always_tried():
     names = ["servo_lag", "tether", "wave", "current", "tail_flexibility"]
-    signals = [SimpleNamespace(cause=SimpleNamespace(name=n, is_effect=True), p_value=-100.0 + i)
-               for i, n in enumerate(names)]  # fmt: skip
+    signals = [
+        SimpleNamespace(
+            cause=SimpleNamespace(name=n, is_effect=True), p_value=-100.0 + i, statistic=90.0
+        )
+        for i, n in enumerate(names)
+    ]
     problem = SimpleNamespace(known=catalogue())
     assert "tail_flexibility" in catalogue()["servo_lag"].confusable_with
     screen = SimpleNamespace(best=lambda: signals, threshold=-50.0)
@@ -68,3 +72,4 @@ def test_what_looks_like_the_first_is_always_tried():
     assert tried == ["servo_lag", "tether", "tail_flexibility"]
     nothing = SimpleNamespace(best=lambda: signals, threshold=-200.0)
     assert shortlisted(problem, nothing, 2) == []
+    assert shortlisted(problem, screen, 2, least=100.0) == []  # within the simulation's own error

@@ -16,6 +16,8 @@ from fish_env.data.schema import SteadyDataset
 from fish_env.diagnosis.gain import Gain, Pair
 from fish_env.diagnosis.next_experiment import Proposal
 from fish_env.diagnosis.preconditions import Precondition
+from fish_env.diagnosis.report import write_report
+from fish_env.diagnosis.report.steady import steady_series_from
 from fish_env.diagnosis.steady.adequacy import Adequacy, adequacy
 from fish_env.diagnosis.steady.answer import as_dict
 from fish_env.diagnosis.steady.attribution import Attribution, attribute
@@ -227,3 +229,6 @@ def _write(diagnosis: SteadyDiagnosis, answer: dict[str, Any], folder: Path) -> 
     else:
         # One of an earlier diagnosis would contradict this one.
         extended.unlink(missing_ok=True)
+    fits = diagnosis.attribution.baseline.fit, diagnosis.accepted
+    final = diagnosis.gain.runs if diagnosis.gain else ()
+    write_report(answer, steady_series_from(diagnosis.dataset, *fits, final), folder)

@@ -38,6 +38,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if options.fresh:
         for job in todo:
             job.file.unlink(missing_ok=True)
+    if options.finished:
+        todo = [job for job in todo if job.file.exists()]
     finished = track(run(todo, options.processes), f"{len(todo)} cases", total=len(todo))
     write(sorted(finished, key=lambda row: (row.tier, row.seed)), options.out, options.quick)
 
@@ -49,6 +51,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     add("--limit", type=int, help="at most this many cases")
     add("--seed0", type=int, default=0, help="number of the first case of each tier")
     add("--quick", action="store_true", help="let the diagnosis take its quick way")
+    add("--finished", action="store_true", help="only sum up the cases finished so far")
     add("--fresh", action="store_true", help="do finished cases again")
     add("--processes", type=int, default=2)
     add("--work", type=Path, default=ROOT / "out" / "benchmark-diagnosis")

@@ -93,9 +93,7 @@ def do(job: Job) -> Row:
         folder = Path(place) / "data"
         truth = make_case(job.tier, job.seed, folder)
         try:
-            answer = find(job.diagnose)(
-                folder, out=Path(place) / "out", seed=job.seed, quick=job.quick
-            )
+            answer = find(job.diagnose)(folder, seed=job.seed, quick=job.quick)
             row = score(truth, answer)
         except Exception:
             answer, row = {}, failed(truth, traceback.format_exc())

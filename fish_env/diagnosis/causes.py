@@ -19,6 +19,8 @@ EQUAL = {
     "com_offset": tuple(f"mass.static_moment_rest[{axis}]" for axis in range(3)),
 }
 """Effects that do exactly what other values of baseline coefficients do: no rivals, two words."""
+ALIKE = ({"body.plane_xz.drag.c0", "body.plane_xy.drag.c0"},)
+"""Coefficients that act alike: both planes' drags at zero incidence brake along the fish."""
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Sizes tried between small and large."""
 
@@ -134,6 +136,8 @@ def effect_values(problem: Problem, name: str, probe: Probe) -> dict[str, float]
 
 
 def same(cause: str, other: str) -> bool:
-    """Whether two causes say the same in other words: an effect, and coefficients it stands for."""
+    """Whether two causes say the same in other words."""
     pairs = ((cause, other), (other, cause))
+    if {cause.removeprefix(PARAMETER), other.removeprefix(PARAMETER)} in ALIKE:
+        return True
     return any(b.removeprefix(PARAMETER) in EQUAL.get(a, ()) for a, b in pairs)

@@ -110,8 +110,20 @@ class Projector:
         right = inner(self.lin.slopes, columns)
         return np.asarray(np.linalg.solve(self.factor.T, np.linalg.solve(self.factor, right)))
 
-    def signal(self, cause: Cause, probe: int, columns: FloatArray) -> Signal | None:
-        """Project a cause; None where nothing of it is left."""
+    def signal(
+        self, cause: Cause, probe: int, columns: FloatArray, strain: bool = True
+    ) -> Signal | None:
+        """Project a cause; None where nothing of it is left, or the simulation diverges with it.
+
+        Args:
+            cause: the cause.
+            probe: index of the alternative.
+            columns: (D, m) change of the residuals.
+            strain: whether what pulled the coefficients from their priors counts as evidence, as
+                it does for a cause that would let them return.
+        """
+        if not np.isfinite(columns).all():
+            return None
         followed = self.coefficients(columns)
         left = columns - self.lin.slopes @ followed
         projected = inner(left, left) + followed.T @ (self.prior[:, None] * followed)
@@ -119,9 +131,9 @@ class Projector:
         if np.any(np.diag(projected) < 1e-4) or np.any(energy < 1e-3):
             return None
         projected += 1e-9 * np.diag(np.diag(projected))
-        # A misfit that the coefficients follow shows in how far they left their priors.
-        pull = followed.T @ (self.prior * self.vector)
-        score = pull - left.T @ self.lin.residuals
+        score = -left.T @ self.lin.residuals
+        if strain:
+            score += followed.T @ (self.prior * self.vector)
         step = np.linalg.solve(projected, score)
         remaining = self.lin.residuals + left @ step
         inflation = self._inflation(left, remaining)

@@ -30,6 +30,9 @@ UNTOLD_S = 0.15
 of a run from rest, the first samples judge nothing (s)."""
 
 
+SAME_INSTANT_S = 1e-6
+
+
 @dataclass(frozen=True, eq=False)
 class RunData:
     """One run, ready for the filter.
@@ -85,10 +88,11 @@ def prepare_run(
     """
     if not channels:
         raise DatasetError(f"run {run.id}: none of {', '.join(CHANNEL_CODES)} is measured")
-    clock = run.time_s - run.time_s[0]
+    clock, measured = _merged(
+        run.time_s - run.time_s[0], np.column_stack([run.channels[name] for name in channels])
+    )
     spans = np.diff(clock, prepend=0.0)
     substeps = np.maximum(1, np.ceil(spans / dt - 1e-9)).astype(np.int64)
-    measured = np.column_stack([run.channels[name] for name in channels])
     state0, covariance0 = _initial(run, channels, measured, clock, noise_sd)
     if run.start == "rest":
         measured[clock < UNTOLD_S] = np.nan
@@ -104,6 +108,17 @@ def prepare_run(
         covariance0,
         run.tail_phase is not None,
     )
+
+
+def _merged(clock: FloatArray, measured: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Rows at one instant, but for rounding, made one: a command and a sample may each have one."""
+    apart = np.diff(clock, prepend=-np.inf) > SAME_INSTANT_S
+    first = np.flatnonzero(apart)
+    merged = measured[first]
+    for row in np.flatnonzero(~apart):
+        at = int(np.searchsorted(first, row, side="right")) - 1
+        merged[at] = np.where(np.isfinite(merged[at]), merged[at], measured[row])
+    return clock[first], merged
 
 
 def _initial(

@@ -8,12 +8,12 @@ from typing import Any
 from tests.hidden.truth import Truth
 
 
-def silent(folder: str | Path, out: str | Path, seed: int = 0, quick: bool = False) -> dict:
+def silent(folder: str | Path, seed: int = 0, quick: bool = False) -> dict:
     """Never sees anything."""
     return {"verdict": "no_misfit", "causes": [], "alternatives": [], "runtime_s": 0.0}
 
 
-def all_knowing(folder: str | Path, out: str | Path, seed: int = 0, quick: bool = False) -> dict:
+def all_knowing(folder: str | Path, seed: int = 0, quick: bool = False) -> dict:
     """Reads the answer that is kept beside the folder, and gives it with narrow intervals."""
     target = Path(folder)
     return perfect(Truth.load(target.parent / f"{target.name}.truth.json"))

@@ -212,7 +212,7 @@ def test_the_right_answer_scores(tier, seed):
 def test_wrong_answers_do_not():
     truth = drawn("rich", list(SIZES).index("servo_lag"))
     right = perfect(truth)
-    assert not score(truth, silent("", "")).verdict_right
+    assert not score(truth, silent("")).verdict_right
     wrong = right | {"causes": [{"name": "servo_delay", "parameters": {}}]}
     assert score(truth, wrong).wrong_single
     assert not score(truth, wrong).name_right
@@ -247,7 +247,7 @@ def test_an_equal_parameter_counts_as_the_effect():
 def test_no_misfit_on_poor_runs_must_say_what_was_not_excited():
     truth = drawn("poor")
     entry = {"name": next(iter(truth.effects))}
-    quiet = silent("", "")
+    quiet = silent("")
     assert not score(truth, quiet).verdict_right
     assert not score(truth, quiet | {"preconditions": [entry | {"excited": True}]}).verdict_right
     assert score(truth, quiet | {"preconditions": [entry | {"excited": False}]}).verdict_right
@@ -269,7 +269,7 @@ def test_rates_carry_exact_intervals():
 
 def test_a_summary_counts_each_tier_and_answer():
     rows = [
-        score(drawn(tier, seed), silent("", "")) for tier in ("rich", "null") for seed in (3, 4)
+        score(drawn(tier, seed), silent("")) for tier in ("rich", "null") for seed in (3, 4)
     ]
     summary = summarise(rows)
     assert summary["tiers"]["rich"]["name_right"]["count"] == 0

@@ -268,9 +268,7 @@ def test_rates_carry_exact_intervals():
 
 
 def test_a_summary_counts_each_tier_and_answer():
-    rows = [
-        score(drawn(tier, seed), silent("")) for tier in ("rich", "null") for seed in (3, 4)
-    ]
+    rows = [score(drawn(tier, seed), silent("")) for tier in ("rich", "null") for seed in (3, 4)]
     summary = summarise(rows)
     assert summary["tiers"]["rich"]["name_right"]["count"] == 0
     assert summary["tiers"]["null"]["name_right"]["count"] == 2

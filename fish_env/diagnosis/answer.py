@@ -11,11 +11,11 @@ import numpy as np
 
 from fish_env.diagnosis import consistency, noise_floor
 from fish_env.diagnosis.causes import PARAMETER
+from fish_env.diagnosis.entries import cause_entry, coefficient_entries
 from fish_env.diagnosis.gain import Gain, Pair
 from fish_env.diagnosis.preconditions import Precondition
 from fish_env.diagnosis.regimes import as_plain
 from fish_env.diagnosis.suitability import doubts
-from fish_env.effects.extended import PREFIX
 from fish_env.identification.estimator import Fit
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def as_dict(diagnosis: Diagnosis) -> Plain:
     """Everything that ``diagnosis.json`` holds."""
     verdict = diagnosis.verdict
     alternatives = [
-        [_cause(rival.fit, name) for name in rival.causes]
+        [cause_entry(rival.fit, name) for name in rival.causes]
         for rival in diagnosis.attribution.rivals
         if rival.causes in verdict.alternatives
     ]
@@ -41,9 +41,9 @@ def as_dict(diagnosis: Diagnosis) -> Plain:
         "quick": diagnosis.quick,
         "runtime_s": diagnosis.runtime_s,
         "verdict": verdict.name,
-        "causes": [_cause(diagnosis.accepted, name) for name in verdict.causes],
+        "causes": [cause_entry(diagnosis.accepted, name) for name in verdict.causes],
         "alternatives": alternatives,
-        "parameters": coefficients(diagnosis.accepted),
+        "parameters": coefficient_entries(diagnosis.accepted),
         "noise": _noise(diagnosis.accepted),
         "noise_floor": [noise_floor.as_dict(floor) for floor in diagnosis.floors],
         "consistency": consistency.as_dict(diagnosis.consistency),
@@ -58,42 +58,6 @@ def as_dict(diagnosis: Diagnosis) -> Plain:
         "notes": list(diagnosis.dataset.notes),
     }
     return {**answer, "doubts": doubts(answer)}
-
-
-def _cause(fit: Fit, name: str) -> Plain:
-    if name.startswith(PARAMETER):
-        path = name.removeprefix(PARAMETER)
-        unit = fit.problem.fish.info(path).unit
-        return {"name": name, "parameters": {"value": _estimate(fit, path, unit)}}
-    effect = fit.problem.known[name]
-    return {
-        "name": name,
-        "parameters": {
-            p.name: _estimate(fit, f"{PREFIX}{name}.{p.name}", p.unit) for p in effect.parameters
-        },
-    }
-
-
-def _estimate(fit: Fit, path: str, unit: str) -> Plain:
-    value = float(fit.estimates[fit.names.index(path)])
-    return {"estimate": value, "ci95": list(fit.interval(path)), "unit": unit}
-
-
-def coefficients(fit: Fit) -> list[Plain]:
-    """Every baseline coefficient: nominal, estimated, and how surprising under its prior."""
-    baseline = fit.problem.baseline
-    return [
-        {
-            "name": f"{PARAMETER}{path}",
-            "nominal": float(baseline.mean[i]),
-            "estimate": float(fit.estimates[i]),
-            "ci95": list(fit.interval(path)),
-            "prior_sd": float(baseline.sd[i]),
-            "prior_sds_off": float((fit.estimates[i] - baseline.mean[i]) / baseline.sd[i]),
-            "unit": fit.problem.fish.info(path).unit,
-        }
-        for i, path in enumerate(baseline.paths)
-    ]
 
 
 def _noise(fit: Fit) -> Plain:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from fish_env.diagnosis.adequacy import Adequacy
 from fish_env.diagnosis.attribution import Attribution
+from fish_env.diagnosis.causes import PARAMETER
 from fish_env.diagnosis.preconditions import Precondition
 
 VERDICTS = (
@@ -40,16 +41,31 @@ def decide(
 
     Adequacy comes before naming: an explanation that does not reach the floor names nothing.
     """
-    accepted = attribution.accepted
-    if not adequacy.reached:
-        return Verdict("outside_library")
-    if accepted.causes:
-        if attribution.rivals:
-            others = tuple(rival.causes for rival in attribution.rivals)
-            return Verdict("ambiguous", accepted.causes, others)
-        effects = [name for name in accepted.causes if not name.startswith("parameter:")]
-        return Verdict("cause" if effects else "parameters", accepted.causes)
     blind = sum(not p.excited for p in preconditions)
-    if preconditions and blind > len(preconditions) / 2:
-        return Verdict("not_excited")
-    return Verdict("no_misfit")
+    return verdict_of(
+        adequacy.reached,
+        attribution.accepted.causes,
+        tuple(rival.causes for rival in attribution.rivals),
+        blind > len(preconditions) / 2,
+    )
+
+
+def verdict_of(
+    reached: bool, causes: tuple[str, ...], rivals: tuple[tuple[str, ...], ...], blind: bool
+) -> Verdict:
+    """The verdict, given whether the floor is reached, what explains, and whether data are blind.
+
+    Args:
+        reached: the explanation leaves nothing but noise.
+        causes: those accepted; none where the baseline explains all.
+        rivals: other explanations that fit alike.
+        blind: the data could not have shown most causes.
+    """
+    if not reached:
+        return Verdict("outside_library")
+    if causes and rivals:
+        return Verdict("ambiguous", causes, rivals)
+    if causes:
+        effects = [name for name in causes if not name.startswith(PARAMETER)]
+        return Verdict("cause" if effects else "parameters", causes)
+    return Verdict("not_excited" if blind else "no_misfit")

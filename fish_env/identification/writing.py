@@ -6,11 +6,14 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from fish_env.effects.extended import PREFIX
 from fish_env.identification.estimator import Fit
 from fish_env.params.provenance import Posterior
 from fish_env.params.schema import FishParams
+
+FloatArray = npt.NDArray[np.float64]
 
 
 def identified_fish(fit: Fit, name: str) -> FishParams:
@@ -22,23 +25,30 @@ def identified_fish(fit: Fit, name: str) -> FishParams:
         fit: result of an identification.
         name: name of the new fish.
     """
-    values = dict(zip(fit.names, fit.estimates.tolist(), strict=True))
     source = f"identified from {fit.problem.dataset.name}, {len(fit.problem.runs)} runs"
+    posterior = posterior_of(fit.names, fit.estimates, fit.covariance, validity(fit))
+    return with_posterior(fit.problem.fish, posterior, name, source)
+
+
+def posterior_of(
+    names: tuple[str, ...], estimates: FloatArray, covariance: FloatArray, valid: dict[str, Any]
+) -> Posterior:
+    """Estimates (n,) and covariance (n, n) as a parameter file keeps them."""
+    symmetric = 0.5 * (covariance + covariance.T)
+    rows = tuple(tuple(row) for row in symmetric.tolist())
+    return Posterior(names, tuple(estimates.tolist()), rows, valid)
+
+
+def with_posterior(fish: FishParams, posterior: Posterior, name: str, source: str) -> FishParams:
+    """The fish at the posterior's estimates, under a new name, with status ``identified``."""
+    values = dict(zip(posterior.names, posterior.mean, strict=True))
     coefficients = {p: v for p, v in values.items() if not p.startswith(PREFIX)}
-    fish = fit.problem.fish.replace(coefficients, "identified", source)
-    effects = {effect: dict(known) for effect, known in fish.effects.items()}
-    for path, value in values.items():
-        if path.startswith(PREFIX):
-            effect, parameter = path.removeprefix(PREFIX).split(".")
-            effects.setdefault(effect, {})[parameter] = value
-    covariance = 0.5 * (fit.covariance + fit.covariance.T)
-    posterior = Posterior(
-        fit.names,
-        tuple(fit.estimates.tolist()),
-        tuple(tuple(row) for row in covariance.tolist()),
-        validity(fit),
-    )
-    return replace(fish, name=name, effects=effects, posterior=posterior, source_file=None)
+    moved = fish.replace(coefficients, "identified", source)
+    effects = {effect: dict(known) for effect, known in moved.effects.items()}
+    for path in [p for p in values if p.startswith(PREFIX)]:
+        effect, parameter = path.removeprefix(PREFIX).split(".")
+        effects.setdefault(effect, {})[parameter] = values[path]
+    return replace(moved, name=name, effects=effects, posterior=posterior, source_file=None)
 
 
 def validity(fit: Fit) -> dict[str, Any]:

@@ -8,14 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fish_env.diagnosis.causes import PARAMETER
+from fish_env.diagnosis.entries import cause_entry, coefficient_entries
 from fish_env.diagnosis.gain import Gain, Pair
 from fish_env.diagnosis.next_experiment import Proposal
 from fish_env.diagnosis.preconditions import Precondition
 from fish_env.diagnosis.steady.attribution import Explanation
 from fish_env.diagnosis.steady.fitting import SteadyFit
 from fish_env.diagnosis.steady.table import UNITS
-from fish_env.effects.extended import PREFIX
 
 if TYPE_CHECKING:
     from fish_env.diagnosis.steady.pipeline import SteadyDiagnosis
@@ -37,9 +36,9 @@ def as_dict(diagnosis: SteadyDiagnosis) -> Plain:
         "quick": diagnosis.quick,
         "runtime_s": diagnosis.runtime_s,
         "verdict": verdict.name,
-        "causes": [_cause(accepted, name) for name in verdict.causes],
+        "causes": [cause_entry(accepted, name) for name in verdict.causes],
         "alternatives": [_explanation(rival) for rival in rivals],
-        "parameters": _coefficients(accepted),
+        "parameters": coefficient_entries(accepted),
         "noise": _noise(accepted),
         "misfit": {name: _pair(pair) for name, pair in diagnosis.misfit.items()},
         "gain": _gain(diagnosis.gain),
@@ -53,42 +52,7 @@ def as_dict(diagnosis: SteadyDiagnosis) -> Plain:
 
 
 def _explanation(explanation: Explanation) -> list[Plain]:
-    return [_cause(explanation.fit, name) for name in explanation.causes]
-
-
-def _cause(fit: SteadyFit, name: str) -> Plain:
-    if name.startswith(PARAMETER):
-        path = name.removeprefix(PARAMETER)
-        unit = fit.problem.fish.info(path).unit
-        return {"name": name, "parameters": {"value": _estimate(fit, path, unit)}}
-    parameters = fit.problem.known[name].parameters
-    return {
-        "name": name,
-        "parameters": {
-            p.name: _estimate(fit, f"{PREFIX}{name}.{p.name}", p.unit) for p in parameters
-        },
-    }
-
-
-def _estimate(fit: SteadyFit, path: str, unit: str) -> Plain:
-    value = float(fit.estimates[fit.names.index(path)])
-    return {"estimate": value, "ci95": list(fit.interval(path)), "unit": unit}
-
-
-def _coefficients(fit: SteadyFit) -> list[Plain]:
-    baseline = fit.problem.baseline
-    return [
-        {
-            "name": f"{PARAMETER}{path}",
-            "nominal": float(baseline.mean[i]),
-            "estimate": float(fit.estimates[i]),
-            "ci95": list(fit.interval(path)),
-            "prior_sd": float(baseline.sd[i]),
-            "prior_sds_off": float((fit.estimates[i] - baseline.mean[i]) / baseline.sd[i]),
-            "unit": fit.problem.fish.info(path).unit,
-        }
-        for i, path in enumerate(baseline.paths)
-    ]
+    return [cause_entry(explanation.fit, name) for name in explanation.causes]
 
 
 def _noise(fit: SteadyFit) -> Plain:

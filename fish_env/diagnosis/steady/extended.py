@@ -2,36 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 from fish_env.data.vocabulary import COMMANDS
 from fish_env.diagnosis.steady.fitting import SteadyFit
-from fish_env.effects.extended import PREFIX
-from fish_env.params.provenance import Posterior
+from fish_env.identification.writing import posterior_of, with_posterior
 from fish_env.params.schema import FishParams
 
 
 def identified_fish(fit: SteadyFit, name: str) -> FishParams:
     """The fish of a fit, with status ``identified``, its posterior and its range of validity."""
-    baseline = fit.problem.baseline
-    count = len(baseline)
     table = fit.problem.table
-    values = dict(zip(baseline.paths, fit.estimates[:count].tolist(), strict=True))
     source = f"identified from {table.name}, {len(table.conditions)} conditions of steady motion"
-    moved = fit.problem.fish.replace(values, "identified", source)
-    effects = {effect: dict(known) for effect, known in moved.effects.items()}
-    for path, value in fit.point.effects.items():
-        effect, parameter = path.removeprefix(PREFIX).split(".")
-        effects.setdefault(effect, {})[parameter] = value
-    covariance = 0.5 * (fit.covariance + fit.covariance.T)
-    posterior = Posterior(
-        fit.names,
-        tuple(fit.estimates.tolist()),
-        tuple(tuple(row) for row in covariance.tolist()),
-        validity(fit),
-    )
-    return replace(moved, name=name, effects=effects, posterior=posterior, source_file=None)
+    posterior = posterior_of(fit.names, fit.estimates, fit.covariance, validity(fit))
+    return with_posterior(fit.problem.fish, posterior, name, source)
 
 
 def validity(fit: SteadyFit) -> dict[str, Any]:

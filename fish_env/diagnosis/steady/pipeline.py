@@ -29,7 +29,7 @@ from fish_env.diagnosis.steady.problem import SteadyProblem
 from fish_env.diagnosis.steady.screening import causes_of, needs_place_or_time
 from fish_env.diagnosis.steady.showing import preconditions
 from fish_env.diagnosis.steady.table import IntArray, Table, table_of
-from fish_env.diagnosis.verdict import Verdict
+from fish_env.diagnosis.verdict import Verdict, verdict_of
 from fish_env.errors import DatasetError
 from fish_env.params.io import load_fish, save_fish
 from fish_env.params.schema import FishParams
@@ -166,18 +166,12 @@ def diagnose_table(
 
 def decide(attribution: Attribution, left: Adequacy, shown: tuple[Precondition, ...]) -> Verdict:
     """Choose the verdict; an explanation that does not reach the floor names nothing."""
-    accepted = attribution.accepted
-    if not left.reached:
-        return Verdict("outside_library")
-    if accepted.causes:
-        if attribution.rivals:
-            others = tuple(rival.causes for rival in attribution.rivals)
-            return Verdict("ambiguous", accepted.causes, others)
-        effects = [name for name in accepted.causes if not name.startswith("parameter:")]
-        return Verdict("cause" if effects else "parameters", accepted.causes)
-    if sum(p.excited for p in shown) < SEEN * len(shown):
-        return Verdict("not_excited")
-    return Verdict("no_misfit")
+    return verdict_of(
+        left.reached,
+        attribution.accepted.causes,
+        tuple(rival.causes for rival in attribution.rivals),
+        sum(p.excited for p in shown) < SEEN * len(shown),
+    )
 
 
 def split_conditions(dataset: SteadyDataset, table: Table, seed: int) -> tuple[IntArray, IntArray]:

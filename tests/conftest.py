@@ -1,6 +1,24 @@
-"""What holds for all tests."""
+"""What holds for all tests, and a browser for those that open pages."""
 
 import os
+from pathlib import Path
+
+import pytest
+
+from tests.replay.browser import Browser
 
 # Windows are opened where nobody sees them; tests that need a real screen ask for one themselves.
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory):
+    opened = Browser(tmp_path_factory.mktemp("profile"))
+    yield opened
+    opened.close()
+
+
+@pytest.fixture(scope="module")
+def pictures(tmp_path_factory):
+    """Where screenshots go, to be looked at: a folder of the user's, else one that goes again."""
+    return Path(os.environ.get("ROBOFISH_SCREENSHOTS") or tmp_path_factory.mktemp("pictures"))

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import json
-import sys
 from collections.abc import Callable
 
 import numpy as np
 import pytest
 
-from fish_env.cli import main
 from fish_env.data import COMMANDS, load_dataset
 from fish_env.diagnosis import diagnose
 from fish_env.diagnosis.suitability import check_runs, doubts
 from fish_env.errors import DatasetError
 from fish_env.params import load_fish, save_fish
+from tests.command_line import run
 from tests.diagnosis.pool import Pool, pool
 
 Spoil = Callable[[Pool], None]
@@ -22,16 +21,8 @@ Spoil = Callable[[Pool], None]
 
 def robofish(capsys, *arguments: str) -> tuple[int, str]:
     """Exit status of the command and what it wrote to standard error."""
-    before, sys.argv = sys.argv, ["robofish", *arguments]
-    capsys.readouterr()
-    try:
-        main()
-        status = 0
-    except SystemExit as end:
-        status = int(end.code or 0)
-    finally:
-        sys.argv = before
-    return status, capsys.readouterr().err
+    status, _, error = run(capsys, *arguments)
+    return status, error
 
 
 def cell(row: int, column: str, text: str) -> Spoil:

@@ -1,33 +1,17 @@
 """The report in a browser: the fish swims, nothing is complained of, small screens work."""
 
-import os
-from pathlib import Path
-
 import pytest
 
 from fish_env.diagnosis.report import write_report
 from tests.diagnosis.report_cases import answer, run_series, steady_series
-from tests.replay.browser import Browser
 
 pytestmark = pytest.mark.slow
 POSE = "Robofish.replays[0].stage.actors[0].fish.group.position.toArray()"
 
 
 @pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    opened = Browser(tmp_path_factory.mktemp("profile"))
-    yield opened
-    opened.close()
-
-
-@pytest.fixture(scope="module")
 def page(tmp_path_factory):
     return write_report(answer(), run_series(), tmp_path_factory.mktemp("report"))
-
-
-@pytest.fixture(scope="module")
-def pictures(tmp_path_factory):
-    return Path(os.environ.get("ROBOFISH_SCREENSHOTS") or tmp_path_factory.mktemp("pictures"))
 
 
 @pytest.mark.parametrize(("width", "dark"), [(1280, False), (1280, True), (360, False)])

@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 from tests.docs.pages import ROOT
-from tests.replay.browser import Browser
 
 LOADED = {("script", "src"), ("link", "href"), ("img", "src"), ("iframe", "src"), ("source", "src")}
 
@@ -90,13 +89,6 @@ def test_formulas_are_left_to_katex(site):
 def test_docstrings_leave_no_roles_of_sphinx(site):
     page = (site / "api.html").read_text(encoding="utf-8")
     assert re.findall(r":(?:class|func|mod|meth):", page) == []
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    opened = Browser(tmp_path_factory.mktemp("profile"))
-    yield opened
-    opened.close()
 
 
 def pages_of(site: Path) -> list[Path]:

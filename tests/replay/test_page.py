@@ -3,9 +3,6 @@
 Screenshots are kept in the folder ROBOFISH_SCREENSHOTS names, otherwise with the test's files.
 """
 
-import os
-from pathlib import Path
-
 import pytest
 
 from fish_env.params import load_fish
@@ -30,13 +27,6 @@ DRAWN = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame((
 
 
 @pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    opened = Browser(tmp_path_factory.mktemp("profile"))
-    yield opened
-    opened.close()
-
-
-@pytest.fixture(scope="module")
 def page(tmp_path_factory):
     start = InitialState(position=(0.0, 0.0, 1.0))
     slow = Simulator(FISH, effects={"servo_lag": {"time_constant": 0.1}})
@@ -50,11 +40,6 @@ def page(tmp_path_factory):
     camera = motion_from_channels(truth.time_s, few, "camera", "measured")
     groups = [Group("both", motions), Group("camera only", (camera,))]
     return write_replay(groups, FISH, tmp_path_factory.mktemp("page") / "replay.html")
-
-
-@pytest.fixture(scope="module")
-def pictures(tmp_path_factory):
-    return Path(os.environ.get("ROBOFISH_SCREENSHOTS") or tmp_path_factory.mktemp("pictures"))
 
 
 @pytest.fixture

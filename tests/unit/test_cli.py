@@ -8,26 +8,12 @@ from pathlib import Path
 import pytest
 from typer.main import get_command
 
-from fish_env.cli import app, main
+from fish_env.cli import app
 from fish_env.effects import catalogue
 from fish_env.params import load_fish
+from tests.command_line import run
 
 COMMANDS = sorted(get_command(app).commands)  # type: ignore[attr-defined]
-
-
-def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
-    """Exit status, standard output and standard error of `robofish`."""
-    before, sys.argv = sys.argv, ["robofish", *arguments]
-    capsys.readouterr()
-    try:
-        main()
-        status = 0
-    except SystemExit as end:
-        status = int(end.code or 0)
-    finally:
-        sys.argv = before
-    shown = capsys.readouterr()
-    return status, shown.out, shown.err
 
 
 @pytest.mark.parametrize("command", COMMANDS)

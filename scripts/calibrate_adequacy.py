@@ -3,9 +3,9 @@
 The filter takes a disturbance to forget exponentially. Gusts, swell and 1/f noise leave colour in
 its residuals, and a test that counts on white ones then asks for forces that are not there. For
 made-up measurements without any effect, under disturbances of four colours, the smallest p-value
-is set against the threshold for white residuals; the margin in `fish_env/diagnosis/adequacy.py`
-is the quantile of their ratio that `LEVEL` asks for. Cases are numbered from 1000 on, so that none
-of them is one that judges.
+is set against the threshold for white residuals, which `fish_env/diagnosis/adequacy.py` uses as it
+is: it would have to be multiplied by a high quantile of their ratio, were that above one. Cases are
+numbered from 1000 on, so that none of them is one that judges.
 
     python scripts/calibrate_adequacy.py --cases 60
 """

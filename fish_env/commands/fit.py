@@ -9,10 +9,8 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from fish_env.data import Dataset, load_dataset
-from fish_env.diagnosis.suitability import check_runs
+from fish_env.diagnosis.suitability import check_runs, divergence, load_runs
 from fish_env.effects.extended import PREFIX
-from fish_env.errors import DatasetError
 from fish_env.identification import Fit, Problem, fit
 from fish_env.identification.starts import likely_start
 from fish_env.identification.writing import identified_fish
@@ -34,9 +32,7 @@ def fit_dataset(
     Raises:
         RoboticFishError: The data or the fish cannot be used.
     """
-    measured = load_dataset(dataset)
-    if not isinstance(measured, Dataset):
-        raise DatasetError(f"{dataset}: a table of steady motion; fit needs runs over time")
+    measured = load_runs(dataset)
     check_runs(measured)
     with console.status("reading runs") as status:
         problem = Problem(measured, load_fish(fish or measured.fish), effects=effects)
@@ -45,10 +41,7 @@ def fit_dataset(
         try:
             result = fit(problem, start=start, report=status.update)
         except np.linalg.LinAlgError:
-            raise DatasetError(
-                f"{measured.name}: the simulation diverges while {problem.fish.name} is fitted to "
-                "these runs; check that fish, units and frame are those of the data"
-            ) from None
+            raise divergence(problem) from None
     out.parent.mkdir(parents=True, exist_ok=True)
     save_fish(identified_fish(result, out.stem), out)
     print_fit(console, result)

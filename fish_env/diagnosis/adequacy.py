@@ -24,9 +24,8 @@ from fish_env.sensing.channels import channels_from_states
 FloatArray = npt.NDArray[np.float64]
 DIRECTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 LEVEL = 0.01
-MARGIN = 1.0
-"""Factor on the log p-value of white residuals. Disturbances of other colours than assumed reach
-0.92 of it in 98 % of data sets without any effect (scripts/calibrate_adequacy.py), so none."""
+"""For white residuals. Disturbances of other colours than assumed reach 0.92 of the threshold's log
+p-value in 98 % of data sets without any effect (scripts/calibrate_adequacy.py)."""
 
 
 @dataclass(frozen=True)
@@ -84,7 +83,7 @@ def adequacy(fit: Fit, rng: np.random.Generator, tolerated: float = 0.0) -> Adeq
         tolerated: evidence (in -2 log likelihood) that an error of the simulation may make up.
     """
     names, signals = generic_forces(fit)
-    threshold = MARGIN * null_threshold([s for _, s in signals], rng, LEVEL)
+    threshold = null_threshold([s for _, s in signals], rng, LEVEL)
     unit = np.repeat([1e-3, 1e-5], 3)
     found = []
     for column, signal in signals:

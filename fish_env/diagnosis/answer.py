@@ -3,26 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
-from math import isfinite
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from fish_env.diagnosis import consistency, noise_floor
 from fish_env.diagnosis.causes import PARAMETER
-from fish_env.diagnosis.entries import cause_entry, coefficient_entries
-from fish_env.diagnosis.gain import Gain, Pair
-from fish_env.diagnosis.preconditions import Precondition
+from fish_env.diagnosis.entries import (
+    FORMAT,
+    Plain,
+    cause_entry,
+    coefficient_entries,
+    experiment_entry,
+    gain_entry,
+    misfit_entry,
+    precondition_entry,
+)
 from fish_env.diagnosis.regimes import as_plain
 from fish_env.diagnosis.suitability import doubts
 from fish_env.identification.estimator import Fit
 
 if TYPE_CHECKING:
     from fish_env.diagnosis.pipeline import Diagnosis
-
-FORMAT = "robofish-diagnosis/1"
-Plain = dict[str, Any]
 
 
 def as_dict(diagnosis: Diagnosis) -> Plain:
@@ -47,13 +47,13 @@ def as_dict(diagnosis: Diagnosis) -> Plain:
         "noise": _noise(diagnosis.accepted),
         "noise_floor": [noise_floor.as_dict(floor) for floor in diagnosis.floors],
         "consistency": consistency.as_dict(diagnosis.consistency),
-        "misfit": {name: _pair(pair, "noise sd") for name, pair in diagnosis.misfit.items()},
-        "gain": _gain(diagnosis.gain),
-        "preconditions": [_precondition(p) for p in diagnosis.preconditions],
+        "misfit": misfit_entry(diagnosis.misfit),
+        "gain": gain_entry(diagnosis.gain),
+        "preconditions": [precondition_entry(p) for p in diagnosis.preconditions],
         "ranking": [{"name": n, "score": s} for n, s in diagnosis.attribution.ranking],
         "localisation": as_plain(diagnosis.localisation),
         "unexplained": [] if diagnosis.adequacy.reached else _unexplained(diagnosis),
-        "next_experiment": _experiment(diagnosis),
+        "next_experiment": experiment_entry(diagnosis.next_experiment),
         "strained": list(diagnosis.adequacy.strained),
         "notes": list(diagnosis.dataset.notes),
     }
@@ -73,54 +73,12 @@ def _noise(fit: Fit) -> Plain:
     }
 
 
-def _pair(pair: Pair, unit: str) -> Plain:
-    return {**asdict(pair), "unit": unit}
-
-
-def _gain(gain: Gain | None) -> Plain | None:
-    if gain is None:
-        return None
-    share = None
-    if gain.share is not None and gain.share_ci95 is not None:
-        share = {"estimate": gain.share, "ci95": list(gain.share_ci95)}
-    return {
-        "final_runs": list(gain.runs),
-        "fit_percent": asdict(gain.fit_percent),
-        "rmse": {name: asdict(pair) for name, pair in gain.rmse.items()},
-        "misfit": {name: _pair(pair, "noise sd") for name, pair in gain.misfit.items()},
-        "share_of_reachable": share,
-    }
-
-
-def _precondition(p: Precondition) -> Plain:
-    sizes = {name: value for name, value in p.smallest_detectable.items() if isfinite(value)}
-    return {
-        "name": p.name,
-        "absorbed_share": float(np.clip(p.absorbed_share, 0.0, 1.0)),
-        "smallest_detectable": sizes,
-        "most_confusable": list(p.most_confusable) if p.most_confusable else None,
-        "excited": bool(p.excited),
-    }
-
-
 def _unexplained(diagnosis: Diagnosis) -> list[Plain]:
     """Forces the data still ask for, over and above the best explanation."""
     return [
         {"depends_on": m.function, "direction": m.direction, "rms": float(m.size), "log_p": m.log_p}
         for m in diagnosis.adequacy.misfits
     ]
-
-
-def _experiment(diagnosis: Diagnosis) -> Plain:
-    proposal = diagnosis.next_experiment
-    if proposal is None:
-        return {"schedule": [], "separates": []}
-    return {
-        "manoeuvre": proposal.name,
-        "schedule": [dict(row) for row in proposal.schedule],
-        "separates": list(proposal.separates),
-        "separation": proposal.separation,
-    }
 
 
 def words(answer: Plain) -> str:

@@ -92,14 +92,14 @@ def attribute(
             break
         total += gain
         after = screen(tried[0].fit, causes, rng)
-        rough = max(ACCURACY.get(name, 0.0) ** 2 for name in tried[0].causes)
+        rough = roughness(tried[0])
         if shortlisted(problem, after, 1, rough * total):
             again = second_look(current, tried, [*chosen, *_new(after, chosen)], report)
             if again[0] is not tried[0]:
                 after = screen(again[0].fit, causes, rng)
             tried = again
         current = best = tried[0]
-        rough = max(ACCURACY.get(name, 0.0) ** 2 for name in best.causes)
+        rough = roughness(best)
         screens.append(after)
         rivals = tuple(
             e
@@ -113,6 +113,11 @@ def attribute(
     return Attribution(
         Explanation((), baseline), tuple(screens), current, rivals, ranking, tolerated
     )
+
+
+def roughness(explanation: Explanation) -> float:
+    """Share of the evidence for an explanation that its simulation may get wrong."""
+    return max(ACCURACY.get(name, 0.0) ** 2 for name in explanation.causes)
 
 
 def _with_wandering_phase(

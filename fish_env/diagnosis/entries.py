@@ -3,17 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
+from math import isfinite
 from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from fish_env.diagnosis.causes import PARAMETER
+from fish_env.diagnosis.gain import Gain, Pair
+from fish_env.diagnosis.next_experiment import Proposal
+from fish_env.diagnosis.preconditions import Precondition
 from fish_env.effects.extended import PREFIX
 from fish_env.identification.parameters import Baseline
 from fish_env.model.effect import Effect
 from fish_env.params.schema import FishParams
 
+FORMAT = "robofish-diagnosis/1"
 Plain = dict[str, Any]
 
 
@@ -78,3 +84,54 @@ def coefficient_entries(fit: Identified) -> list[Plain]:
         }
         for i, path in enumerate(baseline.paths)
     ]
+
+
+def misfit_entry(misfit: Mapping[str, Pair]) -> Plain:
+    """Errors of each channel, baseline and extended, in units of the noise."""
+    return {name: {**asdict(pair), "unit": "noise sd"} for name, pair in misfit.items()}
+
+
+def gain_entry(gain: Gain | None, units: Mapping[str, str] | None = None) -> Plain | None:
+    """What an extension gained, if there is one.
+
+    Args:
+        gain: the gain.
+        units: of each channel's error, to be named beside it.
+    """
+    if gain is None:
+        return None
+    share = None
+    if gain.share is not None and gain.share_ci95 is not None:
+        share = {"estimate": gain.share, "ci95": list(gain.share_ci95)}
+    named = {name: {"unit": unit} for name, unit in (units or {}).items()}
+    return {
+        "final_runs": list(gain.runs),
+        "fit_percent": asdict(gain.fit_percent),
+        "rmse": {name: {**asdict(pair), **named.get(name, {})} for name, pair in gain.rmse.items()},
+        "misfit": misfit_entry(gain.misfit),
+        "share_of_reachable": share,
+    }
+
+
+def precondition_entry(p: Precondition) -> Plain:
+    """What the data could show of one effect."""
+    sizes = {name: value for name, value in p.smallest_detectable.items() if isfinite(value)}
+    return {
+        "name": p.name,
+        "absorbed_share": float(np.clip(p.absorbed_share, 0.0, 1.0)),
+        "smallest_detectable": sizes,
+        "most_confusable": list(p.most_confusable) if p.most_confusable else None,
+        "excited": bool(p.excited),
+    }
+
+
+def experiment_entry(proposal: Proposal | None) -> Plain:
+    """The manoeuvre to fly next, if there is one."""
+    if proposal is None:
+        return {"schedule": [], "separates": []}
+    return {
+        "manoeuvre": proposal.name,
+        "schedule": [dict(row) for row in proposal.schedule],
+        "separates": list(proposal.separates),
+        "separation": proposal.separation,
+    }

@@ -7,7 +7,7 @@ and their priors, cannot follow (T-optimality: Atkinson and Fedorov, 1975).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,6 +23,7 @@ from fish_env.identification.estimator import Fit
 from fish_env.identification.free import Z_STEP
 from fish_env.identification.problem import Point, Problem
 from fish_env.identification.runs import RunData
+from fish_env.model.effect import Effect
 
 FloatArray = npt.NDArray[np.float64]
 RATE_HZ = 25.0
@@ -52,7 +53,8 @@ def propose(
 ) -> Proposal | None:
     """The manoeuvre of the menu that separates rivals, or shows causes the runs could not."""
     fit = attribution.accepted.fit
-    rivals = _rivals(attribution, verdict, shown)
+    others = {r.causes: r.fit.point for r in attribution.rivals}
+    rivals = rivals_of(verdict, others, shown, lambda name: _plausible(fit, name))
     if not rivals:
         return None
     names = tuple(rivals)
@@ -62,28 +64,40 @@ def propose(
     return Proposal(manoeuvre.name, manoeuvre.schedule, names, float(np.mean(best)))
 
 
-def _rivals(
-    attribution: Attribution, verdict: Verdict, shown: Sequence[Precondition]
+def rivals_of(
+    verdict: Verdict,
+    others: Mapping[tuple[str, ...], Point],
+    shown: Sequence[Precondition],
+    plausible: Callable[[str], Point],
 ) -> dict[str, Point]:
-    """What the present explanation is to be told from: other fits, or unseen causes."""
-    fit = attribution.accepted.fit
+    """What the present explanation is to be told from: other fits, or effects not seen.
+
+    Args:
+        verdict: the verdict.
+        others: causes of each rival -> its fit.
+        shown: what the data could show.
+        plausible: the present explanation with an effect at a plausible size.
+    """
     if verdict.name == "ambiguous":
-        return {" + ".join(rival.causes): rival.fit.point for rival in attribution.rivals}
+        return {" + ".join(causes): point for causes, point in others.items()}
     if verdict.name not in ("no_misfit", "not_excited"):
         return {}
-    blind = [p.name for p in shown if not p.excited]
-    return {name: _plausible(fit, name) for name in blind}
+    return {p.name: plausible(p.name) for p in shown if not p.excited}
 
 
-def _plausible(fit: Fit, name: str) -> Point:
-    """The present explanation with a cause at a plausible size."""
-    effect = fit.problem.known[name]
+def plausible_sizes(effect: Effect) -> dict[str, float]:
+    """Parameters of an effect that acts as strongly as is plausible."""
     sizes = {}
     for p in effect.parameters:
         low, high = p.plausible
         far = high if abs(high - p.neutral) >= abs(low - p.neutral) else low
         sizes[p.name] = low if np.isinf(p.neutral) else 0.5 * (low + high) if p.shapes else far
-    values = effect_values(fit.problem, name, sizes)
+    return sizes
+
+
+def _plausible(fit: Fit, name: str) -> Point:
+    """The present explanation with an effect at a plausible size."""
+    values = effect_values(fit.problem, name, plausible_sizes(fit.problem.known[name]))
     bounds = {f.path: (f.lower, f.upper) for f in fit.problem.freedoms([name])}
     clipped = {path: float(np.clip(value, *bounds[path])) for path, value in values.items()}
     return Point(fit.point.z, {**fit.point.effects, **clipped})

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -26,17 +25,15 @@ from fish_env.diagnosis.preconditions import Precondition, preconditions
 from fish_env.diagnosis.regimes import Localisation, localise_fits
 from fish_env.diagnosis.report import ReportSeries, series_from, write_report
 from fish_env.diagnosis.steady.pipeline import diagnose_steady
-from fish_env.diagnosis.suitability import check_runs
+from fish_env.diagnosis.suitability import check_runs, divergence
 from fish_env.diagnosis.verdict import Verdict, decide
-from fish_env.errors import DatasetError
+from fish_env.diagnosis.writing import EXTENDING, write_answer
 from fish_env.identification.estimator import Fit, fit
 from fish_env.identification.problem import Problem
-from fish_env.params.io import load_fish, save_fish
+from fish_env.params.io import load_fish
 from fish_env.params.schema import FishParams
 
 Progress = Callable[[str], None]
-EXTENDING = ("cause", "parameters", "ambiguous")
-"""Verdicts that come with an extended model."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,15 +124,9 @@ def diagnose(
 
 def write(diagnosis: Diagnosis, answer: dict[str, Any], folder: Path) -> None:
     """Writes ``diagnosis.json``, ``report.html`` and, if something extends, ``extended.yaml``."""
-    folder.mkdir(parents=True, exist_ok=True)
-    text = json.dumps(answer, indent=1, allow_nan=False)
-    (folder / "diagnosis.json").write_text(text + "\n", encoding="utf-8")
-    extended = folder / "extended.yaml"
-    if diagnosis.verdict.name in EXTENDING:
-        save_fish(extended_fish(diagnosis.accepted, diagnosis.dataset), extended)
-    else:
-        # One of an earlier diagnosis would contradict this one.
-        extended.unlink(missing_ok=True)
+    extends = diagnosis.verdict.name in EXTENDING
+    extended = extended_fish(diagnosis.accepted, diagnosis.dataset) if extends else None
+    write_answer(answer, extended, folder)
     write_report(answer, _series(diagnosis), folder)
 
 
@@ -216,10 +207,7 @@ def _refitted(problem: Problem) -> Fit:
     try:
         return fit(problem, rounds=2)
     except np.linalg.LinAlgError:
-        raise DatasetError(
-            f"{problem.dataset.name}: the simulation diverges while {problem.fish.name} is refitted"
-            " to these runs; check that fish, units and frame are those of the data"
-        ) from None
+        raise divergence(problem) from None
 
 
 def _split(dataset: Dataset, seed: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -232,18 +220,3 @@ def _split(dataset: Dataset, seed: int) -> tuple[tuple[str, ...], tuple[str, ...
         return dataset.ids, ()
     split = split_runs(dataset, seed, (0.75, 0.0, 0.25), by="condition")
     return (*split.fit, *split.select), split.final
-
-
-def load_runs(folder: str | Path) -> Dataset:
-    """A dataset of runs.
-
-    Raises:
-        DatasetError: refused input, or a table of steady motion.
-    """
-    dataset = load_dataset(folder)
-    if not isinstance(dataset, Dataset):
-        raise DatasetError(
-            f"{folder}: a table of steady motion; a diagnosis needs runs over time, "
-            "compare it with `robofish compare` instead"
-        )
-    return dataset

@@ -82,10 +82,10 @@ def refits(
     sketcher = Sketcher(base)
     sketches = []
     wandering, shown = loose or (base, ())
+    follower = Sketcher(wandering)
     for signal in shown:
         report(f"trying {signal.cause.name} with a wandering phase")
-        first = _sketches(Sketcher(wandering), base, signal, starts(wandering, signal))
-        for _, found in first:
+        for _, found in _sketches(follower, base, signal, starts(wandering, signal)):
             sketches += _sketches(sketcher, base, signal, [found.point])
     for signal in chosen:
         report(f"trying {signal.cause.name}")
@@ -98,7 +98,7 @@ def refits(
     leader = Explanation((*current.causes, name), _in_full(base.problem, sketch, base.noise))
     tried = [leader, *_rest(current, finalists[1:], leader.fit, report)]
     tried, noise = _best_first(tried)
-    return tried, Explanation(current.causes, _again(base.problem, base, noise))
+    return tried, Explanation(current.causes, _at_noise(base.problem, base, noise, 2))
 
 
 def second_look(
@@ -124,8 +124,9 @@ def second_look(
             report(f"trying {signal.cause.name} again")
             begin = starts(current.fit, signal, best.point.z)
             sketches += _sketches(sketcher, current.fit, signal, begin)
-    finalists = _finalists(sketches, sketcher.base(), 0.0)
-    finalists = [f for f in finalists if f[1].objective < sketcher.base() + LEEWAY]
+    reached = sketcher.base()
+    finalists = _finalists(sketches, reached, 0.0)
+    finalists = [f for f in finalists if f[1].objective < reached + LEEWAY]
     more = _rest(current, finalists, best, report)
     return _best_first([*tried, *more])[0]
 
@@ -213,7 +214,7 @@ def _rest(
     for name, sketch in finalists:
         report(f"fitting {name}")
         result.append(
-            Explanation((*current.causes, name), _at_noise(leader.problem, sketch, leader.noise))
+            Explanation((*current.causes, name), _at_noise(leader.problem, sketch, leader.noise, 4))
         )
     return result
 
@@ -226,28 +227,21 @@ def _best_first(tried: list[Explanation]) -> tuple[list[Explanation], NoiseModel
     if ranked[0] is leader:
         return ranked, leader.fit.noise
     first = _noise_too(problem, ranked[0].fit)
-    others = [Explanation(e.causes, _again(problem, e.fit, first.noise)) for e in ranked[1:]]
+    others = [Explanation(e.causes, _at_noise(problem, e.fit, first.noise, 2)) for e in ranked[1:]]
     return [Explanation(ranked[0].causes, first), *others], first.noise
 
 
 def _in_full(problem: Problem, sketch: Sketch, noise: NoiseModel) -> Fit:
     few = problem.subset(3)
     first = fit(few, sketch.effects, sketch.point, noise, sketch.released, rounds=2)
-    return fit(problem, first.effects, first.point, first.noise, first.released, rounds=2)
+    return _noise_too(problem, first)
 
 
-def _at_noise(problem: Problem, sketch: Sketch, noise: NoiseModel) -> Fit:
+def _at_noise(problem: Problem, at: Sketch | Fit, noise: NoiseModel, iterations: int) -> Fit:
     return fit(
-        problem, sketch.effects, sketch.point, noise, sketch.released, refit_noise=False,
-        iterations=4,
-    )  # fmt: skip
+        problem, at.effects, at.point, noise, at.released, refit_noise=False, iterations=iterations
+    )
 
 
 def _noise_too(problem: Problem, own: Fit) -> Fit:
     return fit(problem, own.effects, own.point, own.noise, own.released, rounds=2)
-
-
-def _again(problem: Problem, own: Fit, noise: NoiseModel) -> Fit:
-    return fit(
-        problem, own.effects, own.point, noise, own.released, refit_noise=False, iterations=2
-    )

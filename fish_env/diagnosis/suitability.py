@@ -3,20 +3,46 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from fish_env.data import load_dataset
 from fish_env.data.schema import Dataset, Run, identical_runs
 from fish_env.diagnosis.conventions import check_conventions
 from fish_env.diagnosis.records import check_clock_jumps, check_stuck
 from fish_env.errors import DatasetError
+from fish_env.identification.problem import Problem
 from fish_env.identification.runs import usable_channels
 
 LONGEST_GAP_S = 5.0
 """A motion carried further than this without a sample says nothing about the fish."""
 FEWEST_SAMPLES = 50
 _AMPLITUDE, _FREQUENCY = 1, 2
+
+
+def load_runs(folder: str | Path) -> Dataset:
+    """A dataset of runs over time.
+
+    Raises:
+        DatasetError: refused input, or a table of steady motion.
+    """
+    dataset = load_dataset(folder)
+    if not isinstance(dataset, Dataset):
+        raise DatasetError(
+            f"{folder}: a table of steady motion; this needs runs over time, "
+            "use `robofish compare` or `robofish diagnose` with it instead"
+        )
+    return dataset
+
+
+def divergence(problem: Problem) -> DatasetError:
+    """What to tell the user when a fit goes where the simulation diverges."""
+    return DatasetError(
+        f"{problem.dataset.name}: the simulation diverges while {problem.fish.name} is fitted to "
+        "these runs; check that fish, units and frame are those of the data"
+    )
 
 
 def check_runs(dataset: Dataset) -> None:

@@ -45,6 +45,17 @@ class Point:
     effects: Mapping[str, float]
 
 
+def neutral_values(
+    model: ExtendedModel, known: Mapping[str, Effect], names: Iterable[str]
+) -> dict[str, float]:
+    """Parameters of effects as the fish's file has them, neutral where it says nothing."""
+    values: dict[str, float] = {}
+    for name in names:
+        own = model.effects.get(name, known[name].neutral)
+        values |= {f"{PREFIX}{name}.{p}": v for p, v in own.items()}
+    return values
+
+
 class Problem:
     """Measured runs of a fish, the model that should explain them, and its freedom.
 
@@ -137,11 +148,7 @@ class Problem:
 
     def neutral(self, names: Iterable[str]) -> dict[str, float]:
         """Values of effects as the fish's file has them, neutral where it says nothing."""
-        values: dict[str, float] = {}
-        for name in names:
-            own = self.model.effects.get(name, self.known[name].neutral)
-            values |= {f"{PREFIX}{name}.{p}": v for p, v in own.items()}
-        return values
+        return neutral_values(self.model, self.known, names)
 
     def freedoms(self, names: Iterable[str]) -> tuple[EffectFreedom, ...]:
         """Free parameters of effects."""

@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from fish_env.identification.estimator import Fit, gauss_newton
+from fish_env.identification.estimator import Fit, gauss_newton, objective_at
 from fish_env.identification.free import Free, objective
 from fish_env.identification.phases import settle_phases
 from fish_env.identification.problem import Point, Problem
 
-FloatArray = npt.NDArray[np.float64]
 STEPS = 5
 TOLERANCE = 0.5
 """A sketch ends when no parameter moves by more of its standard deviation."""
@@ -69,13 +67,9 @@ class Sketcher:
         """
         free = Free(self.few, effects, released)
         noise = self.fit.noise
-        tried = [self._try(free, free.clip(free.pack(point))) for point in starts]
-        _, vector = min(tried, key=lambda t: t[0] if np.isfinite(t[0]) else np.inf)
+        values = [objective_at(self.one, effects, point, noise, released) for point in starts]
+        best = int(np.argmin(np.where(np.isfinite(values), values, np.inf)))
+        vector = free.clip(free.pack(starts[best]))
         few = settle_phases(self.few, free.unpack(vector), noise)
         vector, value, _ = gauss_newton(few, free, vector, noise, STEPS, TOLERANCE)
         return Sketch(tuple(effects), tuple(released), free.unpack(vector), value)
-
-    def _try(self, free: Free, vector: FloatArray) -> tuple[float, FloatArray]:
-        noise = self.fit.noise
-        one = settle_phases(self.one, free.unpack(vector), noise)
-        return objective(one, free, vector, noise)[0], vector

@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
-from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from fish_env.diagnosis.entries import cause_entry, coefficient_entries
-from fish_env.diagnosis.gain import Gain, Pair
-from fish_env.diagnosis.next_experiment import Proposal
-from fish_env.diagnosis.preconditions import Precondition
+from fish_env.diagnosis.entries import (
+    FORMAT,
+    Plain,
+    cause_entry,
+    coefficient_entries,
+    experiment_entry,
+    gain_entry,
+    misfit_entry,
+    precondition_entry,
+)
 from fish_env.diagnosis.steady.attribution import Explanation
 from fish_env.diagnosis.steady.fitting import SteadyFit
 from fish_env.diagnosis.steady.table import UNITS
 
 if TYPE_CHECKING:
     from fish_env.diagnosis.steady.pipeline import SteadyDiagnosis
-
-FORMAT = "robofish-diagnosis/1"
-Plain = dict[str, Any]
 
 
 def as_dict(diagnosis: SteadyDiagnosis) -> Plain:
@@ -40,13 +39,13 @@ def as_dict(diagnosis: SteadyDiagnosis) -> Plain:
         "alternatives": [_explanation(rival) for rival in rivals],
         "parameters": coefficient_entries(accepted),
         "noise": _noise(accepted),
-        "misfit": {name: _pair(pair) for name, pair in diagnosis.misfit.items()},
-        "gain": _gain(diagnosis.gain),
-        "preconditions": [_precondition(p) for p in diagnosis.shown],
+        "misfit": misfit_entry(diagnosis.misfit),
+        "gain": gain_entry(diagnosis.gain, UNITS),
+        "preconditions": [precondition_entry(p) for p in diagnosis.shown],
         "ranking": [{"name": n, "score": s} for n, s in diagnosis.attribution.ranking],
         "floor": _floor(diagnosis),
         "unexplained": [] if diagnosis.adequacy.reached else _unexplained(diagnosis),
-        "next_experiment": _experiment(diagnosis.next_experiment),
+        "next_experiment": experiment_entry(diagnosis.next_experiment),
         "notes": list(diagnosis.notes),
     }
 
@@ -62,36 +61,6 @@ def _noise(fit: SteadyFit) -> Plain:
         "sensor_sd": dict(zip(names, scatter.sensor_sd.tolist(), strict=True)),
         "disturbance": {"force_n2_s": scatter.force, "moment_n2_m2_s": scatter.moment},
         "assumed": scatter.assumed,
-    }
-
-
-def _pair(pair: Pair) -> Plain:
-    return {**asdict(pair), "unit": "noise sd"}
-
-
-def _gain(gain: Gain | None) -> Plain | None:
-    if gain is None:
-        return None
-    share = None
-    if gain.share is not None and gain.share_ci95 is not None:
-        share = {"estimate": gain.share, "ci95": list(gain.share_ci95)}
-    return {
-        "final_runs": list(gain.runs),
-        "fit_percent": asdict(gain.fit_percent),
-        "rmse": {name: {**asdict(pair), "unit": UNITS[name]} for name, pair in gain.rmse.items()},
-        "misfit": {name: _pair(pair) for name, pair in gain.misfit.items()},
-        "share_of_reachable": share,
-    }
-
-
-def _precondition(p: Precondition) -> Plain:
-    sizes = {name: value for name, value in p.smallest_detectable.items() if isfinite(value)}
-    return {
-        "name": p.name,
-        "absorbed_share": float(np.clip(p.absorbed_share, 0.0, 1.0)),
-        "smallest_detectable": sizes,
-        "most_confusable": list(p.most_confusable) if p.most_confusable else None,
-        "excited": bool(p.excited),
     }
 
 
@@ -118,14 +87,3 @@ def _unexplained(diagnosis: SteadyDiagnosis) -> list[Plain]:
         }
         for m in diagnosis.adequacy.misfits
     ]
-
-
-def _experiment(proposal: Proposal | None) -> Plain:
-    if proposal is None:
-        return {"schedule": [], "separates": []}
-    return {
-        "manoeuvre": proposal.name,
-        "schedule": [dict(row) for row in proposal.schedule],
-        "separates": list(proposal.separates),
-        "separation": proposal.separation,
-    }

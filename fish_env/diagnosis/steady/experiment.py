@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from fish_env.data.vocabulary import COMMANDS
 from fish_env.diagnosis.manoeuvres import MENU
-from fish_env.diagnosis.next_experiment import Proposal, unfollowed
+from fish_env.diagnosis.next_experiment import Proposal, plausible_sizes, rivals_of, unfollowed
 from fish_env.diagnosis.preconditions import Precondition
 from fish_env.diagnosis.steady.attribution import Attribution
 from fish_env.diagnosis.steady.fitting import SteadyFit, lines
@@ -40,7 +40,8 @@ def propose(
 ) -> Proposal | None:
     """A condition to hold and repeat, or a manoeuvre to record over time; None if all is clear."""
     fit = attribution.accepted.fit
-    rivals = _rivals(attribution, verdict, shown)
+    others = {e.causes: e.fit.point for e in attribution.rivals}
+    rivals = rivals_of(verdict, others, shown, lambda name: plausible(fit, name))
     if not rivals:
         return None
     problem = fit.problem.with_table(candidates(fit.problem.table))
@@ -63,29 +64,11 @@ def _over_time(names: tuple[str, ...]) -> Proposal:
     return Proposal(name, manoeuvre.schedule, names, 0.0)
 
 
-def _rivals(
-    attribution: Attribution, verdict: Verdict, shown: Sequence[Precondition]
-) -> dict[str, Point]:
-    """What the present explanation is to be told from: other fits, or effects not seen."""
-    fit = attribution.accepted.fit
-    if verdict.name == "ambiguous":
-        return {" + ".join(e.causes): e.fit.point for e in attribution.rivals}
-    if verdict.name not in ("no_misfit", "not_excited"):
-        return {}
-    blind = [p.name for p in shown if not p.excited]
-    return {name: plausible(fit, name) for name in blind}
-
-
 def plausible(fit: SteadyFit, name: str) -> Point:
     """The present explanation with an effect at a plausible size."""
-    sizes = {}
-    for p in fit.problem.known[name].parameters:
-        low, high = p.plausible
-        far = high if abs(high - p.neutral) >= abs(low - p.neutral) else low
-        sizes[f"{PREFIX}{name}.{p.name}"] = (
-            low if np.isinf(p.neutral) else 0.5 * (low + high) if p.shapes else far
-        )
-    return Point(fit.point.z, {**fit.point.effects, **sizes})
+    sizes = plausible_sizes(fit.problem.known[name])
+    values = {f"{PREFIX}{name}.{parameter}": size for parameter, size in sizes.items()}
+    return Point(fit.point.z, {**fit.point.effects, **values})
 
 
 def candidates(table: Table) -> Table:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -30,12 +29,12 @@ from fish_env.diagnosis.steady.screening import causes_of, needs_place_or_time
 from fish_env.diagnosis.steady.showing import preconditions
 from fish_env.diagnosis.steady.table import IntArray, Table, table_of
 from fish_env.diagnosis.verdict import Verdict, verdict_of
+from fish_env.diagnosis.writing import EXTENDING, write_answer
 from fish_env.errors import DatasetError
-from fish_env.params.io import load_fish, save_fish
+from fish_env.params.io import load_fish
 from fish_env.params.schema import FishParams
 
 Progress = Callable[[str], None]
-EXTENDING = ("cause", "parameters", "ambiguous")
 FEWEST_CONDITIONS = 3
 FEWEST_FOR_FINAL = 6
 """Conditions a table must have before a fifth of them are kept for judging."""
@@ -213,16 +212,10 @@ def _at_bound(fit: SteadyFit, path: str) -> bool:
 
 
 def _write(diagnosis: SteadyDiagnosis, answer: dict[str, Any], folder: Path) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
-    text = json.dumps(answer, indent=1, allow_nan=False)
-    (folder / "diagnosis.json").write_text(text + "\n", encoding="utf-8")
-    extended = folder / "extended.yaml"
-    if diagnosis.verdict.name in EXTENDING:
-        name = f"{diagnosis.accepted.problem.fish.name}-extended"
-        save_fish(identified_fish(diagnosis.accepted, name), extended)
-    else:
-        # One of an earlier diagnosis would contradict this one.
-        extended.unlink(missing_ok=True)
-    fits = diagnosis.attribution.baseline.fit, diagnosis.accepted
+    accepted = diagnosis.accepted
+    extends = diagnosis.verdict.name in EXTENDING
+    name = f"{accepted.problem.fish.name}-extended"
+    write_answer(answer, identified_fish(accepted, name) if extends else None, folder)
+    fits = diagnosis.attribution.baseline.fit, accepted
     final = diagnosis.gain.runs if diagnosis.gain else ()
     write_report(answer, steady_series_from(diagnosis.dataset, *fits, final), folder)

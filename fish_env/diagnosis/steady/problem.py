@@ -16,7 +16,7 @@ from fish_env.effects.registry import catalogue
 from fish_env.identification.applied_wrench import EFFECT as APPLIED_WRENCH
 from fish_env.identification.filtering import Measurement
 from fish_env.identification.parameters import Baseline, measurement_of
-from fish_env.identification.problem import Point
+from fish_env.identification.problem import Point, neutral_values
 from fish_env.params.schema import FishParams
 
 FloatArray = npt.NDArray[np.float64]
@@ -60,11 +60,7 @@ class SteadyProblem:
 
     def neutral(self, names: Iterable[str]) -> dict[str, float]:
         """Values of effects as the fish's file has them, neutral where it says nothing."""
-        values: dict[str, float] = {}
-        for name in names:
-            own = self.model.effects.get(name, self.known[name].neutral)
-            values |= {f"{PREFIX}{name}.{p}": v for p, v in own.items()}
-        return values
+        return neutral_values(self.model, self.known, names)
 
     @property
     def start(self) -> Point:

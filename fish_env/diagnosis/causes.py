@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from itertools import product
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -44,6 +45,26 @@ class Cause:
     def is_effect(self) -> bool:
         """Whether it is an effect (else a baseline coefficient)."""
         return self.path is None
+
+
+class Tested(Protocol):
+    """A test of a cause."""
+
+    @property
+    def cause(self) -> Cause:
+        """What was tested."""
+        ...
+
+
+T = TypeVar("T", bound=Tested)
+
+
+def best_of_each(tests: Iterable[T], log_p: Callable[[T], float]) -> list[T]:
+    """The most significant test of each cause, the most significant cause first."""
+    chosen: dict[str, T] = {}
+    for test in sorted(tests, key=log_p):
+        chosen.setdefault(test.cause.name, test)
+    return list(chosen.values())
 
 
 def causes_of(problem: Problem) -> tuple[Cause, ...]:

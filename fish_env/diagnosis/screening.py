@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 from scipy.special import chdtrc
 from scipy.stats import chi2, ncx2
 
-from fish_env.diagnosis.causes import Cause, effect_values
+from fish_env.diagnosis.causes import Cause, best_of_each, effect_values
 from fish_env.identification.estimator import Fit
 from fish_env.identification.information import block_sums, information, prior_precision
 from fish_env.identification.products import inner
@@ -85,12 +85,7 @@ class Screen:
 
     def best(self) -> list[Signal]:
         """The best alternative of each cause, most significant first."""
-        chosen: dict[str, Signal] = {}
-        for signal in self.signals:
-            known = chosen.get(signal.cause.name)
-            if known is None or signal.p_value < known.p_value:
-                chosen[signal.cause.name] = signal
-        return sorted(chosen.values(), key=lambda s: s.p_value)
+        return best_of_each(self.signals, lambda signal: signal.p_value)
 
 
 class Projector:

@@ -15,10 +15,10 @@ from fish_env.effects.extended import EffectValues
 from fish_env.envs.batch import FishBatch
 from fish_env.envs.layout import OBSERVATION, OBSERVATION_LIMIT, OUTPUTS
 from fish_env.envs.options import env_options
-from fish_env.envs.viewing import Frame, Viewer
+from fish_env.envs.viewing import Frame, Viewer, Watched
 from fish_env.errors import ConfigError
 from fish_env.params.schema import FishParams
-from fish_env.rendering import Scene, Setting
+from fish_env.rendering import Scene
 
 FAILURE = OUTPUTS.index("failure")
 ACTION_SHAPE = (5,)
@@ -37,7 +37,7 @@ def observation_space() -> Box[np.float32]:
     return Box(-OBSERVATION_LIMIT, OBSERVATION_LIMIT, (len(OBSERVATION),), np.float32)
 
 
-class RoboticFish3DEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
+class RoboticFish3DEnv(Watched, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     """A 29 cm robotic fish that holds or tracks depth and heading while it cruises.
 
     One servo swings a rigid tail; inside, a weight block slides fore and aft and swings sideways.
@@ -255,16 +255,6 @@ class RoboticFish3DEnv(gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]
     def close(self) -> None:
         """Close the window, if there is one; may be called again."""
         self._viewer.close()
-
-    @property
-    def window_open(self) -> bool:
-        """Whether there is a window and nobody has closed it; steps go on without it."""
-        return self._viewer.is_open
-
-    @property
-    def setting(self) -> Setting:
-        """What surrounds the fish in pictures: its shape, the tank, the actuators' ranges."""
-        return self._viewer.setting
 
     def scene(self) -> Scene:
         """The fish as it is now, to be drawn by :mod:`fish_env.rendering` at any time.

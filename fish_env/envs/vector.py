@@ -20,16 +20,16 @@ from fish_env.envs.robotic_fish_3d import (
     action_space,
     observation_space,
 )
-from fish_env.envs.viewing import Frame, Viewer
+from fish_env.envs.viewing import Frame, Viewer, Watched
 from fish_env.errors import ConfigError
-from fish_env.rendering import Scene, Setting
+from fish_env.rendering import Scene
 
 BoolArray = npt.NDArray[np.bool_]
 FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
 
 
-class RoboticFish3DVectorEnv(VectorEnv[Float32Array, Float32Array, npt.NDArray[Any]]):
+class RoboticFish3DVectorEnv(Watched, VectorEnv[Float32Array, Float32Array, npt.NDArray[Any]]):
     """N independent :class:`RoboticFish3DEnv`, advanced together on all cores.
 
     Fish i behaves to the last bit like a single environment that was reset with seed + i, whatever
@@ -167,16 +167,6 @@ class RoboticFish3DVectorEnv(VectorEnv[Float32Array, Float32Array, npt.NDArray[A
     def close_extras(self, **kwargs: Any) -> None:
         """Close the window, if there is one."""
         self._viewer.close()
-
-    @property
-    def window_open(self) -> bool:
-        """Whether there is a window and nobody has closed it; steps go on without it."""
-        return self._viewer.is_open
-
-    @property
-    def setting(self) -> Setting:
-        """What surrounds the fish in pictures."""
-        return self._viewer.setting
 
     def scene(self, fish: int = 0) -> Scene:
         """One fish as it is now, to be drawn by :mod:`fish_env.rendering` at any time."""

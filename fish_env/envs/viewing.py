@@ -207,6 +207,22 @@ class Viewer:
             self._window.close()
 
 
+class Watched:
+    """What environments of one and of many fish say of their pictures."""
+
+    _viewer: Viewer
+
+    @property
+    def window_open(self) -> bool:
+        """Whether there is a window and nobody has closed it; steps go on without it."""
+        return self._viewer.is_open
+
+    @property
+    def setting(self) -> Setting:
+        """What surrounds the fish in pictures: its shape, the tank, the actuators' ranges."""
+        return self._viewer.setting
+
+
 def _checked_size(size: Any) -> tuple[int, int]:
     numbers = np.asarray(size)
     whole = numbers.shape == (2,) and np.issubdtype(numbers.dtype, np.integer)

@@ -1,9 +1,12 @@
 """Screening on a linear problem, where the right answers are known."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 from scipy.stats import kstest
 
+from fish_env.diagnosis.causes import Cause, best_of_each
 from fish_env.diagnosis.screening import (
     Projector,
     confusability,
@@ -121,3 +124,15 @@ def test_confusability_of_equal_and_of_unlike_signals():
     rng = np.random.default_rng(8)
     white = Projector(fit).signal(a.cause, 0, rng.standard_normal((PROBLEM.size, 1)))
     assert confusability(a, white) < 0.15
+
+
+@dataclass(frozen=True)
+class Found:
+    cause: Cause
+    log_p: float
+
+
+def test_the_best_alternative_speaks_for_a_cause_and_the_strongest_cause_comes_first():
+    drag, lag = Cause("drag"), Cause("lag")
+    found = [Found(drag, -3.0), Found(lag, -5.0), Found(drag, -9.0), Found(lag, -1.0)]
+    assert best_of_each(found, lambda f: f.log_p) == [found[2], found[1]]

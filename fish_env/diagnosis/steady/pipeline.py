@@ -103,8 +103,8 @@ def diagnose_steady(
         seed: of the split and of the null distributions.
         quick: refit fewer causes.
         progress: told the name of each step.
-        out: folder for ``diagnosis.json`` and, where there is something to extend,
-            ``extended.yaml``.
+        out: folder for ``diagnosis.json``, ``report.html`` with its figures and, where there is
+            something to extend, ``extended.yaml``; nothing is written without it.
 
     Returns:
         The content of ``diagnosis.json``.

@@ -16,7 +16,7 @@ import numpy.typing as npt
 from scipy.optimize import brentq
 from scipy.stats import chi2, ncx2, norm
 
-from fish_env.diagnosis.causes import Cause, Probe, probes_of
+from fish_env.diagnosis.causes import Cause, Probe, best_of_each, probes_of
 from fish_env.diagnosis.steady.fitting import SteadyFit, lines
 from fish_env.diagnosis.steady.orbit import coordinates
 from fish_env.diagnosis.steady.problem import SteadyProblem
@@ -102,12 +102,7 @@ class Screen:
 
     def best(self) -> list[Signal]:
         """The best alternative of each cause, most significant first."""
-        chosen: dict[str, Signal] = {}
-        for signal in self.signals:
-            known = chosen.get(signal.cause.name)
-            if known is None or signal.log_p < known.log_p:
-                chosen[signal.cause.name] = signal
-        return sorted(chosen.values(), key=lambda s: s.log_p)
+        return best_of_each(self.signals, lambda signal: signal.log_p)
 
 
 class Projector:

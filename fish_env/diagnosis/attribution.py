@@ -27,13 +27,6 @@ DOUBT = 6.0
 """Difference of scores (-2 log likelihood, penalised) that decides nothing."""
 
 
-ACCURACY = {"servo_rate_limit": 0.1, "servo_backlash": 0.2}
-"""Share of their effect that a step of 10 ms gets wrong: these make the tail's rate jump.
-
-What is left beside them names no further cause unless it gains more than such an error would.
-"""
-
-
 @dataclass(frozen=True, eq=False)
 class Attribution:
     """Result of the search.
@@ -105,7 +98,7 @@ def attribute(
             e
             for e in tried[1:]
             if alike(problem, best, e)
-            and not same(best.causes[-1], e.causes[-1])
+            and not same(problem.known, best.causes[-1], e.causes[-1])
             and explained_away(e.causes[-1], screens[-2], screens[-1])
         )
     current = pruned(problem, current)
@@ -116,8 +109,12 @@ def attribute(
 
 
 def roughness(explanation: Explanation) -> float:
-    """Share of the evidence for an explanation that its simulation may get wrong."""
-    return max(ACCURACY.get(name, 0.0) ** 2 for name in explanation.causes)
+    """Share of the evidence for an explanation that its simulation may get wrong.
+
+    What is left beside it names no further cause unless it gains more than such an error would.
+    """
+    known = explanation.fit.problem.known
+    return max((known[name].step_error ** 2 for name in explanation.fit.effects), default=0.0)
 
 
 def _with_wandering_phase(

@@ -15,11 +15,6 @@ from fish_env.model.effect import Effect, EffectParameter
 
 Probe = Mapping[str, float]
 PARAMETER = "parameter:"
-EQUAL = {
-    "buoyancy_offset": ("mass.buoyancy",),
-    "com_offset": tuple(f"mass.static_moment_rest[{axis}]" for axis in range(3)),
-}
-"""Effects that do exactly what other values of baseline coefficients do: no rivals, two words."""
 ALIKE = ({"body.plane_xz.drag.c0", "body.plane_xy.drag.c0"},)
 """Coefficients that act alike: both planes' drags at zero incidence brake along the fish."""
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -156,9 +151,15 @@ def effect_values(problem: Problem, name: str, probe: Probe) -> dict[str, float]
     return {f"{PREFIX}{name}.{key}": probe.get(key, value) for key, value in neutral.items()}
 
 
-def same(cause: str, other: str) -> bool:
-    """Whether two causes say the same in other words."""
-    pairs = ((cause, other), (other, cause))
+def same(known: Mapping[str, Effect], cause: str, other: str) -> bool:
+    """Whether two causes say the same in other words.
+
+    Args:
+        known: effects by name.
+        cause: name of an effect, or ``parameter:<path>``.
+        other: likewise.
+    """
     if {cause.removeprefix(PARAMETER), other.removeprefix(PARAMETER)} in ALIKE:
         return True
-    return any(b.removeprefix(PARAMETER) in EQUAL.get(a, ()) for a, b in pairs)
+    pairs = ((cause, other), (other, cause))
+    return any(a in known and b.removeprefix(PARAMETER) in known[a].equals for a, b in pairs)

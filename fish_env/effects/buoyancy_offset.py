@@ -23,6 +23,7 @@ EFFECT = Effect(
         EffectParameter("mass", "kg", 0.0, -1.0, 1.0, (-0.01, 0.01), "extra displaced mass"),
     ),
     hooks={"barycentre": shift_buoyancy},
+    equals=("mass.buoyancy",),
     confusable_with=(
         "com_offset",
         "current",

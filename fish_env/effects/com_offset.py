@@ -30,6 +30,7 @@ EFFECT = Effect(
         _component("z", "down"),
     ),
     hooks={"barycentre": move_barycentre},
+    equals=tuple(f"mass.static_moment_rest[{axis}]" for axis in range(3)),
     confusable_with=(
         "attitude_misalignment",
         "block_scale",

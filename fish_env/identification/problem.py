@@ -66,7 +66,8 @@ class Problem:
         paths: free baseline coefficients; default: all with a prior.
         effects: names of effects whose parameters are free.
         user_effects: effects of the caller's own, among ``effects`` or not.
-        dt: longest RK4 step (s).
+        dt: longest RK4 step (s), but for a moment after each switch of the commands and for
+            effects that make the tail's rate jump, which get finer ones.
     """
 
     def __init__(
@@ -181,7 +182,13 @@ class Problem:
     ) -> list[Filtered]:
         """Extended Kalman filter of every run at one point."""
         record, measurement = self.lane(point)
-        return self.filter_for(point.effects).run(record, measurement, noise, keep_slopes)
+        fine = self.has_corners(point.effects)
+        return self.filter_for(point.effects).run(record, measurement, noise, keep_slopes, fine)
+
+    def has_corners(self, effects: Iterable[str]) -> bool:
+        """Whether one of these effect parameters makes the tail's rate jump at any time."""
+        names = {path.removeprefix(PREFIX).split(".")[0] for path in effects}
+        return any(self.known[n].step_error > 0.0 for n in (*names, *self.model.effects))
 
     def lane(self, point: Point) -> tuple[FloatArray, Measurement]:
         """Parameter record (parameters, 1) of a point, and what its sensors do."""

@@ -31,6 +31,9 @@ of a run from rest, the first samples judge nothing (s)."""
 
 
 SAME_INSTANT_S = 1e-6
+FINE_STEP_S = 0.0025
+SWITCH_S = 0.04
+"""After a switch of the commands a servo may move its tail as fast as it can: steps are fine."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +65,11 @@ class RunData:
     phase_known: bool
 
     @property
+    def fine_substeps(self) -> npt.NDArray[np.int64]:
+        """(T,) steps for motion with corners everywhere, not only where commands switch."""
+        return np.maximum(self.substeps, _steps(self.clock, FINE_STEP_S))
+
+    @property
     def duration(self) -> float:
         """Length (s)."""
         return float(self.clock[-1])
@@ -81,7 +89,7 @@ def prepare_run(
         run: measured run.
         channels: channels to use.
         noise_sd: (C,) white noise of each channel, for the spread of the initial state.
-        dt: longest RK4 step (s).
+        dt: longest RK4 step (s), but for a moment after each switch of the commands.
 
     Raises:
         DatasetError: the run has none of the channels.
@@ -91,8 +99,8 @@ def prepare_run(
     clock, measured = _merged(
         run.time_s - run.time_s[0], np.column_stack([run.channels[name] for name in channels])
     )
-    spans = np.diff(clock, prepend=0.0)
-    substeps = np.maximum(1, np.ceil(spans / dt - 1e-9)).astype(np.int64)
+    switches = run.commands.times_s - run.time_s[0]
+    substeps = _steps(clock, np.where(_after(switches, clock), min(dt, FINE_STEP_S), dt))
     state0, covariance0 = _initial(run, channels, measured, clock, noise_sd)
     if run.start == "rest":
         measured[clock < UNTOLD_S] = np.nan
@@ -101,13 +109,26 @@ def prepare_run(
         run.condition,
         clock,
         substeps,
-        run.commands.times_s - run.time_s[0],
+        switches,
         np.ascontiguousarray(run.commands.values),
         np.ascontiguousarray(measured),
         state0,
         covariance0,
         run.tail_phase is not None,
     )
+
+
+def _steps(clock: FloatArray, longest: float | FloatArray) -> npt.NDArray[np.int64]:
+    spans = np.diff(clock, prepend=0.0)
+    return np.maximum(1, np.ceil(spans / longest - 1e-9)).astype(np.int64)
+
+
+def _after(switches: FloatArray, clock: FloatArray) -> npt.NDArray[np.bool_]:
+    """Whether the interval before each sample lies, in part, in the moment after a switch."""
+    last = np.searchsorted(switches, clock - SAME_INSTANT_S) - 1
+    begin = np.concatenate([clock[:1], clock[:-1]])
+    since = begin - switches[np.maximum(last, 0)]
+    return (last >= 0) & (since < SWITCH_S - SAME_INSTANT_S)
 
 
 def _merged(clock: FloatArray, measured: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -1,0 +1,100 @@
+"""A hidden fish is measured and diagnosed; what the designer then knows, and what is true."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import shutil
+import subprocess
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from fish_env.params import FishParams, load_fish, save_fish
+from scripts.loop.declaration import Declaration, HiddenFish
+from tests.hidden.cases import make_case
+from tests.hidden.truth import Truth
+
+Diagnose = Callable[..., Mapping[str, Any]]
+PIPELINE = "fish_env.diagnosis.pipeline:diagnose"
+ROOT = Path(__file__).resolve().parents[2]
+SHOWN = ("verdict", "causes", "alternatives", "unexplained", "runtime_s")
+"""What of a diagnosis goes into the results."""
+
+
+@dataclass(frozen=True)
+class Known:
+    """One fish after its diagnosis.
+
+    Attributes:
+        name: of the hidden fish.
+        truth: what was hidden.
+        true: parameter file of the hidden fish.
+        extended: what the diagnosis wrote; None where it wrote no extended model.
+        about: verdict, causes, commit and processor time of the diagnosis.
+    """
+
+    name: str
+    truth: Truth
+    true: Path
+    extended: Path | None
+    about: Mapping[str, Any]
+
+
+def measure_and_diagnose(
+    declared: Declaration, hidden: HiddenFish, folder: Path, diagnose: str = PIPELINE
+) -> Known:
+    """Measures and diagnoses a hidden fish, or reads back what an earlier call left.
+
+    Args:
+        declared: the comparison.
+        hidden: one of its fish.
+        folder: gets ``runs``, ``runs.truth.json``, ``true.yaml`` and ``diagnosis``.
+        diagnose: "module:function" with the arguments of
+            :func:`fish_env.diagnosis.pipeline.diagnose`.
+    """
+    finished = folder / "about.json"
+    if not finished.is_file():
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir(parents=True)
+        begun = time.process_time()
+        truth = make_case(declared.tier, hidden.seed, folder / "runs", hidden.effects)
+        save_fish(true_fish(truth), folder / "true.yaml")
+        answer = find(diagnose)(folder / "runs", folder / "diagnosis", seed=hidden.seed)
+        about = {key: answer.get(key) for key in SHOWN}
+        about |= {"commit": commit(), "cpu_s": round(time.process_time() - begun, 1)}
+        finished.write_text(json.dumps(about, indent=1), encoding="utf-8")
+    extended = folder / "diagnosis" / "extended.yaml"
+    return Known(
+        hidden.name,
+        Truth.load(folder / "runs.truth.json"),
+        folder / "true.yaml",
+        extended if extended.is_file() else None,
+        json.loads(finished.read_text(encoding="utf-8")),
+    )
+
+
+def true_fish(truth: Truth) -> FishParams:
+    """The hidden fish as the environment swims it."""
+    fish = load_fish(truth.fish).replace(truth.coefficients)
+    return replace(fish, name="hidden", effects=truth.effects)
+
+
+def find(name: str) -> Diagnose:
+    """The function that "module:function" names."""
+    module, function = name.split(":")
+    found: Diagnose = getattr(importlib.import_module(module), function)
+    return found
+
+
+def commit() -> str:
+    """Commit of the sources, with a plus sign where fish_env differs from it."""
+
+    def git(*words: str) -> str:
+        done = subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True)
+        return done.stdout.strip()
+
+    changed = "+" if git("status", "--porcelain", "fish_env") else ""
+    return (git("rev-parse", "--short", "HEAD") or "unknown") + changed

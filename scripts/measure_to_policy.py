@@ -1,0 +1,141 @@
+"""From measurement to policy: is a policy that learns on the diagnosed model better on the fish?
+
+Fish with undisclosed effects are measured and diagnosed; policies are trained on the printed fish,
+on the extended model that the diagnosis wrote, on draws from its posterior and, for comparison, on
+the hidden fish itself; all are judged on the hidden fish. What is compared was declared beforehand
+in scripts/loop/measure-to-policy.yaml; docs/measure-to-policy.md says what came of it.
+
+    python -m scripts.measure_to_policy
+
+Whatever is finished is kept, so a stopped run goes on where it was.
+"""
+
+from __future__ import annotations
+
+import argparse
+import datetime
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+# One process and one thread: more do not pay for networks this small.
+for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "ROBOFISH_THREADS"):
+    os.environ.setdefault(variable, "1")
+
+from rich.console import Console  # noqa: E402
+
+from scripts.bench.harness import machine, versions  # noqa: E402
+from scripts.loop.declaration import DECLARED, Declaration, load_declaration  # noqa: E402
+from scripts.loop.measuring import PIPELINE, Known, commit, measure_and_diagnose  # noqa: E402
+from scripts.loop.report import fish_entry, markdown, summarise  # noqa: E402
+from scripts.loop.training import ARMS, Score, scored  # noqa: E402
+from scripts.update_readme import updated  # noqa: E402
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = ROOT / "docs" / "measure-to-policy.md"
+NAME = "measure-to-policy"
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    options, console = parse(arguments), Console(soft_wrap=True, highlight=False)
+    declared = load_declaration(options.declared)
+    known = diagnosed(declared, options.work, options.diagnose, console)
+    if options.only_diagnose:
+        return
+    rows = trained(declared, known, options.work, console)
+    write(declared, known, rows, options.out)
+    if options.declared == DECLARED and options.out == ROOT / "results":
+        write_page()
+
+
+def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    add = parser.add_argument
+    add("--declared", type=Path, default=DECLARED, help="what to compare")
+    add("--only-diagnose", action="store_true", help="measure and diagnose, and stop there")
+    add("--diagnose", default=PIPELINE, help="module:function to diagnose with instead")
+    add("--work", type=Path, default=ROOT / "out" / NAME)
+    add("--out", type=Path, default=ROOT / "results", help="folder of the dated result")
+    return parser.parse_args(arguments)
+
+
+def diagnosed(declared: Declaration, work: Path, diagnose: str, console: Console) -> list[Known]:
+    """All fish measured and diagnosed, one after the other, before anything is trained."""
+    found = []
+    for hidden in declared.fish:
+        known = measure_and_diagnose(declared, hidden, work / "fish" / hidden.name, diagnose)
+        names = ", ".join(cause["name"] for cause in known.about["causes"])
+        console.print(f"{hidden.name}: {known.about['verdict']} {names}")
+        found.append(known)
+    return found
+
+
+def trained(
+    declared: Declaration, known: Sequence[Known], work: Path, console: Console
+) -> list[Score]:
+    """All policies trained and judged; every fish gets its first seed before any its second."""
+    rows = []
+    for seed in declared.seeds:
+        for fish in known:
+            for arm in ARMS:
+                row = scored(declared, fish, arm, seed, work)
+                value = row.means[declared.tasks[0]][declared.metrics[0]]
+                console.print(
+                    f"{fish.name}, {arm}, seed {seed}: {declared.metrics[0]} {value:.4g} "
+                    f"({row.cpu_s:.0f} s of processor)"
+                )
+                rows.append(row)
+    return rows
+
+
+def record_of(
+    declared: Declaration, known: Sequence[Known], rows: Sequence[Score]
+) -> dict[str, Any]:
+    """All that the results file holds."""
+    return {
+        "date": datetime.date.today().isoformat(),
+        "commit": commit(),
+        "machine": machine(),
+        "versions": versions(("stable-baselines3", "torch", "gymnasium", "numpy", "numba")),
+        "cpu_s": {
+            "diagnoses": sum(fish.about["cpu_s"] for fish in known),
+            "trainings": sum(row.cpu_s for row in rows),
+        },
+        "fish": [fish_entry(fish) for fish in known],
+        "suite": {"name": declared.suite.name, "episodes": declared.suite.episodes},
+        "recipe": declared.recipe.tree(),
+        "summary": summarise(declared, rows),
+        "scores": [asdict(row) for row in rows],
+    }
+
+
+def write(
+    declared: Declaration, known: Sequence[Known], rows: Sequence[Score], folder: Path
+) -> Path:
+    """Writes the dated result, as numbers and as a page."""
+    record = record_of(declared, known, rows)
+    folder.mkdir(parents=True, exist_ok=True)
+    file = folder / f"{NAME}-{record['date']}.json"
+    file.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+    text = f"# From measurement to policy, {record['date']}\n\n{markdown(record, declared, rows)}\n"
+    file.with_suffix(".md").write_text(text, encoding="utf-8")
+    return file
+
+
+def latest(folder: Path = ROOT / "results") -> str:
+    """The tables of the latest result."""
+    *_, newest = sorted(folder.glob(f"{NAME}-[0-9]*.md"))
+    return newest.read_text(encoding="utf-8").partition("\n")[2].strip()
+
+
+def write_page() -> None:
+    """Puts the latest tables into the page."""
+    text = PAGE.read_text(encoding="utf-8")
+    PAGE.write_text(updated(text, {"results": latest}), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -8,7 +8,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint docs bench benchmark-diagnosis benchmark-agents clean
+.PHONY: help setup demo test lint docs bench benchmark-diagnosis benchmark-agents benchmark-loop clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 28
@@ -48,6 +48,9 @@ benchmark-diagnosis: setup  ## hide effects in made-up measurements, and count w
 
 benchmark-agents: setup  ## measure controllers and shipped policies on the frozen suites
 	$(BIN)/python -m scripts.benchmark_agents
+
+benchmark-loop: setup  ## measure hidden fish, diagnose, learn on what was found, judge on them
+	$(BIN)/python -m scripts.measure_to_policy
 
 clean:  ## remove .venv and everything that builds and tests leave behind
 	rm -rf $(VENV) build dist out .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

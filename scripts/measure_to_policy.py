@@ -15,24 +15,19 @@ from __future__ import annotations
 import argparse
 import datetime
 import json
-import os
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-# One process and one thread: more do not pay for networks this small.
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "ROBOFISH_THREADS"):
-    os.environ.setdefault(variable, "1")
+from rich.console import Console
 
-from rich.console import Console  # noqa: E402
-
-from scripts.bench.harness import machine, versions  # noqa: E402
-from scripts.loop.declaration import DECLARED, Declaration, load_declaration  # noqa: E402
-from scripts.loop.measuring import PIPELINE, Known, commit, measure_and_diagnose  # noqa: E402
-from scripts.loop.report import fish_entry, markdown, summarise  # noqa: E402
-from scripts.loop.training import ARMS, Score, scored  # noqa: E402
-from scripts.update_readme import updated  # noqa: E402
+from scripts.bench.harness import machine, versions
+from scripts.loop.declaration import DECLARED, Declaration, load_declaration
+from scripts.loop.measuring import PIPELINE, Known, commit, measure_and_diagnose
+from scripts.loop.report import fish_entry, markdown, summarise
+from scripts.loop.training import ARMS, Score, scored
+from scripts.update_readme import updated
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "measure-to-policy.md"

@@ -37,8 +37,7 @@ class Attribution:
         accepted: explanation of the last step (the baseline itself when nothing was added).
         rivals: explanations that fit as well as the accepted one.
         ranking: (name, score) of the first step, score in -2 log likelihood against the baseline.
-        tolerated: what the simulation of the accepted causes may get wrong itself, in the same
-            unit.
+        gain: of all accepted causes together, in the same unit.
     """
 
     baseline: Explanation
@@ -46,7 +45,12 @@ class Attribution:
     accepted: Explanation
     rivals: tuple[Explanation, ...]
     ranking: tuple[tuple[str, float], ...]
-    tolerated: float
+    gain: float
+
+    @property
+    def tolerated(self) -> float:
+        """What the simulation of the accepted causes may get wrong itself, in the same unit."""
+        return roughness(self.accepted) * self.gain
 
 
 def attribute(
@@ -67,13 +71,41 @@ def attribute(
         shortlist: causes tried at each step.
         report: told what is being done.
     """
-    current = Explanation((), baseline)
-    screens = [screen(baseline, causes, rng)]
-    rivals: tuple[Explanation, ...] = ()
-    ranking: tuple[tuple[str, float], ...] = ()
-    rough, total = 0.0, 0.0
+    nothing = Explanation((), baseline)
+    begun = Attribution(nothing, (screen(baseline, causes, rng),), nothing, (), (), 0.0)
+    return extended(begun, causes, rng, shortlist, report)
+
+
+def extended(
+    begun: Attribution,
+    causes: Sequence[Cause],
+    rng: np.random.Generator,
+    shortlist: int = 6,
+    report: Callable[[str], None] = lambda step: None,
+    lenience: float = 0.0,
+) -> Attribution:
+    """An attribution with more causes, if more are significant.
+
+    Args:
+        begun: what was found so far.
+        causes: causes to consider.
+        rng: for null distributions.
+        shortlist: causes tried at each step.
+        report: told what is being done.
+        lenience: added to the log p-value that makes a cause significant, where it is known from
+            elsewhere that something is missing.
+    """
+    problem = begun.baseline.fit.problem
+    current, screens, rivals, ranking = (
+        begun.accepted,
+        [*begun.screens],
+        begun.rivals,
+        begun.ranking,
+    )
+    total, rough = begun.gain, roughness(current)
     while len(current.causes) < MOST_CAUSES and not rivals:
-        chosen = shortlisted(problem, screens[-1], shortlist, rough * total)
+        found = len(current.fit.released)
+        chosen = shortlisted(problem, screens[-1], shortlist, rough * total, lenience, found)
         loose = _with_wandering_phase(current, chosen, causes, rng)
         tried, base = refits(current, chosen, report, loose)
         if base is None:
@@ -102,10 +134,7 @@ def attribute(
             and explained_away(e.causes[-1], screens[-2], screens[-1])
         )
     current = pruned(problem, current)
-    tolerated = rough * total
-    return Attribution(
-        Explanation((), baseline), tuple(screens), current, rivals, ranking, tolerated
-    )
+    return Attribution(begun.baseline, tuple(screens), current, rivals, ranking, total)
 
 
 def roughness(explanation: Explanation) -> float:
@@ -148,20 +177,50 @@ def pruned(problem: Problem, current: Explanation) -> Explanation:
     return current
 
 
-def shortlisted(problem: Problem, screen: Screen, count: int, least: float = 0.0) -> list[Signal]:
+def shortlisted(
+    problem: Problem,
+    screen: Screen,
+    count: int,
+    least: float = 0.0,
+    lenience: float = 0.0,
+    found: int = 0,
+) -> list[Signal]:
     """The most significant causes, and among the others those known to look like the first.
 
     Effects and coefficients are two lists: what the tests of the two make of a large misfit does
     not compare. A strong effect is screened far from where it is, so its place among its like
     means little.
+
+    Args:
+        problem: what is fitted.
+        screen: all causes against the present explanation.
+        count: how many effects to try.
+        least: statistic below which an error of the simulation would do.
+        lenience: added to the log p-value that makes a cause significant.
+        found: coefficients in the present explanation.
     """
-    leading = [s for s in screen.best() if s.p_value < screen.threshold and s.statistic >= least]
-    effects = [s for s in leading if s.cause.is_effect]
-    coefficients = [s for s in leading if not s.cause.is_effect]
+    strong = [s for s in screen.best() if s.statistic >= least]
+    effects = [s for s in strong if s.cause.is_effect and s.p_value < screen.threshold + lenience]
+    lifted = [s for s in strong if not s.cause.is_effect]
+    enough = _threshold_of_coefficients(screen, found) + lenience
+    coefficients = [s for s in lifted if s.p_value < enough]
     first = problem.known.get(effects[0].cause.name) if effects else None
     alike = set(first.confusable_with) if first else set()
     like_first = [s for s in effects[count:] if s.cause.name in alike]
     return [*effects[:count], *like_first, *coefficients[: max(1, count // 2)]]
+
+
+def _threshold_of_coefficients(screen: Screen, found: int) -> float:
+    """Log p-value that makes a coefficient significant.
+
+    The first has to stand out among all causes. A fish file that is wrong in one place is soon
+    wrong in several, so the next ones are judged among coefficients alone, and the share of false
+    names is bounded (Benjamini and Hochberg, 1995).
+    """
+    count = sum(not s.cause.is_effect for s in screen.signals) + found
+    if not found or not count:
+        return screen.threshold
+    return max(screen.threshold, float(np.log(screen.level * (found + 1) / count)))
 
 
 def explained_away(cause: str, before: Screen, after: Screen) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,8 +14,8 @@ from threadpoolctl import threadpool_limits
 from fish_env.data import Dataset, load_dataset, split_runs
 from fish_env.diagnosis.adequacy import Adequacy, adequacy
 from fish_env.diagnosis.answer import as_dict
-from fish_env.diagnosis.attribution import Attribution, attribute
-from fish_env.diagnosis.causes import causes_of
+from fish_env.diagnosis.attribution import Attribution, attribute, extended
+from fish_env.diagnosis.causes import Cause, causes_of
 from fish_env.diagnosis.consistency import Consistency, check_consistency
 from fish_env.diagnosis.extended_file import extended_fish
 from fish_env.diagnosis.gain import Gain, Pair, measure_gain, misfit_of
@@ -34,6 +34,8 @@ from fish_env.params.io import load_fish
 from fish_env.params.schema import FishParams
 
 Progress = Callable[[str], None]
+LENIENCE = float(np.log(10.0))
+"""A cause ten times as likely by chance is believed where the misfit itself is beyond chance."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,8 +187,10 @@ def _diagnose_runs(
     progress("what the runs could show")
     shown = preconditions(problem, attribution.screens[0], causes)
     progress("testing what is left")
+    left = adequacy(attribution.accepted.fit, rng, attribution.tolerated)
+    if not left.reached:
+        attribution, left = _with_weaker_causes(attribution, left, causes, rng, progress)
     accepted = attribution.accepted.fit
-    left = adequacy(accepted, rng, attribution.tolerated)
     verdict = decide(attribution, left, shown)
     gain = None
     if verdict.name in EXTENDING and final:
@@ -201,6 +205,22 @@ def _diagnose_runs(
         dataset, final, floors, agreed, problem, attribution, left, shown, verdict, place, misfit,
         gain, proposal, seed, quick, time.perf_counter() - begin,
     )  # fmt: skip
+
+
+def _with_weaker_causes(
+    attribution: Attribution,
+    left: Adequacy,
+    causes: Sequence[Cause],
+    rng: np.random.Generator,
+    progress: Progress,
+) -> tuple[Attribution, Adequacy]:
+    """One more search where something is known to be missing; kept if nothing then is."""
+    more = extended(attribution, causes, rng, 3, progress, LENIENCE)
+    if more.accepted.causes == attribution.accepted.causes:
+        return attribution, left
+    progress("testing what is left")
+    after = adequacy(more.accepted.fit, rng, more.tolerated)
+    return (more, after) if after.reached else (attribution, left)
 
 
 def _refitted(problem: Problem) -> Fit:

@@ -12,6 +12,7 @@ from fish_env.diagnosis.causes import effect_values
 from fish_env.diagnosis.screening import Signal
 from fish_env.identification.estimator import Fit, fit
 from fish_env.identification.filtering import NoiseModel
+from fish_env.identification.free import REACH
 from fish_env.identification.problem import Point, Problem
 from fish_env.identification.sketch import Sketch, Sketcher
 
@@ -42,10 +43,15 @@ class Explanation:
 
 
 def score(problem: Problem, explanation: Explanation) -> float:
-    """-2 log likelihood and prior, with Schwarz' penalty for what the causes added."""
+    """-2 log likelihood and prior, with a penalty for what the causes added.
+
+    Schwarz' for a parameter of an effect. A coefficient had a prior before, which it leaves for one
+    that is :data:`REACH` times as wide: that costs twice the logarithm of the widths' ratio.
+    """
     own = explanation.fit
-    added = len(own.names) - len(problem.baseline) + len(own.released)
-    return own.objective + added * float(np.log(problem.samples))
+    added = len(own.names) - len(problem.baseline)
+    lifted = 2.0 * len(own.released) * float(np.log(REACH))
+    return own.objective + added * float(np.log(problem.samples)) + lifted
 
 
 def loosened(current: Explanation) -> Fit:

@@ -64,7 +64,7 @@ def best_of_each(tests: Iterable[T], log_p: Callable[[T], float]) -> list[T]:
 
 def causes_of(problem: Problem) -> tuple[Cause, ...]:
     """Every cause that can be considered for a problem."""
-    step = max(float(np.max(np.diff(run.clock) / run.substeps[1:])) for run in problem.runs)
+    step = longest_step(problem)
     effects = [
         Cause(effect.name, probes_of(effect, step))
         for effect in problem.known.values()
@@ -72,6 +72,11 @@ def causes_of(problem: Problem) -> tuple[Cause, ...]:
     ]
     coefficients = [Cause(f"{PARAMETER}{p}", path=p) for p in problem.baseline.paths]
     return (*effects, *coefficients)
+
+
+def longest_step(problem: Problem) -> float:
+    """Longest RK4 step (s) between the samples of a problem."""
+    return max(float(np.max(np.diff(run.clock) / run.substeps[1:])) for run in problem.runs)
 
 
 def probes_of(effect: Effect, step: float = 0.0) -> tuple[tuple[Probe, ...], ...]:
@@ -92,7 +97,7 @@ def probes_of(effect: Effect, step: float = 0.0) -> tuple[tuple[Probe, ...], ...
         setting = dict(zip([s.name for s in shapes], values, strict=True))
         for shares in (SHARES, SHARES[-1:]):
             candidates = [_alternative(effect, switches, setting, share) for share in shares]
-            slow = [c for c in candidates if _slow_enough(effect, c, step)]
+            slow = [c for c in candidates if slow_enough(effect, c, step)]
             if slow and slow[0] not in alternatives:
                 alternatives.append(slow[0])
     return tuple(alternatives)
@@ -105,7 +110,7 @@ def _alternative(
     return tuple({**off, **setting, p.name: _between(p, share)} for p in switches)
 
 
-def _slow_enough(effect: Effect, alternative: tuple[Probe, ...], step: float) -> bool:
+def slow_enough(effect: Effect, alternative: Iterable[Probe], step: float) -> bool:
     """Whether RK4 follows the effect: its shortest time constant is about a step or longer."""
     if effect.time_scale is None:
         return True

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from fish_env.diagnosis.causes import Cause
+from fish_env.diagnosis.causes import Cause, Probe
+from fish_env.diagnosis.detectable import Setting, in_proportion, simulated
 from fish_env.diagnosis.screening import Screen, Signal, confusability, smallest_detectable
+from fish_env.identification.estimator import Fit
 from fish_env.identification.problem import Problem
+from fish_env.model.effect import Effect
 
 
 @dataclass(frozen=True)
@@ -32,10 +35,19 @@ class Precondition:
 
 
 def preconditions(
-    problem: Problem, screen: Screen, causes: Sequence[Cause]
+    problem: Problem, screen: Screen, causes: Sequence[Cause], fit: Fit | None = None
 ) -> tuple[Precondition, ...]:
-    """Detectability and confusability of every effect; a cause without a signal is not excited."""
+    """Detectability and confusability of every effect; a cause without a signal is not excited.
+
+    Args:
+        problem: the runs.
+        screen: of the refitted baseline.
+        causes: what was screened.
+        fit: the refitted baseline, to simulate each effect at the size that is published; without
+            it sizes are taken in proportion from plausible ones.
+    """
     strongest = _representative(problem, screen)
+    sizes = _sizes(problem, screen, strongest, fit)
     result = []
     for cause in causes:
         if not cause.is_effect:
@@ -44,20 +56,22 @@ def preconditions(
         if signal is None:
             result.append(Precondition(cause.name, 1.0, {}, None, False))
             continue
-        sizes = _sizes(problem, signal, screen.threshold)
-        ranges = {p.name: p for p in problem.known[cause.name].parameters}
-        excited = any(
-            size <= max(abs(v - ranges[n].neutral) for v in ranges[n].plausible if np.isfinite(v))
-            if np.isfinite(ranges[n].neutral)
-            else size >= min(ranges[n].plausible)
-            for n, size in sizes.items()
-        )
-        result.append(
-            Precondition(
-                cause.name, signal.absorbed_share, sizes, _nearest(signal, strongest), excited
-            )
-        )
+        own = sizes[cause.name]
+        nearest = _nearest(signal, strongest)
+        excited = _excited(problem.known[cause.name], own)
+        result.append(Precondition(cause.name, signal.absorbed_share, own, nearest, excited))
     return tuple(result)
+
+
+def _excited(effect: Effect, sizes: Mapping[str, float]) -> bool:
+    """Whether a plausible size of any parameter would have been found."""
+    ranges = {p.name: p for p in effect.parameters}
+    return any(
+        size <= max(abs(v - ranges[n].neutral) for v in ranges[n].plausible if np.isfinite(v))
+        if np.isfinite(ranges[n].neutral)
+        else size >= min(ranges[n].plausible)
+        for n, size in sizes.items()
+    )
 
 
 def _representative(problem: Problem, screen: Screen) -> dict[str, Signal]:
@@ -66,16 +80,20 @@ def _representative(problem: Problem, screen: Screen) -> dict[str, Signal]:
     A cause with shapes is judged by the shape that shows best. Without shapes the alternatives are
     sizes, and the one nearest to what can just be detected is the truest: effects saturate.
     """
-    alternatives: dict[str, list[Signal]] = {}
-    for signal in screen.signals:
-        if signal.probe >= 0:
-            alternatives.setdefault(signal.cause.name, []).append(signal)
     return {
         name: max(signals, key=lambda s: float(np.trace(s.projected)))
         if any(p.shapes for p in problem.known[name].parameters)
         else min(signals, key=lambda s: abs(np.log(_multiple(s, screen.threshold))))
-        for name, signals in alternatives.items()
+        for name, signals in _alternatives(screen).items()
     }
+
+
+def _alternatives(screen: Screen) -> dict[str, list[Signal]]:
+    alternatives: dict[str, list[Signal]] = {}
+    for signal in screen.signals:
+        if signal.probe >= 0:
+            alternatives.setdefault(signal.cause.name, []).append(signal)
+    return alternatives
 
 
 def _multiple(signal: Signal, threshold: float) -> float:
@@ -83,22 +101,38 @@ def _multiple(signal: Signal, threshold: float) -> float:
     return min(smallest_detectable(signal, i, threshold) for i in range(signal.freedom))
 
 
-def _sizes(problem: Problem, signal: Signal, threshold: float) -> dict[str, float]:
-    """Departure of each probed parameter that is found with power 0.8, the others neutral."""
-    neutral = problem.known[signal.cause.name].neutral
-    sizes = {}
-    for i, probe in enumerate(signal.cause.probes[signal.probe]):
-        alone = smallest_detectable(signal, i, threshold)
-        for name, value in probe.items():
-            if value == neutral[name] or name in sizes:
-                continue
-            if name not in problem.known[signal.cause.name].switching:
-                continue
-            if np.isinf(neutral[name]):
-                sizes[name] = float(value / np.sqrt(max(alone, 1e-12)))
-            else:
-                sizes[name] = float(alone * abs(value - neutral[name]))
+def _sizes(
+    problem: Problem, screen: Screen, strongest: Mapping[str, Signal], fit: Fit | None
+) -> dict[str, dict[str, float]]:
+    """Departure of each switching parameter that is found with power 0.8, the others neutral."""
+    settings = [s for signal in strongest.values() for s in _settings(problem, screen, signal)]
+    multiples = (
+        in_proportion(settings, screen.threshold)
+        if fit is None
+        else simulated(fit, screen, settings)
+    )
+    sizes: dict[str, dict[str, float]] = {name: {} for name in strongest}
+    for setting, multiple in zip(settings, multiples, strict=True):
+        sizes[setting.effect][setting.parameter] = setting.size(multiple)
     return sizes
+
+
+def _settings(problem: Problem, screen: Screen, signal: Signal) -> list[Setting]:
+    """The switching parameters of an effect, each from the mildest probe of the same shape."""
+    effect = problem.known[signal.cause.name]
+    shapes = [p.name for p in effect.parameters if p.shapes]
+    switches = [p for p in effect.parameters if not p.shapes]
+    mildest = next(
+        other
+        for other in _alternatives(screen)[effect.name]
+        if all(_probe(other)[name] == _probe(signal)[name] for name in shapes)
+    )
+    return [Setting(mildest, i, p.name, p.neutral) for i, p in enumerate(switches)]
+
+
+def _probe(signal: Signal) -> Probe:
+    """First setting of an alternative; all share the shape."""
+    return signal.cause.probes[signal.probe][0]
 
 
 def _nearest(signal: Signal, others: dict[str, Signal]) -> tuple[str, float] | None:

@@ -1,0 +1,204 @@
+"""How small an effect may be and still be found by the screen: simulated at that very size.
+
+The screen's signals come from probes of plausible size. What can just be found is often a
+hundredth of that, where a signal may have another direction and grow by another power. So each
+size is simulated again, and corrected until the screen's test would find it with power 0.8.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fish_env.diagnosis.causes import Probe, effect_values, longest_step, slow_enough
+from fish_env.diagnosis.screening import Projector, Screen, Signal, smallest_detectable
+from fish_env.identification.estimator import Fit
+from fish_env.identification.free import Free
+from fish_env.identification.problem import Problem
+
+FloatArray = npt.NDArray[np.float64]
+Jobs = Sequence[tuple[str, Probe]]
+ROUNDS = 3
+TOLERANCE = 0.05
+"""Sizes are corrected until they change by less than this share."""
+SMOOTH = 2.0
+"""Power of its size by which the energy of a small signal grows."""
+FADING = 1.5
+"""One that grows by a smaller power has a part that does not fade with the size: an error of the
+simulation's step, or a limit on something that jumps."""
+ALIKE = 0.1
+NEAR = 0.2
+"""Coefficients that move by less, in prior standard deviations, stay on the tangent."""
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """One parameter that switches an effect on, with the others neutral.
+
+    Attributes:
+        signal: the alternative of the screen that it starts from.
+        index: which of its settings.
+        parameter: name of the parameter.
+        neutral: value at which the effect is off.
+    """
+
+    signal: Signal
+    index: int
+    parameter: str
+    neutral: float
+
+    @property
+    def effect(self) -> str:
+        """Name of the effect."""
+        return self.signal.cause.name
+
+    def probe(self, multiple: float) -> Probe:
+        """The setting with so many times its signal, if that were in proportion."""
+        probe = dict(self.signal.cause.probes[self.signal.probe][self.index])
+        there = probe[self.parameter]
+        probe[self.parameter] = (
+            there / float(np.sqrt(multiple))
+            if np.isinf(self.neutral)
+            else self.neutral + multiple * (there - self.neutral)
+        )
+        return probe
+
+    def size(self, multiple: float) -> float:
+        """Departure from neutral; the value itself where neutral is infinite."""
+        value = self.probe(multiple)[self.parameter]
+        return float(value if np.isinf(self.neutral) else abs(value - self.neutral))
+
+
+def in_proportion(settings: Sequence[Setting], threshold: float) -> FloatArray:
+    """Multiples (n,) of the probes that are found with power 0.8 if signals keep their shape."""
+    return np.array([smallest_detectable(s.signal, s.index, threshold) for s in settings])
+
+
+def simulated(fit: Fit, screen: Screen, settings: Sequence[Setting]) -> FloatArray:
+    """Multiples (n,) of the probes that the screen finds with power 0.8.
+
+    No size is published that the simulation is too coarse for. Where a signal does not fade with
+    the size, the size is taken in proportion from the probe; where it does not fade there either,
+    every size shows that can be simulated, and the probe itself is the answer.
+
+    Args:
+        fit: what the screen was made against.
+        screen: signals and threshold.
+        settings: what to find the size of.
+    """
+    step = longest_step(fit.problem)
+    least = np.array([_least(fit.problem, setting, step) for setting in settings])
+    wanted = in_proportion(settings, screen.threshold)
+    probe = np.ones(len(settings))
+    last, last_energy = probe, np.array([_information(s) for s in settings])
+    target = last_energy * wanted**2
+    at: FloatArray = np.maximum(wanted, least)
+    moving, endless = np.ones(len(settings), bool), np.zeros(len(settings), bool)
+    for turn in range(ROUNDS):
+        energy = _energies(fit, screen, settings, at, moving)
+        moving &= np.isfinite(energy)
+        power = _power(at, energy, last, last_energy)
+        endless |= moving & (at <= probe) & (power < FADING)
+        moving &= ~endless
+        steps = np.log(target / energy) / (np.clip(power, 1.0, 4.0) if turn else SMOOTH)
+        last, last_energy = at.copy(), energy
+        at[moving] = np.maximum(at * np.exp(steps), least)[moving]
+        moving &= np.abs(np.log(at / last)) > TOLERANCE
+    energy = _energies(fit, screen, settings, probe, endless)
+    twice = _energies(fit, screen, settings, 2.0 * probe, endless)
+    fades = _power(probe, energy, 2.0 * probe, twice) >= FADING
+    from_probe = np.where(fades, np.sqrt(target / energy), 1.0)
+    return np.where(endless, np.maximum(np.where(least > 0.0, 0.0, from_probe), least), at)
+
+
+def _power(
+    size: FloatArray, energy: FloatArray, other: FloatArray, other_energy: FloatArray
+) -> FloatArray:
+    """Power of the size by which energy grows; that of a smooth effect where sizes are alike."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        power = np.log(energy / other_energy) / np.log(size / other)
+    return np.where(np.abs(np.log(size / other)) < ALIKE, SMOOTH, power)
+
+
+def _least(problem: Problem, setting: Setting, step: float) -> float:
+    """Smallest multiple of a probe that the simulation follows; 0 if it follows any."""
+    effect = problem.known[setting.effect]
+    if slow_enough(effect, [setting.probe(1e-9)], step):
+        return 0.0
+    multiples = np.geomspace(1e-6, 1.0, 200)
+    return next(float(m) for m in multiples if slow_enough(effect, [setting.probe(m)], step))
+
+
+def _information(setting: Setting) -> float:
+    """Noncentrality of the probe itself."""
+    signal, i = setting.signal, setting.index
+    return float(signal.projected[i, i]) / signal.inflation
+
+
+def _energies(
+    fit: Fit,
+    screen: Screen,
+    settings: Sequence[Setting],
+    multiples: FloatArray,
+    asked: npt.NDArray[np.bool_],
+) -> FloatArray:
+    """Noncentrality (n,) of the screen's test; NaN where not asked for, or not physical."""
+    which = [i for i in np.flatnonzero(asked).tolist() if _allowed(fit.problem, settings[i], multiples[i])]
+    energy = np.full(len(settings), np.nan)
+    if which:
+        jobs = [(settings[i].effect, settings[i].probe(multiples[i])) for i in which]
+        for i, change in zip(which, changes(fit, jobs), strict=True):
+            energy[i] = noncentrality(screen, settings[i].effect, change)
+    return energy
+
+
+def _allowed(problem: Problem, setting: Setting, multiple: float) -> bool:
+    """Whether the physics allows the size."""
+    value = setting.probe(multiple)[setting.parameter]
+    bounds = {p.name: (p.lower, p.upper) for p in problem.known[setting.effect].parameters}
+    low, high = bounds[setting.parameter]
+    return bool(low <= value <= high)
+
+
+def changes(fit: Fit, jobs: Jobs) -> FloatArray:
+    """What settings of effects change in the residuals, shape (n, D), for a refit to follow.
+
+    A refit follows a large change along a curve, not along its tangent. So each setting is
+    simulated again with the coefficients where the tangent leads, and what they explain there is
+    added back: projecting the result leaves what a refit would leave, to second order.
+    """
+    projector, own = Projector(fit), Free(fit.problem, (), fit.released)
+    start = np.repeat(fit.point.z[:, None], len(jobs), axis=1)
+    seen = _simulated(fit, jobs, start)
+    followed = projector.coefficients(seen.T)[: len(start)]
+    far = np.flatnonzero(np.abs(followed).max(axis=0) > NEAR).tolist()
+    if far:
+        there = np.array([own.clip(z) for z in (start - followed).T[far]]).T
+        moved = _simulated(fit, [jobs[i] for i in far], there)
+        moved -= (projector.lin.slopes[:, : len(start)] @ (there - start[:, far])).T
+        seen[far] = np.where(np.isfinite(moved), moved, seen[far])
+    return seen
+
+
+def _simulated(fit: Fit, jobs: Jobs, z: FloatArray) -> FloatArray:
+    """Change of the residuals (n, D) with each setting, at coefficients (coefficients, n)."""
+    problem = fit.problem
+    base = {**problem.neutral({name for name, _ in jobs}), **fit.point.effects}
+    values = [effect_values(problem, name, probe) for name, probe in jobs]
+    lanes = {path: np.array([own.get(path, base[path]) for own in values]) for path in base}
+    out = problem.innovations(z, lanes, fit.noise, fit.filtered)
+    return np.asarray(out - fit.linearised.residuals)
+
+
+def noncentrality(screen: Screen, effect: str, change: FloatArray) -> float:
+    """What a change (D,) of the residuals adds to the screen's test of an effect, at its best."""
+    found = 0.0
+    for signal in screen.signals:
+        if signal.cause.name == effect:
+            score = signal.left.T @ change
+            energy = float(score @ np.linalg.solve(signal.projected, score))
+            found = max(found, energy / signal.inflation)
+    return found

@@ -146,7 +146,11 @@ def _energies(
     asked: npt.NDArray[np.bool_],
 ) -> FloatArray:
     """Noncentrality (n,) of the screen's test; NaN where not asked for, or not physical."""
-    which = [i for i in np.flatnonzero(asked).tolist() if _allowed(fit.problem, settings[i], multiples[i])]
+    which = [
+        i
+        for i in np.flatnonzero(asked).tolist()
+        if _allowed(fit.problem, settings[i], multiples[i])
+    ]
     energy = np.full(len(settings), np.nan)
     if which:
         jobs = [(settings[i].effect, settings[i].probe(multiples[i])) for i in which]

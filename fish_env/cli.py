@@ -113,7 +113,9 @@ def diagnose(
     fish: Annotated[
         str | None, typer.Option(help="Another fish than the dataset names: preset or file.")
     ] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="A first look: try fewer causes.")] = False,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A first look: fewer runs, no rival causes.")
+    ] = False,
     seed: Annotated[int, typer.Option(help="Of all that is random.")] = 0,
 ) -> None:
     """Find what the simulation gets wrong: a cause with numbers, or an honest "none I know".

@@ -25,7 +25,7 @@ def diagnose_dataset(
         dataset: Folder, or name of a shipped dataset.
         out: Folder for `diagnosis.json`, `report.html` and `extended.yaml`.
         fish: Another fish than the dataset names: preset or file.
-        quick: Refit fewer causes.
+        quick: Take a first look only.
         seed: Of the split into runs and of the null distributions.
 
     Raises:
@@ -57,7 +57,7 @@ def print_answer(console: Console, answer: dict[str, Any]) -> None:
     """Prints the verdict in words, then what supports it."""
     console.print(f"[bold]{answer['verdict']}[/bold]  {escape(words(answer))}", highlight=False)
     if answer["quick"]:
-        console.print("a first look: only the three likeliest causes were refitted", style="dim")
+        console.print(f"a first look, without {'; '.join(answer['left_out'])}", style="dim")
     if answer["causes"]:
         console.print(_causes(answer))
     console.print(_misfit(answer))

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from fish_env.diagnosis import consistency, noise_floor
 from fish_env.diagnosis.causes import PARAMETER
+from fish_env.diagnosis.effort import QUICK
 from fish_env.diagnosis.entries import (
     FORMAT,
     Plain,
@@ -39,6 +40,7 @@ def as_dict(diagnosis: Diagnosis) -> Plain:
         "fish": diagnosis.problem.fish.name,
         "seed": diagnosis.seed,
         "quick": diagnosis.quick,
+        "left_out": list(QUICK.left_out) if diagnosis.quick else [],
         "runtime_s": diagnosis.runtime_s,
         "verdict": verdict.name,
         "causes": [cause_entry(diagnosis.accepted, name) for name in verdict.causes],

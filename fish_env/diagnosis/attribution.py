@@ -9,6 +9,7 @@ import numpy as np
 
 from fish_env.diagnosis.adequacy import strains
 from fish_env.diagnosis.causes import Cause, same
+from fish_env.diagnosis.effort import FULL, Effort
 from fish_env.diagnosis.screening import Screen, Signal, screen
 from fish_env.diagnosis.search import (
     Explanation,
@@ -58,7 +59,7 @@ def attribute(
     baseline: Fit,
     causes: Sequence[Cause],
     rng: np.random.Generator,
-    shortlist: int = 6,
+    effort: Effort = FULL,
     report: Callable[[str], None] = lambda step: None,
 ) -> Attribution:
     """Add causes while one is significant, keep all that explain the data alike.
@@ -68,19 +69,19 @@ def attribute(
         baseline: refitted baseline.
         causes: causes to consider.
         rng: for null distributions.
-        shortlist: causes tried at each step.
+        effort: how much to spend.
         report: told what is being done.
     """
     nothing = Explanation((), baseline)
     begun = Attribution(nothing, (screen(baseline, causes, rng),), nothing, (), (), 0.0)
-    return extended(begun, causes, rng, shortlist, report)
+    return extended(begun, causes, rng, effort, report)
 
 
 def extended(
     begun: Attribution,
     causes: Sequence[Cause],
     rng: np.random.Generator,
-    shortlist: int = 6,
+    effort: Effort = FULL,
     report: Callable[[str], None] = lambda step: None,
     lenience: float = 0.0,
 ) -> Attribution:
@@ -90,24 +91,20 @@ def extended(
         begun: what was found so far.
         causes: causes to consider.
         rng: for null distributions.
-        shortlist: causes tried at each step.
+        effort: how much to spend.
         report: told what is being done.
         lenience: added to the log p-value that makes a cause significant, where it is known from
             elsewhere that something is missing.
     """
     problem = begun.baseline.fit.problem
-    current, screens, rivals, ranking = (
-        begun.accepted,
-        [*begun.screens],
-        begun.rivals,
-        begun.ranking,
-    )
+    current, screens = begun.accepted, [*begun.screens]
+    rivals, ranking = begun.rivals, begun.ranking
     total, rough = begun.gain, roughness(current)
     while len(current.causes) < MOST_CAUSES and not rivals:
         found = len(current.fit.released)
-        chosen = shortlisted(problem, screens[-1], shortlist, rough * total, lenience, found)
-        loose = _with_wandering_phase(current, chosen, causes, rng)
-        tried, base = refits(current, chosen, report, loose)
+        chosen = shortlisted(problem, screens[-1], effort.shortlist, rough * total, lenience, found)
+        loose = _with_wandering_phase(current, chosen, causes, rng) if effort.retries else None
+        tried, base = refits(current, chosen, report, loose, effort.finalists)
         if base is None:
             break
         if not ranking:
@@ -118,7 +115,7 @@ def extended(
         total += gain
         after = screen(tried[0].fit, causes, rng)
         rough = roughness(tried[0])
-        if shortlisted(problem, after, 1, rough * total):
+        if effort.retries and shortlisted(problem, after, 1, rough * total):
             again = second_look(current, tried, [*chosen, *_new(after, chosen)], report)
             if again[0] is not tried[0]:
                 after = screen(again[0].fit, causes, rng)

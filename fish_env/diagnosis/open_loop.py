@@ -15,9 +15,7 @@ from fish_env.model.state import BASE_STATES
 FloatArray = npt.NDArray[np.float64]
 
 
-def without_feedback(
-    run: RunData, states: int = len(BASE_STATES), fine: bool = False
-) -> Filtered:
+def without_feedback(run: RunData, states: int = len(BASE_STATES), fine: bool = False) -> Filtered:
     """Gains of zero, so that "innovations" are plain prediction errors."""
     samples, channels = run.measured.shape
     return Filtered(

@@ -17,6 +17,7 @@ from fish_env.diagnosis.answer import as_dict
 from fish_env.diagnosis.attribution import Attribution, attribute, extended
 from fish_env.diagnosis.causes import Cause, causes_of
 from fish_env.diagnosis.consistency import Consistency, check_consistency
+from fish_env.diagnosis.effort import FULL, QUICK
 from fish_env.diagnosis.extended_file import extended_fish
 from fish_env.diagnosis.gain import Gain, Pair, measure_gain, misfit_of
 from fish_env.diagnosis.next_experiment import Proposal, propose
@@ -57,7 +58,7 @@ class Diagnosis:
         gain: on the final runs; None without an extension, or without final runs.
         next_experiment: manoeuvre that separates what is still open; None where nothing is.
         seed: seed of splits and null distributions.
-        quick: whether fewer causes were refitted.
+        quick: whether this is a first look.
         runtime_s: wall time.
     """
 
@@ -99,7 +100,7 @@ def diagnose(
         out: folder for ``diagnosis.json``, ``report.html`` with its figures and, where there is
             something to extend, ``extended.yaml``; nothing is written without it.
         seed: of the split and of the null distributions.
-        quick: refit fewer causes.
+        quick: a first look, which leaves out what :data:`~fish_env.diagnosis.effort.QUICK` says.
         fish: another fish than the dataset names: parameters, preset or file.
         progress: told the name of each step.
 
@@ -155,7 +156,7 @@ def diagnose_runs(
         dataset: measured runs.
         fish: parameters; default: the dataset's own.
         seed: of the split and of the null distributions.
-        quick: refit fewer causes.
+        quick: a first look, which leaves out what :data:`~fish_env.diagnosis.effort.QUICK` says.
         progress: told the name of each step.
 
     Raises:
@@ -171,6 +172,7 @@ def _diagnose_runs(
 ) -> Diagnosis:
     begin = time.perf_counter()
     rng = np.random.default_rng(seed)
+    effort = QUICK if quick else FULL
     progress("checking the runs")
     check_runs(dataset)
     progress("comparing the channels with each other")
@@ -178,17 +180,17 @@ def _diagnose_runs(
     agreed = check_consistency(dataset, np.random.default_rng([seed, 2]), floors)
     fitted, final = _split(dataset, seed)
     progress("refitting the baseline")
-    problem = Problem(dataset, fish, fitted)
+    problem = Problem(dataset, fish, fitted).subset(effort.runs)
     baseline = _refitted(problem)
     problem = baseline.problem  # with the tail phases settled
     causes = causes_of(problem)
     progress("screening causes")
-    attribution = attribute(problem, baseline, causes, rng, 3 if quick else 6, progress)
+    attribution = attribute(problem, baseline, causes, rng, effort, progress)
     progress("what the runs could show")
     shown = preconditions(problem, attribution.screens[0], causes)
     progress("testing what is left")
     left = adequacy(attribution.accepted.fit, rng, attribution.tolerated)
-    if not left.reached:
+    if effort.retries and not left.reached:
         attribution, left = _with_weaker_causes(attribution, left, causes, rng, progress)
     accepted = attribution.accepted.fit
     verdict = decide(attribution, left, shown)
@@ -215,7 +217,7 @@ def _with_weaker_causes(
     progress: Progress,
 ) -> tuple[Attribution, Adequacy]:
     """One more search where something is known to be missing; kept if nothing then is."""
-    more = extended(attribution, causes, rng, 3, progress, LENIENCE)
+    more = extended(attribution, causes, rng, FULL, progress, LENIENCE)
     if more.accepted.causes == attribution.accepted.causes:
         return attribution, left
     progress("testing what is left")

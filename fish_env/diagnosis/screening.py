@@ -225,6 +225,7 @@ def null_threshold(signals: Sequence[Signal], rng: np.random.Generator, level: f
     """
     effects = [s for s in signals if s.probe >= 0]
     smallest = np.zeros(DRAWS)
+    largest: dict[int, FloatArray] = {}  # statistic of as many degrees of freedom
     if effects:
         stacked = np.concatenate([s.left for s in effects], axis=1)
         gram = inner(stacked, stacked)
@@ -237,9 +238,12 @@ def null_threshold(signals: Sequence[Signal], rng: np.random.Generator, level: f
         for s in effects:
             part = slice(at, at + s.freedom)
             block = correlation[part, part] + 1e-9 * np.eye(s.freedom)
-            statistic = np.einsum("ij,ij->j", draws[part], np.linalg.solve(block, draws[part]))
-            smallest = np.minimum(smallest, np.log(chdtrc(s.freedom, statistic)))
+            white = np.linalg.solve(np.linalg.cholesky(block), draws[part])
+            statistic = np.einsum("ij,ij->j", white, white)
+            largest[s.freedom] = np.maximum(largest.get(s.freedom, 0.0), statistic)
             at += s.freedom
+    for freedom, statistic in largest.items():
+        smallest = np.minimum(smallest, np.log(chdtrc(freedom, statistic)))
     coefficients = sum(s.probe < 0 for s in signals)
     if coefficients:
         uniform = rng.random(DRAWS)

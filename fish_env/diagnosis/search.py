@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fish_env.diagnosis.causes import effect_values
+from fish_env.diagnosis.effort import FULL
 from fish_env.diagnosis.screening import Signal
 from fish_env.identification.estimator import Fit, fit
 from fish_env.identification.filtering import NoiseModel
@@ -22,7 +23,6 @@ WANDER = 0.3
 """rad/s^0.5. Enough to stay in step with a beat that is a tenth off."""
 FAR = 2.0
 """A baseline coefficient this many prior deviations off may be so to make up for a cause."""
-FINALISTS = 4
 BEHIND = 0.25
 """A sketch that gains less by more than this share of the best one's gain is not fitted in full."""
 LEEWAY = 100.0
@@ -72,6 +72,7 @@ def refits(
     chosen: Sequence[Signal],
     report: Report,
     loose: tuple[Fit, Sequence[Signal]] | None = None,
+    most: int = FULL.finalists,
 ) -> tuple[list[Explanation], Explanation | None]:
     """Fits with one more cause each, best first, and the present one under the best one's noise.
 
@@ -83,6 +84,7 @@ def refits(
         chosen: causes to add.
         report: told what is being done.
         loose: fit with a wandering phase, and what it shows to be missing.
+        most: how many causes to fit in full.
     """
     base = current.fit
     sketcher = Sketcher(base)
@@ -96,7 +98,7 @@ def refits(
     for signal in chosen:
         report(f"trying {signal.cause.name}")
         sketches += _sketches(sketcher, base, signal, starts(base, signal))
-    finalists = _finalists(sketches, sketcher.base(), BEHIND)
+    finalists = _finalists(sketches, sketcher.base(), BEHIND, most)
     if not finalists:
         return [], None
     name, sketch = finalists[0]
@@ -131,7 +133,7 @@ def second_look(
             begin = starts(current.fit, signal, best.point.z)
             sketches += _sketches(sketcher, current.fit, signal, begin)
     reached = sketcher.base()
-    finalists = _finalists(sketches, reached, 0.0)
+    finalists = _finalists(sketches, reached, 0.0, FULL.finalists)
     finalists = [f for f in finalists if f[1].objective < reached + LEEWAY]
     more = _rest(current, finalists, best, report)
     return _best_first([*tried, *more])[0]
@@ -199,7 +201,7 @@ def _probed(problem: Problem, signal: Signal) -> list[dict[str, float]]:
 
 
 def _finalists(
-    sketches: list[tuple[str, Sketch]], base: float, behind: float
+    sketches: list[tuple[str, Sketch]], base: float, behind: float, most: int
 ) -> list[tuple[str, Sketch]]:
     """The sketches that may still be the best fit, best first."""
     if not sketches:
@@ -209,7 +211,7 @@ def _finalists(
     ranked = [ranked[i] for i in sorted(first.values())]  # a cause may have several
     best = ranked[0][1].objective
     margin = max(LEEWAY, behind * (base - best))
-    return [s for s in ranked[:FINALISTS] if s[1].objective <= best + margin]
+    return [s for s in ranked[:most] if s[1].objective <= best + margin]
 
 
 def _rest(
@@ -240,7 +242,7 @@ def _best_first(tried: list[Explanation]) -> tuple[list[Explanation], NoiseModel
 def _in_full(problem: Problem, sketch: Sketch, noise: NoiseModel) -> Fit:
     few = problem.subset(3)
     first = fit(few, sketch.effects, sketch.point, noise, sketch.released, rounds=2)
-    return _noise_too(problem, first)
+    return first if few is problem else _noise_too(problem, first)
 
 
 def _at_noise(problem: Problem, at: Sketch | Fit, noise: NoiseModel, iterations: int) -> Fit:

@@ -97,6 +97,7 @@ class Problem:
         )
         self.baseline = Baseline(self.fish, paths)
         self.effects = tuple(effects)
+        self.plain_steps = False
         unknown = [name for name in self.effects if name not in self.known]
         if unknown:
             raise EffectError(f"unknown effects {unknown}; known: {', '.join(self.known)}")
@@ -185,8 +186,16 @@ class Problem:
         fine = self.has_corners(point.effects)
         return self.filter_for(point.effects).run(record, measurement, noise, keep_slopes, fine)
 
+    def with_plain_steps(self) -> Problem:
+        """The same problem without finer steps for effects that make the tail's rate jump."""
+        other = copy(self)
+        other.plain_steps = True
+        return other
+
     def has_corners(self, effects: Iterable[str]) -> bool:
-        """Whether one of these effect parameters makes the tail's rate jump at any time."""
+        """Whether one of these effect parameters asks for fine steps at any time."""
+        if self.plain_steps:
+            return False
         names = {path.removeprefix(PREFIX).split(".")[0] for path in effects}
         return any(self.known[n].step_error > 0.0 for n in (*names, *self.model.effects))
 

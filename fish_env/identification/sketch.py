@@ -44,8 +44,11 @@ class Sketcher:
 
     def __init__(self, fit: Fit, runs: int = 2) -> None:
         self.fit = fit
-        self.few: Problem = fit.problem.subset(runs)
-        self.one: Problem = fit.problem.subset(1)
+        problem = fit.problem
+        if not problem.has_corners(fit.point.effects):
+            problem = problem.with_plain_steps()  # good enough to see who leads, and much quicker
+        self.few: Problem = problem.subset(runs)
+        self.one: Problem = problem.subset(1)
 
     def base(self) -> float:
         """Objective of the fit itself on these runs."""

@@ -46,7 +46,7 @@ def verdict(answer: Answer, series: Series, folder: Path) -> str:
     name = str(answer["verdict"])
     facts = [f"dataset {answer.get('dataset', '?')}", f"fish {answer.get('fish', '?')}"]
     if answer.get("quick"):
-        facts.append("a first look: only the likeliest causes were refitted")
+        facts.append(f"a first look, without {'; '.join(answer.get('left_out', []))}")
     return (
         f'<header class="rp-verdict rp-{text(name)}"><p class="rp-facts">{text(" · ".join(facts))}'
         f"</p><h1>{text(VERDICTS.get(name, name))}</h1>"

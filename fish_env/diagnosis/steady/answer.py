@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from fish_env.diagnosis.effort import STEADY_LEFT_OUT
 from fish_env.diagnosis.entries import (
     FORMAT,
     Plain,
@@ -33,6 +34,7 @@ def as_dict(diagnosis: SteadyDiagnosis) -> Plain:
         "fish": accepted.problem.fish.name,
         "seed": diagnosis.seed,
         "quick": diagnosis.quick,
+        "left_out": list(STEADY_LEFT_OUT) if diagnosis.quick else [],
         "runtime_s": diagnosis.runtime_s,
         "verdict": verdict.name,
         "causes": [cause_entry(accepted, name) for name in verdict.causes],

@@ -1,0 +1,41 @@
+"""How much a diagnosis spends: all it can, or a first look."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Effort:
+    """What is spent on one diagnosis of runs.
+
+    Attributes:
+        runs: most runs that are fitted.
+        shortlist: effects tried at each step.
+        finalists: of these, fitted in full.
+        retries: whether what was found is questioned: other starts from where the winner is,
+            tails out of step with their beat, weaker causes where something is missing.
+        left_out: in words, what a full diagnosis does beyond this one.
+    """
+
+    runs: int
+    shortlist: int
+    finalists: int
+    retries: bool
+    left_out: tuple[str, ...] = ()
+
+
+FULL = Effort(runs=10_000, shortlist=6, finalists=4, retries=True)
+QUICK = Effort(
+    runs=2,
+    shortlist=3,
+    finalists=1,
+    retries=False,
+    left_out=(
+        "all but two of the runs for fitting",
+        "fits of rival causes, so nothing comes out as ambiguous",
+        "second looks: from the winner, at tails out of step, for weaker causes",
+    ),
+)
+STEADY_LEFT_OUT = ("fits of all but the three likeliest causes",)
+"""What a first look at a steady table leaves out."""

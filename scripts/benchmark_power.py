@@ -1,0 +1,143 @@
+"""How often an effect of a chosen size is found, against what the diagnosis publishes.
+
+For each design (a fish, schedules, a size of the noise) the smallest detectable sizes are published
+from runs without any effect. Then the same design is swum again, with other noise and an effect of
+some multiple of its published size, and screened: the baseline refit and the largest of all tests,
+which is the cheap part of a diagnosis. A few of these data sets are diagnosed in full.
+
+Each finished data set is kept, so a stopped run goes on where it was:
+
+    python scripts/benchmark_power.py --designs 4
+"""
+
+from __future__ import annotations
+
+import argparse
+import datetime
+import json
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "ROBOFISH_THREADS"):
+    os.environ.setdefault(variable, "1")
+
+from rich.progress import track  # noqa: E402
+
+from scripts.power import report  # noqa: E402
+from scripts.power.looks import Target, diagnosed, with_effect, without_effect  # noqa: E402
+
+SIZES = (0.6, 0.8, 1.0, 1.4)
+FAR = (1.0, 4.0)
+WHOLE = 1.4
+"""Multiple at which whole diagnoses are made."""
+TARGETS = (
+    Target("frequency_scale", "scale", -1.0),
+    Target("added_mass", "yaw"),
+    Target("linear_drag", "surge"),
+    Target("buoyancy_offset", "mass"),
+    Target("current", "north"),
+    Target("gyro_bias", "r"),
+    Target("sensor_delay", "delay"),
+)
+AGAIN = TARGETS[:3]
+"""Those that are measured under twice the noise, too."""
+HIDDEN_BY_THE_START = (Target("depth_bias", "offset"), Target("position_scale", "scale"))
+"""Those whose signal is in where a run starts, which the measurement itself says."""
+
+
+@dataclass(frozen=True)
+class Look:
+    """One data set with an effect."""
+
+    target: Target
+    multiple: float
+    design: int
+    repeat: int
+    noise: str
+    whole: bool = False
+
+    @property
+    def file(self) -> str:
+        """Where its result is kept."""
+        kind = "whole" if self.whole else "look"
+        return f"{kind}-{self.noise}-{self.design}-{self.target.name}-{self.multiple:g}.json"
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    options = parse(arguments)
+    options.work.mkdir(parents=True, exist_ok=True)
+    todo = list(looks(options.designs, options.again))
+    if options.finished:
+        todo = [look for look in todo if (options.work / look.file).exists()]
+    begin = time.monotonic()
+    rows = [do(look, options.work) for look in track(todo, f"{len(todo)} data sets")]
+    nothing = [json.loads(f.read_text()) for f in sorted(options.work.glob("nothing-*.json"))]
+    print(f"{time.monotonic() - begin:.0f} s")
+    today = datetime.date.today().isoformat()
+    report.write(today, rows, nothing, options.out, options.picture)
+
+
+def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    add = parser.add_argument
+    add("--designs", type=int, default=4, help="fish and schedules under the nominal noise")
+    add("--again", type=int, default=3, help="of them under twice the noise")
+    add("--finished", action="store_true", help="only sum up what is finished so far")
+    add("--work", type=Path, default=ROOT / "out" / "benchmark-power")
+    add("--out", type=Path, default=ROOT / "results", help="folder of the dated result")
+    add("--picture", type=Path, default=ROOT / "docs" / "images" / "power.png")
+    return parser.parse_args(arguments)
+
+
+def looks(designs: int, again: int) -> Iterator[Look]:
+    """All data sets, one design after the other, so that an early stop has seen all effects."""
+    for design in range(designs):
+        yield from at_sizes(TARGETS, SIZES, design, "nominal", 1)
+        if design < again:
+            yield from at_sizes(AGAIN, SIZES, design, "double", 101)
+        if design < 2:
+            yield from at_sizes(HIDDEN_BY_THE_START, FAR, design, "nominal", 201)
+    for number, target in enumerate(TARGETS):
+        yield Look(target, WHOLE, 0, 301 + number, "nominal", whole=True)
+
+
+def at_sizes(
+    targets: Sequence[Target], sizes: Sequence[float], design: int, noise: str, first: int
+) -> Iterator[Look]:
+    """Every target at every size, each with noise of its own, numbered from the first on."""
+    pairs = [(target, size) for target in targets for size in sizes]
+    for number, (target, size) in enumerate(pairs):
+        yield Look(target, size, design, first + number, noise)
+
+
+def do(look: Look, work: Path) -> dict[str, Any]:
+    """One data set; a finished one is read back."""
+    design, noise = look.design, look.noise
+    nothing = kept(work / f"nothing-{noise}-{design}.json", lambda: without_effect(design, noise))
+    size = nothing["published"][look.target.name]
+    make = diagnosed if look.whole else with_effect
+    return kept(
+        work / look.file,
+        lambda: make(look.target, look.multiple, size, design, look.repeat, noise),
+    )
+
+
+def kept(file: Path, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
+    """A result, made if there is none yet."""
+    if not file.exists():
+        unfinished = file.with_suffix(".part")
+        unfinished.write_text(json.dumps(make(), indent=1), encoding="utf-8")
+        unfinished.replace(file)
+    result: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+    return result
+
+
+if __name__ == "__main__":
+    main()

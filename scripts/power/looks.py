@@ -1,0 +1,146 @@
+"""Data sets with an effect of a chosen size, and the cheap part of a diagnosis on each."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.stats import chi2
+from threadpoolctl import threadpool_limits
+
+from fish_env.data import Dataset, load_dataset, split_runs
+from fish_env.diagnosis.causes import causes_of
+from fish_env.diagnosis.pipeline import diagnose_runs
+from fish_env.diagnosis.preconditions import preconditions
+from fish_env.diagnosis.screening import Screen, screen
+from fish_env.identification.estimator import Fit, fit
+from fish_env.identification.problem import Problem
+from scripts.power.limits import limits
+from tests.hidden.designs import Noise, swim_design
+from tests.hidden.records import LIBRARY
+from tests.hidden.truth import Truth
+
+Values = Mapping[str, Mapping[str, float]]
+NOISES = {"nominal": Noise(), "double": Noise(sensors=2.0, force=0.006)}
+NOTHING = 0
+"""Number of the noise of the data set without an effect; the others count from one."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """One parameter of one effect, moved in one direction from where the effect is off."""
+
+    effect: str
+    parameter: str
+    sign: float = 1.0
+
+    @property
+    def name(self) -> str:
+        """Effect and parameter."""
+        return f"{self.effect}.{self.parameter}"
+
+    def values(self, departure: float) -> dict[str, dict[str, float]]:
+        """Parameters of the effect when this one departs from neutral by so much."""
+        neutral = LIBRARY[self.effect]
+        moved = neutral[self.parameter] + self.sign * departure
+        return {self.effect: {**neutral, self.parameter: moved}}
+
+
+def measured(design: int, repeat: int, noise: str, effects: Values) -> tuple[Dataset, Truth]:
+    """A data set of a design."""
+    with tempfile.TemporaryDirectory() as place:
+        folder = Path(place) / "data"
+        truth = swim_design(design, repeat, folder, effects, NOISES[noise])
+        dataset = load_dataset(folder)
+    assert isinstance(dataset, Dataset)
+    return dataset, truth
+
+
+def screened(dataset: Dataset, seed: int) -> tuple[Fit, Screen]:
+    """The refitted baseline and the screen of all causes, on the runs a diagnosis would fit."""
+    split = split_runs(dataset, seed, (0.75, 0.0, 0.25), by="condition")
+    baseline = fit(Problem(dataset, None, (*split.fit, *split.select)), rounds=2)
+    causes = causes_of(baseline.problem)
+    return baseline, screen(baseline, causes, np.random.default_rng(seed))
+
+
+def without_effect(design: int, noise: str) -> dict[str, Any]:
+    """What is published of a design, and what the information in its data would allow."""
+    begin = time.process_time()
+    with threadpool_limits(1, "blas"):
+        dataset, truth = measured(design, NOTHING, noise, {})
+        baseline, screens = screened(dataset, design)
+        causes = causes_of(baseline.problem)
+        published = preconditions(baseline.problem, screens, causes, baseline)
+        linear = preconditions(baseline.problem, screens, causes)
+        allowed = limits(baseline.problem, truth, published, screens)
+    first = screens.best()[0]
+    return {
+        "design": design,
+        "noise": noise,
+        "threshold": screens.threshold,
+        "alarm": first.p_value < screens.threshold,
+        "published": sizes_of(published),
+        "in_proportion": sizes_of(linear),
+        "limits": allowed,
+        "cpu_s": time.process_time() - begin,
+    }
+
+
+def sizes_of(published: Any) -> dict[str, float]:
+    """effect.parameter -> smallest detectable size."""
+    return {
+        f"{p.name}.{parameter}": float(size)
+        for p in published
+        for parameter, size in p.smallest_detectable.items()
+    }
+
+
+def with_effect(
+    target: Target, multiple: float, published: float, design: int, repeat: int, noise: str
+) -> dict[str, Any]:
+    """Whether the screen finds an effect of so many times its published size."""
+    begin = time.process_time()
+    with threadpool_limits(1, "blas"):
+        effects = target.values(multiple * published)
+        screens = screened(measured(design, repeat, noise, effects)[0], design)[1]
+    best = screens.best()
+    own = next(s for s in best if s.cause.name == target.effect)
+    return {
+        "target": target.name,
+        "multiple": multiple,
+        "design": design,
+        "repeat": repeat,
+        "noise": noise,
+        "found": bool(own.p_value < screens.threshold),
+        "misfit": bool(best[0].p_value < screens.threshold),
+        "first": best[0].cause.name,
+        "statistic": own.statistic,
+        "freedom": own.freedom,
+        "bound": float(chi2.isf(np.exp(screens.threshold), own.freedom)),
+        "cpu_s": time.process_time() - begin,
+    }
+
+
+def diagnosed(
+    target: Target, multiple: float, published: float, design: int, repeat: int, noise: str
+) -> dict[str, Any]:
+    """What a whole diagnosis makes of the same data."""
+    begin = time.process_time()
+    dataset, _ = measured(design, repeat, noise, target.values(multiple * published))
+    verdict = diagnose_runs(dataset, seed=design).verdict
+    return {
+        "target": target.name,
+        "multiple": multiple,
+        "design": design,
+        "repeat": repeat,
+        "noise": noise,
+        "verdict": verdict.name,
+        "named": list(verdict.causes),
+        "cpu_s": time.process_time() - begin,
+    }

@@ -1,0 +1,68 @@
+"""Steps of the simulation are fine where the tail may be quick, and that is fine enough."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fish_env.diagnosis.open_loop import errors
+from fish_env.identification.problem import Point, Problem
+from fish_env.identification.runs import FINE_STEP_S, SWITCH_S
+from tests.identification.synthetic import Setup, simulate
+
+LAG = {"effects.servo_lag.time_constant": 0.013}
+LIMIT = {"effects.servo_rate_limit.rate": 2.0}
+
+
+@pytest.fixture(scope="module")
+def dataset():
+    return simulate(Setup(runs=1, duration=4.0))
+
+
+def predicted(problem, effects):
+    point = Point(np.zeros(len(problem.baseline)), effects)
+    return errors(problem, point, noise_of(problem))[0]
+
+
+def noise_of(problem):
+    return Setup(channels=problem.channels).noise
+
+
+def off(dataset, effects, change=lambda problem: problem):
+    """Largest error of the steps, in standard deviations of the sensors."""
+    problem = change(Problem(dataset))
+    exact = Problem(dataset, dt=2e-4)
+    difference = predicted(problem, effects) - predicted(exact, effects)
+    return np.nanmax(np.abs(difference / problem.sensor_sd))
+
+
+def without_fine_steps(problem):
+    plain = [replace(run, substeps=np.full_like(run.substeps, 4)) for run in problem.runs]
+    return problem.with_runs(plain).with_plain_steps()
+
+
+def test_steps_are_fine_after_a_switch_and_plain_elsewhere(dataset):
+    run = Problem(dataset).runs[0]
+    span = np.diff(run.clock) / run.substeps[1:]
+    since = run.clock[:-1, None] - run.command_times
+    fresh = ((since > -0.04 + 1e-9) & (since < SWITCH_S - 1e-6)).any(axis=1)
+    np.testing.assert_array_equal(span <= FINE_STEP_S + 1e-9, fresh)
+    assert span.max() <= 0.01 + 1e-9
+    assert 0.0 < fresh.mean() < 0.2
+
+
+@pytest.mark.parametrize("effects", [LAG, LIMIT, {}], ids=["lag", "rate limit", "nothing"])
+def test_the_steps_get_less_wrong_than_the_sensors(dataset, effects):
+    assert off(dataset, effects) < 1.0
+
+
+@pytest.mark.parametrize("effects", [LAG, LIMIT], ids=["lag", "rate limit"])
+def test_plain_steps_would_not_do(dataset, effects):
+    assert off(dataset, effects, without_fine_steps) > 2.0 * off(dataset, effects)
+
+
+def test_only_corners_ask_for_fine_steps(dataset):
+    problem = Problem(dataset)
+    assert problem.has_corners(LIMIT)
+    assert not problem.has_corners(LAG)
+    assert not problem.with_plain_steps().has_corners(LIMIT)

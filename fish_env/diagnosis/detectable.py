@@ -101,7 +101,9 @@ def simulated(fit: Fit, screen: Screen, settings: Sequence[Setting]) -> FloatArr
         energy = _energies(fit, screen, settings, at, moving)
         moving &= np.isfinite(energy)
         power = _power(at, energy, last, last_energy)
-        endless |= moving & (at <= probe) & (power < FADING)
+        suspect = moving & (at <= probe) & (power < FADING)
+        halved = _energies(fit, screen, settings, 0.5 * at, suspect)
+        endless |= suspect & ~(_power(at, energy, 0.5 * at, halved) >= FADING)
         moving &= ~endless
         steps = np.log(target / energy) / (np.clip(power, 1.0, 4.0) if turn else SMOOTH)
         last, last_energy = at.copy(), energy

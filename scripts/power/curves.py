@@ -12,8 +12,10 @@ from scipy.stats import chi2
 POWER = 0.8
 SIZES = np.linspace(np.log(0.2), np.log(5.0), 644)
 """Logarithms of the sizes tried for the power 0.8, half a per cent apart."""
-STEEPNESS = np.geomspace(1.0, 40.0, 60)
-"""What is tried of the steepness; a chi-squared test at the screen's threshold has about 7."""
+STEEPNESS = np.geomspace(1.5, 30.0, 40)
+EXPECTED, SPREAD = 7.0, 0.5
+"""A chi-squared test at the screen's threshold has about this steepness; a prior on its logarithm
+with this spread keeps a handful of counts from asking for a cliff."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,7 @@ class Curve:
 
 
 def fit_curve(sizes: Sequence[float], found: Sequence[bool]) -> Curve:
-    """Maximum likelihood over a grid, which never fails, not even where all or none are found.
+    """Likelihood over a grid, which never fails, not even where all or none are found.
 
     Args:
         sizes: size of each data set, above zero.
@@ -52,7 +54,8 @@ def fit_curve(sizes: Sequence[float], found: Sequence[bool]) -> Curve:
     no = np.bincount(index, ~hit, len(size))
     lifted = np.log(size) - SIZES[:, None]
     share = expit(logit(POWER) + STEEPNESS[:, None, None] * lifted)
-    likelihood = (xlogy(yes, share) + xlog1py(no, -share)).sum(axis=2)
+    prior = -0.5 * (np.log(STEEPNESS / EXPECTED) / SPREAD) ** 2
+    likelihood = (xlogy(yes, share) + xlog1py(no, -share)).sum(axis=2) + prior[:, None]
     steepest, middle = np.unravel_index(np.argmax(likelihood), likelihood.shape)
     profile = likelihood.max(axis=0)
     inside = SIZES[profile > profile[middle] - 0.5 * chi2.isf(0.05, 1)]
@@ -65,19 +68,20 @@ def fit_curve(sizes: Sequence[float], found: Sequence[bool]) -> Curve:
     )
 
 
-def strength(statistics: Sequence[float], expected: Sequence[float], freedom: int) -> dict:
+def strength(
+    over: Sequence[float], expected: Sequence[float], freedom: Sequence[int]
+) -> dict[str, float]:
     """Size of signals against what was expected of them, from the statistics themselves.
 
     A statistic is noncentral chi-squared; its noncentrality grows with the square of the size. So
     the ratio of sizes is the root of the ratio of the sums, which uses more than counts do.
 
     Args:
-        statistics: of the screen's test, one a data set.
+        over: statistic of the screen's test less its degrees of freedom, one a data set.
         expected: noncentrality that the published size promises for each.
-        freedom: degrees of freedom of the test.
+        freedom: degrees of freedom of each.
     """
-    promised = float(np.sum(expected))
-    seen = max(float(np.sum(np.asarray(statistics) - freedom)), 0.0)
-    error = np.sqrt(2.0 * len(statistics) * freedom + 4.0 * seen)
+    promised, seen = float(np.sum(expected)), max(float(np.sum(over)), 0.0)
+    error = np.sqrt(2.0 * float(np.sum(freedom)) + 4.0 * seen)
     edges = np.sqrt(np.maximum(seen + np.array([-1.96, 0.0, 1.96]) * error, 0.0) / promised)
     return {"ratio": float(edges[1]), "low": float(edges[0]), "high": float(edges[2])}

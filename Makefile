@@ -8,7 +8,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint docs bench benchmark-diagnosis benchmark-power benchmark-diagnosis-time benchmark-agents benchmark-loop clean
+.PHONY: help setup demo test lint docs bench benchmark-diagnosis benchmark-power benchmark-time benchmark-agents benchmark-loop clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 28
@@ -49,7 +49,7 @@ benchmark-diagnosis: setup  ## hide effects in made-up measurements, and count w
 benchmark-power: setup  ## hide effects of chosen sizes, and see from which size on they are found
 	$(BIN)/python scripts/benchmark_power.py
 
-benchmark-diagnosis-time: setup  ## measure how the time of a diagnosis grows with the data
+benchmark-time: setup  ## measure how the time of a diagnosis grows with the data
 	$(BIN)/python scripts/benchmark_diagnosis_time.py
 
 benchmark-agents: setup  ## measure controllers and shipped policies on the frozen suites

@@ -214,9 +214,9 @@ def _threshold_of_coefficients(screen: Screen, found: int) -> float:
     wrong in several, so the next ones are judged among coefficients alone, and the share of false
     names is bounded (Benjamini and Hochberg, 1995).
     """
-    count = sum(not s.cause.is_effect for s in screen.signals) + found
-    if not found or not count:
+    if not found:
         return screen.threshold
+    count = sum(not s.cause.is_effect for s in screen.signals) + found
     return max(screen.threshold, float(np.log(screen.level * (found + 1) / count)))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Protocol, TypeVar
@@ -17,6 +17,8 @@ Probe = Mapping[str, float]
 PARAMETER = "parameter:"
 ALIKE = ({"body.plane_xz.drag.c0", "body.plane_xy.drag.c0"},)
 """Coefficients that act alike: both planes' drags at zero incidence brake along the fish."""
+MOST_FREQUENCIES = 96
+QUARTER = (0.0, np.pi / 2)
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Sizes tried between small and large."""
 
@@ -65,8 +67,9 @@ def best_of_each(tests: Iterable[T], log_p: Callable[[T], float]) -> list[T]:
 def causes_of(problem: Problem) -> tuple[Cause, ...]:
     """Every cause that can be considered for a problem."""
     step = longest_step(problem)
+    length = max(run.duration for run in problem.runs)
     effects = [
-        Cause(effect.name, probes_of(effect, step))
+        Cause(effect.name, probes_of(effect, step, length))
         for effect in problem.known.values()
         if effect.acts_on_motion or effect.sample_time or effect.measure
     ]
@@ -79,17 +82,23 @@ def longest_step(problem: Problem) -> float:
     return max(float(np.max(np.diff(run.clock) / run.substeps[1:])) for run in problem.runs)
 
 
-def probes_of(effect: Effect, step: float = 0.0) -> tuple[tuple[Probe, ...], ...]:
+def probes_of(
+    effect: Effect, step: float = 0.0, length: float = 0.0
+) -> tuple[tuple[Probe, ...], ...]:
     """Small and large settings that show what an effect does.
 
     Parameters that switch the effect on are probed one at a time; those that only shape it (a
-    frequency, a phase, an anchor) take a few values of their plausible range.
+    depth, an anchor) take a few values of their plausible range. An oscillation is probed as its
+    sine and its cosine together, at frequencies close enough to each other that none is missed.
 
     Args:
         effect: the effect.
         step: longest RK4 step (s); settings that are too quick for it are moved towards the large
             ones until they are not.
+        length: of the longest run (s).
     """
+    if phase_of(effect):
+        return _oscillations(effect, length)
     switches = [p for p in effect.parameters if not p.shapes]
     shapes = [p for p in effect.parameters if p.shapes]
     alternatives: list[tuple[Probe, ...]] = []
@@ -101,6 +110,106 @@ def probes_of(effect: Effect, step: float = 0.0) -> tuple[tuple[Probe, ...], ...
             if slow and slow[0] not in alternatives:
                 alternatives.append(slow[0])
     return tuple(alternatives)
+
+
+def phase_of(effect: Effect) -> str | None:
+    """The phase (rad) of an effect that oscillates with one amplitude; None of any other."""
+    phases = [p.name for p in effect.parameters if p.shapes and _turns(p)]
+    switches = [p for p in effect.parameters if not p.shapes]
+    return phases[0] if len(phases) == 1 and len(switches) == 1 else None
+
+
+def _turns(parameter: EffectParameter) -> bool:
+    low, high = parameter.plausible
+    return parameter.unit == "rad" and high - low > 6.0
+
+
+def _oscillations(effect: Effect, length: float) -> tuple[tuple[Probe, ...], ...]:
+    """Sine and cosine at every frequency that runs of a length (s) can tell from its neighbours."""
+    phase = phase_of(effect)
+    (size,) = (p for p in effect.parameters if not p.shapes)
+    shapes = [p for p in effect.parameters if p.shapes and p.name != phase]
+    values = [_frequencies(s, length) if s.unit == "Hz" else _middle(s) for s in shapes]
+    return tuple(
+        tuple(
+            dict(zip((s.name for s in shapes), chosen, strict=True))
+            | {str(phase): turn, size.name: _small(size)}
+            for turn in QUARTER
+        )
+        for chosen in product(*values)
+    )
+
+
+def _frequencies(parameter: EffectParameter, length: float) -> tuple[float, ...]:
+    """Two thirds of a cycle in a run apart, but no more than :data:`MOST_FREQUENCIES`."""
+    low, high = parameter.plausible
+    count = int(np.clip(1.5 * (high - low) * length, 3, MOST_FREQUENCIES))
+    return tuple(np.linspace(low, high, count).tolist())
+
+
+def _middle(parameter: EffectParameter) -> tuple[float, ...]:
+    low, high = parameter.plausible
+    return (float(np.sqrt(low * high)) if low > 0.0 else 0.5 * (low + high),)
+
+
+def combined(
+    effect: Effect, settings: Sequence[Probe], size: Sequence[float], start: Probe
+) -> Probe:
+    """Parameters that do what so many times each setting does, where effects add.
+
+    Args:
+        effect: the effect.
+        settings: one alternative of :func:`probes_of`.
+        size: multiple of each setting.
+        start: values that the settings depart from.
+    """
+    phase = phase_of(effect)
+    if phase:
+        (amplitude,) = (p.name for p in effect.parameters if not p.shapes)
+        sine, cosine = (n * setting[amplitude] for n, setting in zip(size, settings, strict=True))
+        angle = float(np.arctan2(cosine, sine))
+        return {**settings[0], amplitude: float(np.hypot(sine, cosine)), phase: angle}
+    values = {**start, **{p.name: settings[0][p.name] for p in effect.parameters if p.shapes}}
+    for factor, setting in zip(size, settings, strict=True):
+        for name in (p.name for p in effect.parameters if not p.shapes):
+            endless = np.isinf(start[name])
+            values[name] = (
+                setting[name] if endless else values[name] + factor * (setting[name] - start[name])
+            )
+    return values
+
+
+def finer(effect: Effect, probe: Probe, length: float) -> tuple[tuple[Probe, ...], ...]:
+    """Sine and cosine at frequencies and other shapes around those of a probe.
+
+    Between two frequencies that differ by a small part of a cycle in a run, a fit can get stuck.
+
+    Args:
+        effect: the effect; no alternatives unless it oscillates.
+        probe: its parameters.
+        length: of the longest run (s).
+    """
+    phase = phase_of(effect)
+    if not phase:
+        return ()
+    shapes = [p for p in effect.parameters if p.shapes and p.name != phase]
+    values = [_around(s, probe[s.name], length) for s in shapes]
+    return tuple(
+        tuple(
+            {**probe, **dict(zip((s.name for s in shapes), chosen, strict=True)), phase: turn}
+            for turn in QUARTER
+        )
+        for chosen in product(*values)
+    )
+
+
+def _around(parameter: EffectParameter, value: float, length: float) -> tuple[float, ...]:
+    low, high = parameter.plausible
+    if parameter.unit == "Hz":
+        values = value + np.linspace(-0.7, 0.7, 15) / max(length, 1.0)
+    else:
+        values = value * np.array([0.4, 1.0, 2.5])
+    return tuple(np.unique(np.clip(values, low, high)).tolist())
 
 
 def _alternative(
@@ -119,8 +228,6 @@ def slow_enough(effect: Effect, alternative: Iterable[Probe], step: float) -> bo
 
 def _shape_values(parameter: EffectParameter) -> tuple[float, ...]:
     low, high = parameter.plausible
-    if parameter.unit == "rad" and high - low > 6.0:
-        return (0.0, np.pi / 2)
     if low > 0 and high / low > 4:
         return tuple(np.geomspace(low, high, 3).tolist())
     return tuple(np.linspace(low, high, 3).tolist())

@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 from scipy.special import chdtrc
 from scipy.stats import chi2, ncx2
 
-from fish_env.diagnosis.causes import Cause, best_of_each, effect_values
+from fish_env.diagnosis.causes import Cause, best_of_each, effect_values, finer
 from fish_env.identification.estimator import Fit
 from fish_env.identification.information import block_sums, information, prior_precision
 from fish_env.identification.products import inner
@@ -161,6 +161,17 @@ def screen(
         *_coefficient_signals(projector, tested, fit),
     ]
     return Screen(tuple(signals), null_threshold(signals, rng, level), level)
+
+
+def zoomed(fit: Fit, signal: Signal) -> Signal:
+    """The best signal around one of an oscillation; any other signal as it is."""
+    problem, cause = fit.problem, signal.cause
+    length = max(run.duration for run in problem.runs)
+    around = finer(problem.known[cause.name], cause.probes[signal.probe][0], length)
+    if not around:
+        return signal
+    close = Cause(cause.name, around)
+    return min((signal, *_effect_signals(fit, Projector(fit), [close])), key=lambda s: s.p_value)
 
 
 def _effect_signals(fit: Fit, projector: Projector, causes: Sequence[Cause]) -> list[Signal]:

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from fish_env.diagnosis.causes import effect_values
+from fish_env.diagnosis.causes import combined, effect_values
 from fish_env.diagnosis.effort import FULL
-from fish_env.diagnosis.screening import Signal
+from fish_env.diagnosis.screening import Signal, zoomed
 from fish_env.identification.estimator import Fit, fit
 from fish_env.identification.filtering import NoiseModel
 from fish_env.identification.free import REACH
@@ -174,13 +174,12 @@ def starts(base: Fit, signal: Signal, z: FloatArray | None = None) -> list[Point
     problem, cause = base.problem, signal.cause
     if not cause.is_effect:
         return [base.point]
-    neutral = problem.neutral([cause.name])
+    signal = zoomed(base, signal)
     size = np.linalg.solve(signal.projected, signal.score)
-    linear = dict(neutral)
-    for factor, probe in zip(size, cause.probes[signal.probe], strict=True):
-        for path, value in effect_values(problem, cause.name, probe).items():
-            finite = np.isfinite(neutral[path])
-            linear[path] = linear[path] + factor * (value - neutral[path]) if finite else value
+    settings = signal.cause.probes[signal.probe]
+    start = {p.rsplit(".", 1)[1]: v for p, v in problem.neutral([cause.name]).items()}
+    estimate = combined(problem.known[cause.name], settings, size.tolist(), start)
+    linear = effect_values(problem, cause.name, estimate)
     bounds = {f.path: (f.lower, f.upper) for f in problem.freedoms([cause.name])}
     clipped = [
         {path: float(np.clip(value, *bounds[path])) for path, value in values.items()}

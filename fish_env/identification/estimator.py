@@ -143,6 +143,7 @@ def gauss_newton(
         lin = linearise(problem, free, vector, noise, filtered)
         hessian = information(lin.slopes, free.prior)
         gradient = inner(lin.slopes, lin.residuals[:, None])[:, 0] + free.prior * vector
+        free.suit_steps(hessian)
         before, settled = vector, True
         for trial, whole in free.trials(hessian, gradient, vector):
             trial_value, trial_filtered = objective(problem, free, trial, noise)

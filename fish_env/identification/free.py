@@ -19,6 +19,8 @@ from fish_env.identification.problem import Point, Problem
 
 FloatArray = npt.NDArray[np.float64]
 Z_STEP = 0.05
+SHORTEST = 0.02
+"""Shortest step for differences, as a share of the longest."""
 REACH = 5.0
 """Prior standard deviations that a coefficient may move, unless its prior is lifted."""
 SHARES = (0.5, 0.2)
@@ -60,7 +62,9 @@ class Free:
         self.count = len(problem.baseline)
         self.names = (*problem.baseline.paths, *(f.path for f in self.freedoms))
         self.prior = prior_precision(problem.baseline, len(self.freedoms), released)
-        self.steps = np.r_[np.full(self.count, Z_STEP), [f.step for f in self.freedoms]]
+        self.largest_steps = np.r_[np.full(self.count, Z_STEP), [f.step for f in self.freedoms]]
+        self.steps = self.largest_steps
+        self.corners = problem.has_corners(f.path for f in self.freedoms)
 
     def pack(self, point: Point) -> FloatArray:
         """The vector (n,) of a point."""
@@ -71,6 +75,20 @@ class Free:
         values = vector[self.count :].tolist()
         paths = [f.path for f in self.freedoms]
         return Point(vector[: self.count].copy(), dict(zip(paths, values, strict=True)))
+
+    def suit_steps(self, hessian: FloatArray) -> None:
+        """Take differences over what the data can tell: a secant of more is no slope.
+
+        With corners in the motion the slope of a short step is noise, so those steps stay.
+
+        Args:
+            hessian: (n, n) information.
+        """
+        if self.corners:
+            return
+        told = 1.0 / np.sqrt(np.maximum(np.diag(hessian), 1e-300))
+        steps = np.clip(told, SHORTEST * self.largest_steps, self.largest_steps)
+        self.steps = np.r_[self.largest_steps[: self.count], steps[self.count :]]
 
     def clip(self, vector: FloatArray) -> FloatArray:
         """The vector (n,) moved within physical bounds."""

@@ -57,6 +57,25 @@ def test_a_simpler_explanation_is_not_beaten_by_parameters_alone():
     assert alike(PROBLEM, best, other)
 
 
+def test_coefficients_after_the_first_are_judged_among_themselves():
+    signals = [
+        SimpleNamespace(
+            cause=SimpleNamespace(name=f"parameter:{i}", is_effect=False),
+            p_value=p,
+            statistic=20.0,
+        )
+        for i, p in enumerate([-7.0, -5.5, -5.0, *[-1.0] * 37])
+    ]
+    screen = SimpleNamespace(signals=signals, best=lambda: signals, threshold=-7.6, level=0.05)
+    problem = SimpleNamespace(known={})
+    names = [
+        [s.cause.name for s in shortlisted(problem, screen, 4, found=found)] for found in (0, 1, 5)
+    ]
+    assert names[0] == []
+    assert names[1] == ["parameter:0"]  # 2 / 41 of the level: -6.0
+    assert names[2] == ["parameter:0", "parameter:1"]  # 6 / 45 of it: -5.0
+
+
 def test_what_looks_like_the_first_is_always_tried():
     names = ["servo_lag", "tether", "wave", "current", "tail_flexibility"]
     signals = [

@@ -1,8 +1,9 @@
 """What is tried of each cause: inside physical bounds, never neutral, all that it can do."""
 
+import numpy as np
 import pytest
 
-from fish_env.diagnosis.causes import probes_of
+from fish_env.diagnosis.causes import combined, finer, probes_of
 from fish_env.effects import catalogue
 from fish_env.model.effect import Effect, EffectParameter
 
@@ -32,11 +33,59 @@ def test_probes_of_the_catalogue(name):
 
 
 def test_parameters_of_shape_take_several_values():
-    phases = {probe["phase"] for alternative in probes_of(catalogue()["wave"])
-              for probe in alternative}  # fmt: skip
-    frequencies = {a[0]["frequency"] for a in probes_of(catalogue()["wave"])}
-    assert len(phases) == 2
-    assert len(frequencies) == 3
+    depths = {probe["depth"] for a in probes_of(catalogue()["surface_drag"]) for probe in a}
+    assert len(depths) == 3
+
+
+@pytest.mark.parametrize("frequency", [0.2, 0.361, 1.234, 2.0])
+@pytest.mark.parametrize("phase", [-2.0, 0.0, 1.5])
+def test_some_probe_shows_most_of_a_wave(frequency, phase):
+    length = 30.0
+    time = np.linspace(0.0, length, 1000)
+    wave = np.sin(2 * np.pi * frequency * time + phase)
+    shown = []
+    for sine, cosine in probes_of(catalogue()["wave"], length=length):
+        pair = [np.sin(2 * np.pi * p["frequency"] * time + p["phase"]) for p in (sine, cosine)]
+        basis = np.linalg.qr(np.transpose(pair))[0]
+        shown.append(((basis.T @ wave) ** 2).sum() / (wave**2).sum())
+    assert max(shown) > 0.6
+
+
+def test_sine_and_cosine_together_are_the_wave():
+    effect = catalogue()["wave"]
+    settings = probes_of(effect, length=10.0)[0]
+    both = combined(effect, settings, (3.0, -4.0), effect.neutral)
+    assert both["amplitude"] == pytest.approx(5.0 * settings[0]["amplitude"])
+    time = np.linspace(0.0, 10.0, 50)
+    turn = 2 * np.pi * both["frequency"] * time
+    parts = (3.0 * np.sin(turn) - 4.0 * np.cos(turn)) * settings[0]["amplitude"]
+    np.testing.assert_allclose(both["amplitude"] * np.sin(turn + both["phase"]), parts, atol=1e-12)
+
+
+def test_an_oscillation_is_looked_at_more_closely_and_nothing_else_is():
+    effect = catalogue()["wave"]
+    coarse = sorted({a[0]["frequency"] for a in probes_of(effect, length=30.0)})
+    around = finer(effect, probes_of(effect, length=30.0)[5][0], 30.0)
+    fine = sorted({a[0]["frequency"] for a in around})
+    assert max(np.diff(fine)) < 0.11 / 30.0
+    assert fine[0] <= coarse[4] + 1e-3
+    assert fine[-1] >= coarse[6] - 1e-3
+    current = catalogue()["current"]
+    assert finer(current, probes_of(current)[0][0], 30.0) == ()
+
+
+def test_settings_add_and_shapes_stay():
+    effect = catalogue()["current"]
+    settings = probes_of(effect)[0]
+    size = (2.0, -1.0, 0.5)
+    added = combined(effect, settings, size, effect.neutral)
+    for name, factor, setting in zip(("north", "east", "down"), size, settings, strict=True):
+        assert added[name] == pytest.approx(factor * setting[name])
+    tether = catalogue()["tether"]
+    probe = probes_of(tether)[0]
+    held = combined(tether, probe, (3.0,), tether.neutral)
+    assert held["x"] == probe[0]["x"]
+    assert held["stiffness"] == pytest.approx(3.0 * probe[0]["stiffness"])
 
 
 def test_a_probe_outside_the_bounds_would_be_found():

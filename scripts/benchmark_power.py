@@ -31,7 +31,14 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "ROBOFISH_THREADS"):
 from rich.progress import track  # noqa: E402
 
 from scripts.power import report  # noqa: E402
-from scripts.power.looks import Target, diagnosed, with_effect, without_effect  # noqa: E402
+from scripts.power.looks import (  # noqa: E402
+    Target,
+    allowed,
+    diagnosed,
+    with_effect,
+    without_effect,
+)
+from scripts.power.signals import agreement  # noqa: E402
 
 SIZES = (0.6, 0.8, 1.0, 1.4)
 FAR = (1.0, 4.0)
@@ -78,10 +85,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
         todo = [look for look in todo if (options.work / look.file).exists()]
     begin = time.monotonic()
     rows = [do(look, options.work) for look in track(todo, f"{len(todo)} data sets")]
-    nothing = [json.loads(f.read_text()) for f in sorted(options.work.glob("nothing-*.json"))]
+    nothing = [with_limits(file) for file in sorted(options.work.glob("nothing-*.json"))]
+    sizes = nothing[0]["published"]
+    signals = kept(options.work / "signals.json", lambda: agreement(nothing[0]["design"], sizes))
     print(f"{time.monotonic() - begin:.0f} s")
     today = datetime.date.today().isoformat()
-    report.write(today, rows, nothing, options.out, options.picture)
+    summary = report.summarise(rows, nothing, signals)
+    report.write(today, {**summary, "rows": rows, "without_effect": nothing}, options.out)
+    report.draw(summary, options.picture)
 
 
 def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
@@ -127,6 +138,14 @@ def do(look: Look, work: Path) -> dict[str, Any]:
         work / look.file,
         lambda: make(look.target, look.multiple, size, design, look.repeat, noise),
     )
+
+
+def with_limits(file: Path) -> dict[str, Any]:
+    """What is published of a design, and what its data allow."""
+    nothing = json.loads(file.read_text(encoding="utf-8"))
+    design, noise = nothing["design"], nothing["noise"]
+    name = file.with_name(file.name.replace("nothing", "limits"))
+    return {**nothing, "limits": kept(name, lambda: allowed(design, noise, nothing))}
 
 
 def kept(file: Path, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:

@@ -8,7 +8,7 @@ parameter alone has power 0.8.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any
 
@@ -16,16 +16,18 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.stats import chi2, ncx2
 
-from fish_env.diagnosis.causes import Cause
+from fish_env.diagnosis.causes import Cause, longest_step, probes_of
 from fish_env.diagnosis.detectable import changes
-from fish_env.diagnosis.preconditions import Precondition
-from fish_env.diagnosis.screening import Projector, Screen
+from fish_env.diagnosis.screening import Projector
 from fish_env.identification.filtering import NoiseModel
 from fish_env.identification.free import Free, linearise, objective
 from fish_env.identification.problem import Point, Problem
+from fish_env.model.effect import Effect
 from tests.hidden.disturbances import MOMENT_PER_FORCE
 from tests.hidden.truth import Truth
 
+NEAR_NOTHING = (0.2, 0.1)
+"""Shares of the published size between which a signal's slope is taken."""
 ALONE = 0.05
 """Level of a test that looks for one cause only."""
 
@@ -54,28 +56,44 @@ def oracle(problem: Problem, truth: Truth) -> Any:
 
 
 def limits(
-    problem: Problem, truth: Truth, published: Sequence[Precondition], screen: Screen
+    problem: Problem, truth: Truth, published: Mapping[str, float], threshold: float
 ) -> dict[str, dict[str, float]]:
     """effect.parameter -> smallest sizes that the information in the data allows.
 
     ``same``: at the level that the screen leaves each of its tests. ``alone``: at 5 %, as if no
-    other cause had to be looked for. ``known``: as ``same``, with the coefficients known. Effects
-    whose published size is bounded by the simulation's step are left out.
+    other cause had to be looked for. ``known``: as ``same``, with the coefficients known.
+
+    Left out are effects with a shape, which may be any, and those whose published size is bounded
+    by the simulation's step.
+
+    Args:
+        problem: the runs, without any effect in them.
+        truth: what made them.
+        published: effect.parameter -> size, near which the information is computed.
+        threshold: log p-value that a test of the screen has to pass.
     """
     found = oracle(problem, truth)
-    jobs = [
-        (p.name, parameter, size, _probe(problem, screen, p.name, parameter, size))
-        for p in published
-        if problem.known[p.name].time_scale is None
-        for parameter, size in p.smallest_detectable.items()
-    ]
-    seen = changes(found, [(name, probe) for name, _, _, probe in jobs])
+    jobs = {
+        name: [
+            (name.split(".")[0], probe_at(problem, name, share * size)) for share in NEAR_NOTHING
+        ]
+        for name, size in published.items()
+        if suits(problem.known[name.split(".")[0]])
+    }
+    small = changes(found, [pair[0] for pair in jobs.values()])
+    smaller = changes(found, [pair[1] for pair in jobs.values()])
     projector, result = Projector(found), {}
-    for (name, parameter, size, _), change in zip(jobs, seen, strict=True):
-        signal = projector.signal(Cause(name), 0, change[:, None])
+    for name, change in zip(jobs, small - smaller, strict=True):
+        slope = change / (NEAR_NOTHING[0] - NEAR_NOTHING[1])
+        signal = projector.signal(Cause(name), 0, slope[:, None])
         if signal is not None:
-            result[f"{name}.{parameter}"] = _sizes(size, signal, screen.threshold)
+            result[name] = _sizes(published[name], signal, threshold)
     return result
+
+
+def suits(effect: Effect) -> bool:
+    """Whether the information about an effect is a number that one can compute."""
+    return effect.time_scale is None and not any(p.shapes for p in effect.parameters)
 
 
 def _sizes(size: float, signal: Any, threshold: float) -> dict[str, float]:
@@ -89,16 +107,12 @@ def _sizes(size: float, signal: Any, threshold: float) -> dict[str, float]:
     }
 
 
-def _probe(
-    problem: Problem, screen: Screen, name: str, parameter: str, size: float
-) -> dict[str, float]:
-    """An effect at a size, with the shape and on the side that its published size is for."""
-    effect = problem.known[name]
-    signals = [s for s in screen.signals if s.cause.name == name]
-    shaped = any(p.shapes for p in effect.parameters)
-    chosen = max(signals, key=lambda s: float(np.trace(s.projected))) if shaped else signals[0]
-    probes = chosen.cause.probes[chosen.probe]
-    own = next(p for p in probes if p[parameter] != effect.neutral[parameter])
+def probe_at(problem: Problem, name: str, size: float) -> dict[str, float]:
+    """An effect at a size, on the side on which the screen probes it."""
+    effect_name, parameter = name.split(".")
+    effect = problem.known[effect_name]
     neutral = effect.neutral[parameter]
-    side = np.sign(own[parameter] - neutral)
-    return {**own, parameter: float(neutral + side * size)}
+    probes = probes_of(effect, longest_step(problem))[0]
+    there = next(p[parameter] for p in probes if p[parameter] != neutral)
+    side = float(np.sign(there - neutral))
+    return {**effect.neutral, parameter: neutral + side * size}

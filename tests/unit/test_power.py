@@ -11,7 +11,7 @@ from scripts.benchmark_power import AGAIN, SIZES, TARGETS, looks
 from scripts.power.curves import Curve, fit_curve, strength
 from scripts.power.limits import noncentrality
 from scripts.power.looks import Target
-from scripts.power.report import summarise, write
+from scripts.power.report import draw, summarise, write
 from tests.hidden.designs import Noise, swim_design
 from tests.hidden.plans import Plan
 
@@ -128,16 +128,19 @@ def test_a_summary_is_written_with_its_picture(tmp_path):
         "in_proportion": {"current.north": 2.0, "servo_lag.time_constant": 0.01},
         "limits": {"current.north": limit},
     }  # fmt: skip
-    summary = summarise(rows, [nothing])
+    signals = {"sensor_delay.delay": {"cosine": 0.4, "share": 0.5}}
+    summary = summarise(rows, [nothing], signals)
     north = summary["noises"]["nominal"]["current.north"]
     assert north["counts"]["1"]["count"] == 1
     assert 0.8 < north["found"]["at"] < 1.2
     assert summary["noises"]["nominal"]["all"]["found"]["looks"] == len(SIZES)
     assert summary["catalogue"]["current.north"]["same"] == pytest.approx(1 / 0.9)
-    write("2026-01-02", rows, [nothing], tmp_path, tmp_path / "images" / "power.png")
+    write("2026-01-02", summary, tmp_path)
+    draw(summary, tmp_path / "images" / "power.png")
     page = (tmp_path / "power-2026-01-02.md").read_text()
     assert "| current.north | 0/1 | 0/1 | 1/1 | 1/1 |" in page
     assert "| depth_bias.offset | 4 | no |" in page
+    assert "| sensor_delay.delay | 0.40 | 0.50 |" in page
     assert (
         json.loads((tmp_path / "power-2026-01-02.json").read_text())["data_sets"] == len(rows) + 1
     )

@@ -1,0 +1,77 @@
+"""Whether an effect's signal, as the diagnosis simulates it, is in the data when the effect is.
+
+Two data sets of one design share all of their noise; one has the effect, the other has not. The
+difference of their residuals, which another implementation of the physics makes, should be what
+the filter predicts. What a refit follows is taken off both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from fish_env.data import Dataset, split_runs
+from fish_env.diagnosis.causes import Cause, effect_values
+from fish_env.diagnosis.screening import Projector
+from fish_env.identification.estimator import Fit, fit
+from fish_env.identification.problem import Problem
+from scripts.power.looks import Target, Values, measured
+from tests.hidden.records import LIBRARY
+from tests.hidden.sizes import SIZES
+
+NOISE_NUMBER = 999
+
+
+def agreement(design: int, published: Mapping[str, float]) -> dict[str, dict[str, float]]:
+    """effect.parameter -> cosine of the two signals, and the share of one that is in the other.
+
+    Left out are effects that are off at infinity and those without a signal in either.
+    """
+    with threadpool_limits(1, "blas"):
+        still = problem_of(design, {})
+        base = fit(still, rounds=2)
+        found = {}
+        for name, size in published.items():
+            target = Target(*name.split("."))
+            if np.isfinite(LIBRARY[target.effect][target.parameter]):
+                pair = compared(base, design, target, size)
+                if pair is not None:
+                    found[name] = pair
+    return found
+
+
+def problem_of(design: int, effects: Values) -> Problem:
+    """The runs of a design that a diagnosis would fit, with some effects."""
+    dataset: Dataset = measured(design, NOISE_NUMBER, "nominal", effects)[0]
+    split = split_runs(dataset, design, (0.75, 0.0, 0.25), by="condition")
+    return Problem(dataset, None, (*split.fit, *split.select))
+
+
+def compared(base: Fit, design: int, target: Target, size: float) -> dict[str, float] | None:
+    """The signal that is expected and the one that is there."""
+    (values,) = target.values(size).values()
+    shapes = SIZES[target.effect].shape or {}
+    values |= {name: 0.5 * (low + high) for name, (low, high) in shapes.items()}
+    before = innovations(base, base.problem, {})
+    there = innovations(base, problem_of(design, {target.effect: values}), {}) - before
+    expected = innovations(base, base.problem, effect_values(base.problem, target.effect, values))
+    projector, cause = Projector(base), Cause(target.effect)
+    mine = projector.signal(cause, 0, (expected - before)[:, None])
+    theirs = projector.signal(cause, 0, -there[:, None])
+    if mine is None or theirs is None:
+        return None
+    shared = -float(mine.left[:, 0] @ there)
+    energies = float(mine.projected[0, 0]), float(theirs.projected[0, 0])
+    return {
+        "cosine": shared / float(np.sqrt(energies[0] * energies[1])),
+        "share": shared / energies[0],
+    }
+
+
+def innovations(base: Fit, problem: Problem, effects: Mapping[str, Any]) -> np.ndarray:
+    """Whitened residuals of some runs at a fit, with its gains."""
+    lanes = {path: np.array([value]) for path, value in effects.items()}
+    return problem.innovations(base.point.z[:, None], lanes, base.noise, base.filtered)[0]

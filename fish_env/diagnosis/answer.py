@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from fish_env.diagnosis import consistency, noise_floor
+from fish_env.diagnosis.attribution import Ranked
 from fish_env.diagnosis.causes import PARAMETER
 from fish_env.diagnosis.effort import QUICK
 from fish_env.diagnosis.entries import (
@@ -52,7 +53,7 @@ def as_dict(diagnosis: Diagnosis) -> Plain:
         "misfit": misfit_entry(diagnosis.misfit),
         "gain": gain_entry(diagnosis.gain),
         "preconditions": [precondition_entry(p) for p in diagnosis.preconditions],
-        "ranking": [{"name": n, "score": s} for n, s in diagnosis.attribution.ranking],
+        "ranking": [_rank(ranked) for ranked in diagnosis.attribution.ranking],
         "localisation": as_plain(diagnosis.localisation),
         "unexplained": [] if diagnosis.adequacy.reached else _unexplained(diagnosis),
         "next_experiment": experiment_entry(diagnosis.next_experiment),
@@ -60,6 +61,11 @@ def as_dict(diagnosis: Diagnosis) -> Plain:
         "notes": list(diagnosis.dataset.notes),
     }
     return {**answer, "doubts": doubts(answer)}
+
+
+def _rank(ranked: Ranked) -> Plain:
+    entry: Plain = {"name": ranked.name, "score": ranked.score}
+    return entry | ({"ci95": list(ranked.interval)} if ranked.interval else {})
 
 
 def _noise(fit: Fit) -> Plain:

@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
+from scipy.stats import t as student
 
 from fish_env.diagnosis.adequacy import strains
 from fish_env.diagnosis.causes import Cause, same
@@ -22,10 +24,27 @@ from fish_env.diagnosis.search import (
 from fish_env.identification.estimator import Fit
 from fish_env.identification.problem import Problem
 
+FloatArray = npt.NDArray[np.float64]
 MOST_CAUSES = 3
 MOST_LOOSE = 4
 DOUBT = 6.0
 """Difference of scores (-2 log likelihood, penalised) that decides nothing."""
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """How much one cause explains.
+
+    Attributes:
+        name: the cause.
+        score: -2 log likelihood + prior, against that of the baseline under the same noise; less is
+            better.
+        interval: 95 % interval of the score over runs like these; None for a single run.
+    """
+
+    name: str
+    score: float
+    interval: tuple[float, float] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +56,7 @@ class Attribution:
         screens: screen of the baseline, then of each accepted explanation.
         accepted: explanation of the last step (the baseline itself when nothing was added).
         rivals: explanations that fit as well as the accepted one.
-        ranking: (name, score) of the first step, score in -2 log likelihood against the baseline.
+        ranking: causes fitted in the first step, best first.
         gain: of all accepted causes together, in the same unit.
     """
 
@@ -45,7 +64,7 @@ class Attribution:
     screens: tuple[Screen, ...]
     accepted: Explanation
     rivals: tuple[Explanation, ...]
-    ranking: tuple[tuple[str, float], ...]
+    ranking: tuple[Ranked, ...]
     gain: float
 
     @property
@@ -108,7 +127,7 @@ def extended(
         if base is None:
             break
         if not ranking:
-            ranking = tuple((e.causes[-1], e.fit.objective - base.fit.objective) for e in tried)
+            ranking = tuple(ranked(e, base) for e in tried)
         gain = score(problem, base) - score(problem, tried[0])
         if gain < max(DOUBT, rough * total):
             break
@@ -132,6 +151,23 @@ def extended(
         )
     current = pruned(problem, current)
     return Attribution(begun.baseline, tuple(screens), current, rivals, ranking, total)
+
+
+def ranked(explanation: Explanation, base: Explanation) -> Ranked:
+    """The last cause of an explanation against the explanation without it."""
+    score_ = explanation.fit.objective - base.fit.objective
+    by_run = _by_run(base.fit, explanation.fit)
+    count = len(by_run)
+    if count < 2:
+        return Ranked(explanation.causes[-1], score_, None)
+    half = float(student.ppf(0.975, count - 1) * by_run.std(ddof=1) * np.sqrt(count))
+    return Ranked(explanation.causes[-1], score_, (score_ - half, score_ + half))
+
+
+def _by_run(fit: Fit, other: Fit) -> FloatArray:
+    """(runs,) how much -2 log likelihood the other fit has more."""
+    pairs = zip(fit.filtered, other.filtered, strict=True)
+    return np.array([2.0 * (a.log_likelihood - b.log_likelihood) for a, b in pairs])
 
 
 def roughness(explanation: Explanation) -> float:
@@ -239,11 +275,6 @@ def alike(problem: Problem, best: Explanation, other: Explanation) -> bool:
     gap = score(problem, other) - score(problem, best)
     if gap < DOUBT:
         return True
-    by_run = np.array(
-        [
-            2.0 * (b.log_likelihood - o.log_likelihood)
-            for b, o in zip(best.fit.filtered, other.fit.filtered, strict=True)
-        ]
-    )
+    by_run = _by_run(best.fit, other.fit)
     error = by_run.std(ddof=1) / np.sqrt(len(by_run)) if len(by_run) > 1 else np.inf
     return bool(by_run.mean() < error and gap < 40.0)

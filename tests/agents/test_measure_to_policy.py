@@ -17,6 +17,7 @@ from scripts.loop import training
 from scripts.loop.declaration import DECLARED, load_declaration
 from scripts.loop.measuring import measure_and_diagnose
 from scripts.loop.training import ARMS, POSTERIOR, fish_options, scored
+from scripts.update_readme import updated
 
 KNOWING = "tests.agents.loop_stubs:knowing"
 BLIND = "tests.agents.loop_stubs:blind"
@@ -173,6 +174,12 @@ def test_no_training_swims_the_episodes_that_judge():
     suite = load_suite("calm")
     assert declared.suite == suite
     assert set(range(suite.seed, suite.seed + suite.episodes)) <= set(RESERVED_SEEDS)
+
+
+def test_the_page_shows_the_latest_result():
+    text = measure_to_policy.PAGE.read_text(encoding="utf-8")
+    shown = updated(text, {"results": measure_to_policy.latest})
+    assert text == shown, "run `make benchmark-loop`, or copy the tables of the latest result"
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from fish_env.diagnosis.attribution import alike, explained_away, shortlisted
+from fish_env.diagnosis.attribution import alike, explained_away, ranked, shortlisted
 from fish_env.effects import catalogue
 
 
@@ -50,6 +50,18 @@ def test_explanations_are_alike_within_the_scatter_of_runs(gap, runs, expected):
     best = explanation(0.0, [0.5 * r for r in runs])
     other = explanation(gap, [0.0] * len(runs))
     assert alike(PROBLEM, best, other) is expected
+
+
+def test_a_gain_has_an_interval_over_runs():
+    base, better = explanation(0.0, [0.0, 0.0, 0.0]), explanation(-60.0, [8.0, 10.0, 12.0])
+    better.causes = ("current",)
+    found = ranked(better, base)
+    half = 4.303 * 4.0 * 3**0.5  # Student's quantile, spread of -2 log likelihoods, three runs
+    assert (found.name, found.score) == ("current", -60.0)
+    assert found.interval == pytest.approx((-60.0 - half, -60.0 + half), rel=1e-3)
+    base, better = explanation(0.0, [0.0]), explanation(-60.0, [30.0])
+    better.causes = ("current",)
+    assert ranked(better, base).interval is None
 
 
 def test_a_simpler_explanation_is_not_beaten_by_parameters_alone():

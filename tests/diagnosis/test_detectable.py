@@ -53,6 +53,9 @@ class Bending:
     def neutral(self, names) -> dict[str, float]:
         return {PATH: 0.0}
 
+    def has_corners(self, effects) -> bool:
+        return False
+
     def freedoms(self, names) -> tuple:
         return ()
 

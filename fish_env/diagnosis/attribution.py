@@ -135,7 +135,9 @@ def extended(
         after = screen(tried[0].fit, causes, rng)
         rough = roughness(tried[0])
         if effort.retries and shortlisted(problem, after, 1, rough * total):
-            again = second_look(current, tried, [*chosen, *_new(after, chosen)], report)
+            others = [*chosen, *_new(after, chosen)]
+            others += _like(tried[0].causes[-1], screens[-1], others, problem)
+            again = second_look(current, tried, others, report)
             if again[0] is not tried[0]:
                 after = screen(again[0].fit, causes, rng)
             tried = again
@@ -199,6 +201,13 @@ def _new(after: Screen, chosen: Sequence[Signal]) -> list[Signal]:
     known = {s.cause.name for s in chosen}
     leading = [s for s in after.best() if s.p_value < after.threshold and s.cause.is_effect]
     return [s for s in leading if s.cause.name not in known][:3]
+
+
+def _like(winner: str, before: Screen, chosen: Sequence[Signal], problem: Problem) -> list[Signal]:
+    """Effects known to look like the winner, whatever the screen made of them."""
+    alike = set(problem.known[winner].confusable_with) if winner in problem.known else set()
+    known = {winner, *(s.cause.name for s in chosen)}
+    return [s for s in before.best() if s.cause.name in alike - known]
 
 
 def pruned(problem: Problem, current: Explanation) -> Explanation:

@@ -31,6 +31,8 @@ of a run from rest, the first samples judge nothing (s)."""
 
 
 SAME_INSTANT_S = 1e-6
+BEFORE_S = 1e3
+FREQUENCY = 2  # column of the commands
 FINE_STEP_S = 0.0025
 SWITCH_S = 0.04
 """After a switch of the commands a servo may move its tail as fast as it can: steps are fine."""
@@ -45,7 +47,7 @@ class RunData:
         condition: repeats share it.
         clock: (T,) sample times from the first (s).
         substeps: (T,) RK4 steps up to each sample.
-        command_times: (m,) switch times on the same clock (s).
+        command_times: (m,) switch times on the same clock (s); the first may be long before it.
         command_values: (m, 5).
         measured: (T, C), NaN where missing.
         state0: (18,) initial base state.
@@ -68,6 +70,12 @@ class RunData:
     def fine_substeps(self) -> npt.NDArray[np.int64]:
         """(T,) steps for motion with corners everywhere, not only where commands switch."""
         return np.maximum(self.substeps, _steps(self.clock, FINE_STEP_S))
+
+    @property
+    def commands(self) -> tuple[FloatArray, FloatArray]:
+        """Switch times (m,) and commands (m, 5) of the run itself."""
+        first = int(self.command_times[0] <= -0.5 * BEFORE_S)
+        return self.command_times[first:], self.command_values[first:]
 
     @property
     def duration(self) -> float:
@@ -109,13 +117,26 @@ def prepare_run(
         run.condition,
         clock,
         substeps,
-        switches,
-        np.ascontiguousarray(run.commands.values),
+        *_commands(run, switches),
         np.ascontiguousarray(measured),
         state0,
         covariance0,
         run.tail_phase is not None,
     )
+
+
+def _commands(run: Run, switches: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Switch times (m,) and commands (m, 5), from before the run on where it starts from rest.
+
+    Late samples show a time before the run. The fish was then held as first commanded, but for
+    its beat, which had not begun.
+    """
+    values = run.commands.values
+    if run.start == "rest":
+        held = values[:1].copy()
+        held[0, FREQUENCY] = 0.0
+        switches, values = np.r_[switches[0] - BEFORE_S, switches], np.vstack([held, values])
+    return np.ascontiguousarray(switches), np.ascontiguousarray(values)
 
 
 def _steps(clock: FloatArray, longest: float | FloatArray) -> npt.NDArray[np.int64]:

@@ -54,7 +54,7 @@ def with_posterior(fish: FishParams, posterior: Posterior, name: str, source: st
 def validity(fit: Fit) -> dict[str, Any]:
     """Ranges of the motion and of the commands behind a fit, (lowest, highest), SI."""
     states = np.concatenate([f.states for f in fit.filtered])
-    commands = np.concatenate([run.command_values for run in fit.problem.runs])
+    commands = np.concatenate([run.commands[1] for run in fit.problem.runs])
     rows = {"surge": 7, "sway": 8, "heave": 9, "depth": 2, "roll_rate": 10, "pitch_rate": 11}
     rows["yaw_rate"] = 12
     ranges: dict[str, Any] = {name: _range(states[:, row]) for name, row in rows.items()}

@@ -66,3 +66,17 @@ def test_only_corners_ask_for_fine_steps(dataset):
     assert problem.has_corners(LIMIT)
     assert not problem.has_corners(LAG)
     assert not problem.with_plain_steps().has_corners(LIMIT)
+
+
+def test_late_samples_show_the_time_before_the_run():
+    """A record that is late by its delay is the prompt record, pushed back."""
+    delay, setup = 0.08, Setup(runs=1, duration=3.0, uneven=False)
+    data = simulate(setup)
+    late = Problem(data)
+    prompt = predicted(late, {})
+    shown = predicted(late, {"effects.sensor_delay.delay": delay})
+    measured = late.runs[0].measured
+    samples = round(delay * setup.rate)
+    np.testing.assert_allclose(
+        (measured - shown)[samples + 4 :], (measured - prompt)[4:-samples], atol=2e-3
+    )

@@ -198,7 +198,7 @@ def _series(
     final: bool,
 ) -> RunSeries:
     measured = _measured(problem, run)
-    steps = CommandSteps(run.command_times, run.command_values)
+    steps = CommandSteps(*run.commands)
     best = list(states)[-1]
     phase = float(states[best].states[0, 13])
     motions = [motion_from_channels(run.clock, measured, "measured", "measured", steps, phase)]

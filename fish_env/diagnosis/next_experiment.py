@@ -171,4 +171,5 @@ def _blank(problem: Problem, manoeuvre: Manoeuvre) -> RunData:
         measured=np.zeros((len(clock), len(problem.channels))),
         state0=state,
         phase_known=True,
+        as_measured=False,
     )

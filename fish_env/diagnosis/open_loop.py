@@ -68,4 +68,5 @@ def _cut(run: RunData, state: FloatArray, first: int, last: int) -> RunData:
         command_values=np.ascontiguousarray(run.command_values[max(held, 0) :]),
         measured=np.ascontiguousarray(run.measured[first:last]),
         state0=np.ascontiguousarray(state),
+        as_measured=False,
     )

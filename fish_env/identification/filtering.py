@@ -21,6 +21,7 @@ from fish_env.model.runtime import Kernels, default_threads, kernels
 from fish_env.model.state import BASE_STATES
 
 FloatArray = npt.NDArray[np.float64]
+POSITIONS = {"x": 0, "y": 1, "z": 2}
 TEMPLATES = tuple(
     Path(__file__).with_name(f"{name}_template.py") for name in ("error_state", "filter", "replay")
 )
@@ -130,6 +131,22 @@ class RunFilter:
         step = float(np.min(np.diff(data.clock) / data.fine_substeps[1:]))
         return history_rows(self.kernels.longest_delay(records), step)
 
+    def _starts(self, data: RunData, measurement: Measurement) -> FloatArray:
+        """Initial states (states, N): what the first samples say once their distortion is undone.
+
+        Positions and heading; the rest starts too widely spread for it to matter.
+        """
+        count = measurement.gain.shape[1]
+        states = np.zeros((len(self.kernels.state_names), count))
+        states[: len(BASE_STATES)] = data.state0[:, None]
+        for i, name in enumerate(self.channels if data.as_measured else ()):
+            gain, bias = measurement.gain[i], measurement.bias[i]
+            if name in POSITIONS:
+                states[POSITIONS[name]] = (states[POSITIONS[name]] - bias) / gain
+            elif name == "yaw":
+                states[3:7] = turned(states[3:7], -bias)
+        return states
+
     def run(
         self,
         record: FloatArray,
@@ -163,8 +180,7 @@ class RunFilter:
                 np.zeros((rows, channels, N_ERROR)),
                 np.zeros((rows, channels)),
             )
-            state0 = np.zeros(states)
-            state0[: len(BASE_STATES)] = data.state0
+            state0 = self._starts(data, measurement)[:, 0].copy()
             value = entry(
                 state0, record, measurement.pace[0], measurement.delay[0], measurement.gain[:, 0],
                 measurement.bias[:, 0], data.clock, steps_of(data, fine), data.command_times,
@@ -217,15 +233,13 @@ class RunFilter:
         entry = self.kernels.entry("filter_lanes")
         count = records.shape[1]
         outs = [np.empty((count, *data.measured.shape)) for data in self.runs]
-        states = len(self.kernels.state_names)
         column = np.zeros(count, np.int64) if pushes is None else pushes.column
         size = np.zeros(count) if pushes is None else pushes.size
         none = [np.zeros((0, 0))] * len(self.runs)
         bases = none if pushes is None else pushes.bases
         jobs = []
         for data, gains, out, basis in zip(self.runs, filtered, outs, bases, strict=True):
-            state0 = np.zeros((states, count))
-            state0[: len(BASE_STATES)] = data.state0[:, None]
+            state0 = self._starts(data, measurement)
             step = 16 * max(1, -(-count // 64))
             for first in range(0, count, step):
                 last = min(count, first + step)
@@ -260,6 +274,13 @@ class Pushes:
     bases: Sequence[FloatArray]
     column: npt.NDArray[np.int64]
     size: FloatArray
+
+
+def turned(quaternion: FloatArray, angle: FloatArray) -> FloatArray:
+    """Quaternions (4, N) body to inertial, turned about the downward axis by angles (N,) in rad."""
+    w, x, y, z = quaternion
+    c, s = np.cos(0.5 * angle), np.sin(0.5 * angle)
+    return np.array([c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w])
 
 
 def steps_of(data: RunData, fine: bool) -> npt.NDArray[np.int64]:

@@ -53,6 +53,8 @@ class RunData:
         state0: (18,) initial base state.
         covariance0: (19, 19) of its error state.
         phase_known: whether the tail phase at the start is known.
+        as_measured: whether position and heading of the initial state are as the samples show them,
+            with whatever distorts those; otherwise they are true.
     """
 
     id: str
@@ -65,6 +67,7 @@ class RunData:
     state0: FloatArray
     covariance0: FloatArray
     phase_known: bool
+    as_measured: bool = True
 
     @property
     def fine_substeps(self) -> npt.NDArray[np.int64]:

@@ -223,7 +223,7 @@ def test_one_thread_or_two_give_the_same_bits(monkeypatch):
     ("path", "value"),
     [
         ("effects.gyro_bias.r", 0.03),
-        ("effects.position_scale.scale", 1.05),
+        ("effects.position_scale.scale", 1.4),
         ("effects.sensor_delay.delay", 0.06),
         ("effects.clock_scale.scale", 1.01),
     ],

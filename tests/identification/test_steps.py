@@ -80,3 +80,25 @@ def test_late_samples_show_the_time_before_the_run():
     np.testing.assert_allclose(
         (measured - shown)[samples + 4 :], (measured - prompt)[4:-samples], atol=2e-3
     )
+
+
+@pytest.mark.parametrize(
+    ("effect", "distort"),
+    [
+        ({"effects.position_scale.scale": 0.9}, lambda name, v: 0.9 * v if name in "xyz" else v),
+        ({"effects.depth_bias.offset": 0.3}, lambda name, v: v + 0.3 if name == "z" else v),
+    ],
+    ids=["scale", "bias"],
+)
+def test_a_distortion_of_the_samples_is_undone_at_the_start_too(dataset, effect, distort):
+    (run,) = dataset.runs
+    moved = {name: v + 2.0 if name == "x" else v for name, v in run.channels.items()}
+    shown = {name: distort(name, v) for name, v in moved.items()}
+    plain = Problem(replace(dataset, runs=(replace(run, channels=moved),)))
+    distorted = Problem(replace(dataset, runs=(replace(run, channels=shown),)))
+    start = Point(np.zeros(len(plain.baseline)), {})
+    expected = plain.filtered(start, noise_of(plain))[0]
+    found = distorted.filtered(replace(start, effects=effect), noise_of(distorted))[0]
+    np.testing.assert_allclose(found.states[:, :3], expected.states[:, :3], atol=1.5e-3)
+    wrong = distorted.filtered(start, noise_of(distorted))[0]
+    assert np.abs(wrong.states[:, :3] - expected.states[:, :3]).max() > 0.1

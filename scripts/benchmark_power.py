@@ -81,6 +81,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options = parse(arguments)
     options.work.mkdir(parents=True, exist_ok=True)
     todo = list(looks(options.designs, options.again))
+    if options.only:
+        todo = [look for look in todo if look.target.effect in options.only.split(",")]
     if options.finished:
         todo = [look for look in todo if (options.work / look.file).exists()]
     begin = time.monotonic()
@@ -100,6 +102,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     add = parser.add_argument
     add("--designs", type=int, default=4, help="fish and schedules under the nominal noise")
     add("--again", type=int, default=3, help="of them under twice the noise")
+    add("--only", help="effects, separated by commas; default: all")
     add("--finished", action="store_true", help="only sum up what is finished so far")
     add("--work", type=Path, default=ROOT / "out" / "benchmark-power")
     add("--out", type=Path, default=ROOT / "results", help="folder of the dated result")

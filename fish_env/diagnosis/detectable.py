@@ -30,6 +30,7 @@ FADING = 1.5
 """One that grows by a smaller power has a part that does not fade with the size: an error of the
 simulation's step, or a limit on something that jumps."""
 ALIKE = 0.1
+REFITS = 2
 NEAR = 0.2
 """Coefficients that move by less, in prior standard deviations, stay on the tangent."""
 
@@ -174,18 +175,19 @@ def changes(fit: Fit, jobs: Jobs) -> FloatArray:
 
     A refit follows a large change along a curve, not along its tangent. So each setting is
     simulated again with the coefficients where the tangent leads, and what they explain there is
-    added back: projecting the result leaves what a refit would leave, to second order.
+    added back: projecting the result leaves what a refit would leave after as many steps.
     """
     projector, own = Projector(fit), Free(fit.problem, (), fit.released)
     start = np.repeat(fit.point.z[:, None], len(jobs), axis=1)
     seen = _simulated(fit, jobs, start)
     followed = projector.coefficients(seen.T)[: len(start)]
     far = np.flatnonzero(np.abs(followed).max(axis=0) > NEAR).tolist()
-    if far:
-        there = np.array([own.clip(z) for z in (start - followed).T[far]]).T
+    for _ in range(REFITS if far else 0):
+        there = np.array([own.clip(z) for z in (start[:, far] - followed[:, far]).T]).T
         moved = _simulated(fit, [jobs[i] for i in far], there)
         moved -= (projector.lin.slopes[:, : len(start)] @ (there - start[:, far])).T
         seen[far] = np.where(np.isfinite(moved), moved, seen[far])
+        followed[:, far] = projector.coefficients(seen[far].T)[: len(start)]
     return seen
 
 

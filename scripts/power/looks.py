@@ -27,8 +27,8 @@ from tests.hidden.truth import Truth
 
 Values = Mapping[str, Mapping[str, float]]
 NOISES = {"nominal": Noise(), "double": Noise(sensors=2.0, force=0.006)}
-NOTHING = 0
-"""Number of the noise of the data set without an effect; the others count from one."""
+NOTHING = {"nominal": 0, "double": 100}
+"""Number of the noise of the data set without an effect; no other has it."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def without_effect(design: int, noise: str) -> dict[str, Any]:
     """What is published of a design."""
     begin = time.process_time()
     with threadpool_limits(1, "blas"):
-        dataset, _ = measured(design, NOTHING, noise, {})
+        dataset, _ = measured(design, NOTHING[noise], noise, {})
         baseline, screens = screened(dataset, design)
         causes = causes_of(baseline.problem)
         published = preconditions(baseline.problem, screens, causes, baseline)
@@ -92,7 +92,7 @@ def without_effect(design: int, noise: str) -> dict[str, Any]:
 
 def allowed(design: int, noise: str, nothing: dict[str, Any]) -> dict[str, dict[str, float]]:
     """What the information in the data of a design would allow."""
-    dataset, truth = measured(design, NOTHING, noise, {})
+    dataset, truth = measured(design, NOTHING[noise], noise, {})
     split = split_runs(dataset, design, (0.75, 0.0, 0.25), by="condition")
     problem = Problem(dataset, None, (*split.fit, *split.select))
     with threadpool_limits(1, "blas"):

@@ -14,15 +14,11 @@ from scipy.stats import chi2
 from fish_env.plotting.style import BLACK, BLUE, DOTS_PER_INCH, VERMILION, drawing
 from scripts.power.curves import Curve, fit_curve, strength
 from scripts.power.limits import noncentrality
-from tests.hidden.summary import rate, shown
+from tests.hidden.summary import rate
 
 Rows = Sequence[dict[str, Any]]
 START = ("depth_bias.offset", "position_scale.scale")
 """Measured apart: where a run starts is read off the measurement that they change."""
-
-
-BROKEN = ("sensor_delay.delay",)
-"""Whose signal the filter gets wrong after a start from rest (see the page)."""
 
 
 def write(date: str, summary: dict[str, Any], folder: Path) -> None:
@@ -42,7 +38,6 @@ def summarise(rows: Rows, nothing: Rows, signals: dict[str, Any]) -> dict[str, A
     return {
         "data_sets": len(rows) + len(nothing),
         "cpu_s": float(sum(row["cpu_s"] for row in [*rows, *nothing])),
-        "false_alarms": rate(row["alarm"] for row in nothing),
         "noises": {noise: by_target([r for r in looks if r["noise"] == noise]) for noise in noises},
         "start": [row for row in rows if row["target"] in START],
         "whole": [row for row in rows if "verdict" in row],
@@ -55,11 +50,7 @@ def by_target(looks: Rows) -> dict[str, Any]:
     """Curves of each effect, and of all together."""
     targets = list(dict.fromkeys(row["target"] for row in looks))
     groups = {name: [row for row in looks if row["target"] == name] for name in targets}
-    groups["all"] = looks
-    rest = [row for row in looks if row["target"] not in BROKEN]
-    if len(rest) < len(looks):
-        groups[f"all but {', '.join(BROKEN)}"] = rest
-    return {name: curves(group) for name, group in groups.items()}
+    return {name: curves(group) for name, group in {**groups, "all": looks}.items()}
 
 
 def curves(looks: Rows) -> dict[str, Any]:
@@ -112,8 +103,7 @@ def between(curve: dict[str, Any]) -> str:
 def markdown(summary: dict[str, Any]) -> str:
     """The page."""
     lines = [
-        f"{summary['data_sets']} data sets, {summary['cpu_s'] / 60:.0f} minutes of processor time. "
-        f"False alarms without an effect: {shown(summary['false_alarms'])}.",
+        f"{summary['data_sets']} data sets, {summary['cpu_s'] / 60:.0f} minutes of processor time.",
     ]
     for noise, targets in summary["noises"].items():
         lines += ["", f"## {noise.capitalize()} noise", "", *power_table(targets)]
@@ -195,9 +185,9 @@ def draw(summary: dict[str, Any], file: Path) -> None:
 def _power(panel: Any, noise: str, targets: dict[str, Any]) -> None:
     sizes = np.linspace(0.5, 1.6, 200)
     for name, one in targets.items():
-        if not name.startswith("all"):
+        if name != "all":
             panel.plot(sizes, _curve(one).share(sizes), color=BLUE, alpha=0.3, linewidth=1.0)
-    together = list(targets.values())[-1]
+    together = targets["all"]
     panel.plot(sizes, _curve(together).share(sizes), color=BLACK)
     for size, count in together["counts"].items():
         low, high = count["rate"] - count["low"], count["high"] - count["rate"]
@@ -224,4 +214,4 @@ def _catalogue(panel: Any, found: dict[str, dict[str, float]]) -> None:
     panel.axvline(1.5, color=BLACK, linewidth=0.9)
     panel.set_yticks(rows, names, fontsize=5.5)
     panel.set(ylim=(-1, len(names)), xlim=(0.7, None), xlabel="published / allowed by information")
-    panel.legend(loc="lower right")
+    panel.legend(loc="lower right", frameon=True)

@@ -10,7 +10,7 @@ from fish_env.data import load_dataset
 from scripts.benchmark_power import AGAIN, SIZES, TARGETS, looks
 from scripts.power.curves import Curve, fit_curve, strength
 from scripts.power.limits import noncentrality
-from scripts.power.looks import Target
+from scripts.power.looks import NOTHING, Target
 from scripts.power.report import draw, summarise, write
 from tests.hidden.designs import Noise, swim_design
 from tests.hidden.plans import Plan
@@ -76,7 +76,7 @@ def test_every_data_set_has_noise_and_a_file_of_its_own():
     assert len({look.file for look in todo}) == len(todo)
     seeds = [(look.design, look.repeat) for look in todo]
     assert len(set(seeds)) == len(seeds)
-    assert 0 not in [look.repeat for look in todo]  # that of the data without an effect
+    assert not {look.repeat for look in todo} & set(NOTHING.values())
     assert sum(look.noise == "double" for look in todo) == 2 * len(AGAIN) * len(SIZES)
     assert sum(look.whole for look in todo) == len(TARGETS)
 

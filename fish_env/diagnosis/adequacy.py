@@ -15,14 +15,17 @@ import numpy.typing as npt
 
 from fish_env.diagnosis.causes import Cause
 from fish_env.diagnosis.screening import Projector, Signal, null_threshold
+from fish_env.effects.extended import PREFIX
 from fish_env.identification.estimator import Fit
 from fish_env.identification.filtering import Filtered, Pushes
 from fish_env.identification.noise import disturbance_range
 from fish_env.identification.runs import RunData
+from fish_env.model.effect import EffectParameter
 from fish_env.sensing.channels import channels_from_states
 
 FloatArray = npt.NDArray[np.float64]
 DIRECTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+FAR_OFF = 10.0
 LEVEL = 0.003
 """For white residuals. A false alarm here spoils a right answer of any kind, and 97 % are to be
 right, so it gets a tenth of that. How far disturbances of other colours go is measured by
@@ -54,8 +57,8 @@ class Adequacy:
         reached: nothing is asked for beyond chance, and the disturbance is one that a tank makes.
         threshold: log p-value for that.
         misfits: what is asked for most, strongest first.
-        strained: how the disturbance had to leave what is plausible to explain the data; empty
-            where it did not.
+        strained: what had to leave what is plausible to explain the data, the disturbance or a
+            cause's own numbers; empty where nothing did.
     """
 
     reached: bool
@@ -73,6 +76,36 @@ def strains(fit: Fit) -> tuple[str, ...]:
     if noise.moment_sd > 0.98 * within.moment[1]:
         found.append(f"a disturbing moment of {1e3 * noise.moment_sd:.2g} mN m or more")
     return tuple(found)
+
+
+def implausible(fit: Fit) -> tuple[str, ...]:
+    """Numbers of the causes that nobody would believe: their nearest relative is what acts.
+
+    A coefficient more than :data:`FAR_OFF` prior deviations off, an effect of a sign that it
+    cannot have, or :data:`FAR_OFF` times as strong as the strongest that is plausible.
+    """
+    paths = fit.problem.baseline.paths
+    found = [
+        f"{path} {abs(z):.0f} prior standard deviations from where it is known to be"
+        for path, z in zip(paths, fit.point.z, strict=True)
+        if path in fit.released and abs(z) > FAR_OFF
+    ]
+    for name in fit.effects:
+        for parameter in fit.problem.known[name].parameters:
+            path = f"{PREFIX}{name}.{parameter.name}"
+            if not parameter.shapes and _beyond(parameter, fit.interval(path)):
+                value, unit = fit.point.effects[path], parameter.unit
+                found.append(f"{name} with a {parameter.name} of {value:.2g} {unit}")
+    return tuple(found)
+
+
+def _beyond(parameter: EffectParameter, interval: tuple[float, float]) -> bool:
+    """Whether an interval lies wholly outside what could be, seen from neutral."""
+    neutral, (low, high) = parameter.neutral, parameter.plausible
+    if not np.isfinite(neutral):
+        return interval[1] < low / FAR_OFF
+    below, above = min(low - neutral, 0.0), max(high - neutral, 0.0)
+    return bool(interval[0] > neutral + FAR_OFF * above or interval[1] < neutral + FAR_OFF * below)
 
 
 def adequacy(fit: Fit, rng: np.random.Generator, tolerated: float = 0.0) -> Adequacy:
@@ -94,7 +127,7 @@ def adequacy(fit: Fit, rng: np.random.Generator, tolerated: float = 0.0) -> Adeq
     found.sort(key=lambda m: m.log_p)
     strongest = max((signal.statistic for _, signal in signals), default=0.0)
     reached = not found or found[0].log_p >= threshold or strongest < tolerated
-    strained = strains(fit)
+    strained = (*strains(fit), *implausible(fit))
     return Adequacy(reached and not strained, threshold, tuple(found[:8]), strained)
 
 

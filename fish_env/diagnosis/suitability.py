@@ -127,6 +127,7 @@ def doubts(answer: Mapping[str, Any]) -> list[str]:
         answer: the content of ``diagnosis.json``.
     """
     found = [_far_coefficients(answer["parameters"]), _mass_in_disguise(answer["causes"])]
+    found += [f"What fits best is not to be believed: {s}." for s in answer.get("strained", ())]
     return [doubt for doubt in found if doubt]
 
 

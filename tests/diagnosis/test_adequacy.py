@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fish_env.diagnosis.adequacy import adequacy, regressors
+from fish_env.diagnosis.adequacy import adequacy, implausible, regressors
+from fish_env.effects import catalogue
 from fish_env.identification.filtering import NoiseModel
 from fish_env.identification.free import Linearised
 from fish_env.params import load_fish
@@ -62,7 +63,7 @@ def fit_with(missing, seed=0, noise=QUIET):
                      np.repeat(run.clock, 6))  # fmt: skip
     problem = Answering(run, flat)
     return SimpleNamespace(
-        problem=problem, filtered=[filtered], linearised=lin, released=(), noise=noise,
+        problem=problem, filtered=[filtered], linearised=lin, released=(), effects=(), noise=noise,
         point=SimpleNamespace(z=np.zeros(0), effects={}),
     )  # fmt: skip
 
@@ -101,3 +102,37 @@ def test_a_missing_wrench_is_found_with_what_it_depends_on(function, channel, di
 
 def test_a_wrench_below_the_noise_is_left_alone():
     assert adequacy(fit_with([("depth", 2, 0.02)]), np.random.default_rng(0)).reached
+
+
+def named(effects=(), released=(), z=0.0, interval=(0.0, 0.0)):
+    """What is read of a fit that names causes."""
+    problem = SimpleNamespace(known=catalogue(), baseline=Sized(("tail.area", "mass.total")))
+    value = sum(interval) / 2
+    paths = {f"effects.{e}.{p.name}": value for e in effects for p in catalogue()[e].parameters}
+    return SimpleNamespace(
+        problem=problem, effects=effects, released=released,
+        point=SimpleNamespace(z=np.array([z, 0.0]), effects=paths), interval=lambda path: interval,
+    )  # fmt: skip
+
+
+def test_a_coefficient_far_outside_its_prior_is_no_explanation():
+    assert implausible(named(released=("tail.area",), z=6.0)) == ()
+    (said,) = implausible(named(released=("tail.area",), z=-57.0))
+    assert "tail.area" in said
+    assert implausible(named(released=("mass.total",), z=-57.0)) == ()
+
+
+@pytest.mark.parametrize(
+    ("effect", "interval", "believed"),
+    [
+        ("hull_compression", (0.002, 0.004), True),
+        ("hull_compression", (-0.001, 0.002), True),  # may be of the right sign
+        ("hull_compression", (-0.02, -0.01), False),  # a hull that swells with depth
+        ("hull_compression", (0.2, 0.3), False),
+        ("frequency_scale", (0.8, 0.85), True),
+        ("servo_rate_limit", (1.0, 1.5), True),
+        ("servo_rate_limit", (0.01, 0.05), False),
+    ],
+)
+def test_an_effect_needs_a_sign_and_size_that_it_can_have(effect, interval, believed):
+    assert (implausible(named(effects=(effect,), interval=interval)) == ()) is believed

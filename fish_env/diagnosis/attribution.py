@@ -187,8 +187,11 @@ def _with_wandering_phase(
     causes: Sequence[Cause],
     rng: np.random.Generator,
 ) -> tuple[Fit, Sequence[Signal]] | None:
-    """What shows when the tail's phase may wander: asked where no plausible disturbance is left."""
-    if not chosen or not strains(current.fit):
+    """What shows when the tail's phase may wander: asked where no plausible disturbance is left.
+
+    A beat out of step hides everything else, so it is the first cause to be found or none.
+    """
+    if current.causes or not chosen or not strains(current.fit):
         return None
     loose = loosened(current)
     shown = screen(loose, causes, rng)

@@ -79,6 +79,7 @@ def test_nothing_is_found_where_nothing_is_hidden(tmp_path):
     assert answer["verdict"] in ("no_misfit", "not_excited")
     assert answer["causes"] == []
     assert answer["gain"] is None
+    assert "two of the runs" in answer["left_out"][0]
     assert not (out / "extended.yaml").exists()
     assert max(pair["extended"] for pair in answer["misfit"].values()) < 1.2
     assert {"refitting the baseline", "screening causes", "testing what is left"} <= set(steps)

@@ -17,8 +17,6 @@ from scripts.power.limits import noncentrality
 from tests.hidden.summary import rate
 
 Rows = Sequence[dict[str, Any]]
-START = ("depth_bias.offset", "position_scale.scale")
-"""Measured apart: where a run starts is read off the measurement that they change."""
 
 
 def write(date: str, summary: dict[str, Any], folder: Path) -> None:
@@ -33,15 +31,14 @@ def write(date: str, summary: dict[str, Any], folder: Path) -> None:
 
 def summarise(rows: Rows, nothing: Rows, signals: dict[str, Any]) -> dict[str, Any]:
     """All that the page says."""
-    looks = [row for row in rows if "statistic" in row and row["target"] not in START]
+    looks = [row for row in rows if "statistic" in row]
     noises = list(dict.fromkeys(row["noise"] for row in looks))
     return {
         "data_sets": len(rows) + len(nothing),
         "cpu_s": float(sum(row["cpu_s"] for row in [*rows, *nothing])),
         "noises": {noise: by_target([r for r in looks if r["noise"] == noise]) for noise in noises},
-        "start": [row for row in rows if row["target"] in START],
         "whole": [row for row in rows if "verdict" in row],
-        "catalogue": catalogue(nothing),
+        "catalogue": catalogue([row for row in nothing if row["noise"] == "nominal"]),
         "signals": signals,
     }
 
@@ -107,7 +104,6 @@ def markdown(summary: dict[str, Any]) -> str:
     ]
     for noise, targets in summary["noises"].items():
         lines += ["", f"## {noise.capitalize()} noise", "", *power_table(targets)]
-    lines += ["", "## Effects that the start of a run hides", "", *start_table(summary["start"])]
     lines += ["", "## Whole diagnoses", "", *whole_table(summary["whole"])]
     lines += ["", "## Published over allowed", "", *catalogue_table(summary["catalogue"])]
     lines += ["", "## Signals, expected and made", "", *signals_table(summary["signals"])]
@@ -122,7 +118,7 @@ def power_table(targets: dict[str, Any]) -> list[str]:
         f"| --- {'| ---: ' * len(sizes)}| ---: | ---: | ---: |",
     ]
     for name, one in targets.items():
-        counts = [f"{c['count']}/{c['of']}" for c in (one["counts"][size] for size in sizes)]
+        counts = [counted(one["counts"].get(size)) for size in sizes]
         of = one["strength"]
         lines.append(
             f"| {name} | {' | '.join(counts)} | {between(one['found'])} | {between(one['misfit'])} "
@@ -131,13 +127,8 @@ def power_table(targets: dict[str, Any]) -> list[str]:
     return lines
 
 
-def start_table(rows: Rows) -> list[str]:
-    lines = ["| effect | size | found | statistic | bound |", "| --- | ---: | --- | ---: | ---: |"]
-    return lines + [
-        f"| {row['target']} | {row['multiple']:g} | {'yes' if row['found'] else 'no'} "
-        f"| {row['statistic']:.1f} | {row['bound']:.1f} |"
-        for row in rows
-    ]
+def counted(count: dict[str, Any] | None) -> str:
+    return f"{count['count']}/{count['of']}" if count else "-"
 
 
 def whole_table(rows: Rows) -> list[str]:

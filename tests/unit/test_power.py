@@ -118,7 +118,7 @@ def row(target: str, multiple: float, found: bool, noise: str = "nominal") -> di
 
 def test_a_summary_is_written_with_its_picture(tmp_path):
     rows = [row("current.north", k, k > 0.9, n) for k in SIZES for n in ("nominal", "double")]
-    rows += [row("depth_bias.offset", 4.0, False)]
+    rows += [row("gyro_bias.r", 1.0, False)]
     whole = {key: rows[0][key] for key in ("target", "multiple", "design", "noise", "cpu_s")}
     rows += [{**whole, "verdict": "cause", "named": ["current"]}]
     limit = {"same": 0.9, "alone": 0.5, "known": 0.3}
@@ -133,13 +133,13 @@ def test_a_summary_is_written_with_its_picture(tmp_path):
     north = summary["noises"]["nominal"]["current.north"]
     assert north["counts"]["1"]["count"] == 1
     assert 0.8 < north["found"]["at"] < 1.2
-    assert summary["noises"]["nominal"]["all"]["found"]["looks"] == len(SIZES)
+    assert summary["noises"]["nominal"]["all"]["found"]["looks"] == len(SIZES) + 1
     assert summary["catalogue"]["current.north"]["same"] == pytest.approx(1 / 0.9)
     write("2026-01-02", summary, tmp_path)
     draw(summary, tmp_path / "images" / "power.png")
     page = (tmp_path / "power-2026-01-02.md").read_text()
     assert "| current.north | 0/1 | 0/1 | 1/1 | 1/1 |" in page
-    assert "| depth_bias.offset | 4 | no |" in page
+    assert "| gyro_bias.r | - | - | 0/1 | - |" in page
     assert "| sensor_delay.delay | 0.40 | 0.50 |" in page
     assert (
         json.loads((tmp_path / "power-2026-01-02.json").read_text())["data_sets"] == len(rows) + 1

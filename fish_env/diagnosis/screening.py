@@ -18,7 +18,13 @@ from scipy.stats import chi2, ncx2
 
 from fish_env.diagnosis.causes import Cause, best_of_each, effect_values, finer
 from fish_env.identification.estimator import Fit
-from fish_env.identification.information import block_sums, information, prior_precision
+from fish_env.identification.information import (
+    BLOCK_S,
+    LONG_BLOCK_S,
+    block_sums,
+    information,
+    prior_precision,
+)
 from fish_env.identification.products import inner
 
 FloatArray = npt.NDArray[np.float64]
@@ -135,11 +141,17 @@ class Projector:
         return Signal(cause, probe, left, float(energy.sum()), projected, score, inflation)
 
     def _inflation(self, left: FloatArray, residuals: FloatArray) -> float:
-        """Spread of block sums of the score against what white residuals would give."""
-        sums = block_sums(left * residuals[:, None], self.lin.run_of, self.lin.time_of)
-        white = np.einsum("ij,ij->j", left, left)
-        ratios = np.einsum("ij,ij->j", sums, sums) / np.maximum(white, 1e-12)
-        return float(max(1.0, ratios.max()))
+        """Spread of block sums of the score against what white residuals would give.
+
+        The larger of two spreads, over blocks long enough for most disturbances and for slow ones.
+        """
+        scores = left * residuals[:, None]
+        white = np.maximum(np.einsum("ij,ij->j", left, left), 1e-12)
+        largest = 1.0
+        for length in (BLOCK_S, LONG_BLOCK_S):
+            sums = block_sums(scores, self.lin.run_of, self.lin.time_of, length)
+            largest = max(largest, float((np.einsum("ij,ij->j", sums, sums) / white).max()))
+        return largest
 
 
 def screen(

@@ -12,7 +12,9 @@ from fish_env.identification.products import inner
 
 FloatArray = npt.NDArray[np.float64]
 BLOCK_S = 3.0
-"""Length of the blocks over which scores are summed (s), longer than a disturbance remembers."""
+"""Length of the blocks over which scores are summed (s), longer than most disturbances remember."""
+LONG_BLOCK_S = 9.0
+"""As long as a disturbance may remember; few fit into a run, so their spread is less sure."""
 
 
 def prior_precision(baseline: Baseline, further: int, released: Iterable[str]) -> FloatArray:
@@ -43,10 +45,13 @@ def information(slopes: FloatArray, prior: FloatArray) -> FloatArray:
 
 
 def block_sums(
-    scores: FloatArray, run_of: npt.NDArray[np.int64], time_of: FloatArray
+    scores: FloatArray,
+    run_of: npt.NDArray[np.int64],
+    time_of: FloatArray,
+    length_s: float = BLOCK_S,
 ) -> FloatArray:
     """Scores (D, m) summed over blocks of time of each run, shape (blocks, m)."""
-    block = run_of * 10_000 + np.floor(time_of / BLOCK_S).astype(np.int64)
+    block = run_of * 10_000 + np.floor(time_of / length_s).astype(np.int64)
     _, index = np.unique(block, return_inverse=True)
     sums = np.zeros((index.max() + 1, scores.shape[1]))
     np.add.at(sums, index, scores)

@@ -82,13 +82,15 @@ def implausible(fit: Fit) -> tuple[str, ...]:
     """Numbers of the causes that nobody would believe: their nearest relative is what acts.
 
     A coefficient more than :data:`FAR_OFF` prior deviations off, an effect of a sign that it
-    cannot have, or :data:`FAR_OFF` times as strong as the strongest that is plausible.
+    cannot have, or :data:`FAR_OFF` times as strong as the strongest that is plausible. A
+    coefficient that does what an effect does may go as far as the effect.
     """
     paths = fit.problem.baseline.paths
+    effects_too = {path for effect in fit.problem.known.values() for path in effect.equals}
     found = [
         f"{path} {abs(z):.0f} prior standard deviations from where it is known to be"
         for path, z in zip(paths, fit.point.z, strict=True)
-        if path in fit.released and abs(z) > FAR_OFF
+        if path in set(fit.released) - effects_too and abs(z) > FAR_OFF
     ]
     for name in fit.effects:
         for parameter in fit.problem.known[name].parameters:

@@ -36,7 +36,7 @@ class Answering:
     """A problem in which each direction of the wrench moves one of six channels."""
 
     def __init__(self, run, residuals):
-        self.runs, self.residuals, self.baseline = (run,), residuals, Sized(())
+        self.runs, self.residuals, self.baseline, self.known = (run,), residuals, Sized(()), {}
         self.fish = load_fish("zheng-2021-a")
 
     def innovations(self, z, effects, noise, filtered, pushes):

@@ -79,7 +79,8 @@ def markdown(record: dict[str, Any], declared: Declaration, rows: Sequence[Score
         "### What was hidden and what was found",
         _fish_table(record["fish"]),
         f"### Each fish: {label} on `{declared.tasks[0]}`",
-        "Mean over the seeds, in brackets their standard deviation.",
+        "Mean over the seeds, in brackets their standard deviation; differences with their 95 % "
+        "intervals over the seeds. No gap: its interval reaches zero.",
         _each_fish(primary, [entry["name"] for entry in record["fish"]]),
         "### Means over fish and seeds",
         _means_table(record["summary"]),
@@ -87,7 +88,8 @@ def markdown(record: dict[str, Any], declared: Declaration, rows: Sequence[Score
         "With 95 % intervals over the fish; in brackets, on how many of them it is better.",
         _differences_table(record["summary"], len(record["fish"])),
         "### Share of the gap between printed fish and truth that is closed",
-        "In per cent, with 95 % intervals; open ones where the gap itself could be zero.",
+        "In per cent, with 95 % intervals over the fish. Open: the gap itself could be zero, and "
+        "the share mean little.",
         _closed_table(record["summary"]),
     ]
     return "\n\n".join(parts)
@@ -115,7 +117,9 @@ def _found(entry: dict[str, Any]) -> str:
         f"{cause['name']} ({', '.join(_estimate(*item) for item in cause['parameters'].items())})"
         for cause in entry["causes"]
     )
-    return causes if entry["extended"] else f"{causes or 'nothing'}; no extended model"
+    others = [" + ".join(cause["name"] for cause in other) for other in entry["alternatives"]]
+    rivals = f"; or {', or '.join(others)}" if others else ""
+    return f"{causes or 'nothing'}{rivals}{'' if entry['extended'] else '; no extended model'}"
 
 
 def _estimate(name: str, found: dict[str, Any]) -> str:
@@ -124,16 +128,19 @@ def _estimate(name: str, found: dict[str, Any]) -> str:
 
 
 def _each_fish(scores: Scores, names: Sequence[str]) -> str:
-    head = ("fish", *ARMS, "extended - baseline", "share closed (%)")
+    head = ("fish", *ARMS, "gap: truth - baseline", "gain: extended - baseline", "gain / gap (%)")
     rows = []
     for i, name in enumerate(names):
         cells = [f"{v[i].mean():.1f} ({v[i].std(ddof=1):.1f})" for v in scores.values()]
+        gap = over_seeds(scores, TRUTH, BASELINE, i)
         gain = over_seeds(scores, EXTENDED, BASELINE, i)
-        gap = per_fish(scores, TRUTH, BASELINE)[i]
-        share = f"{100 * gain.mean / gap:.0f}" if gap else "-"
-        cells += [f"{gain.mean:+.1f} ({gain.low:+.1f} to {gain.high:+.1f})", share]
-        rows.append([name, *cells])
+        share = f"{100 * gain.mean / gap.mean:.0f}" if gap.low > 0.0 else "no gap"
+        rows.append([name, *cells, _signed(gap), _signed(gain), share])
     return _table(head, rows)
+
+
+def _signed(interval: Interval) -> str:
+    return f"{interval.mean:+.1f} ({interval.low:+.1f} to {interval.high:+.1f})"
 
 
 def _shown(metric: str, value: float, sign: str = "") -> str:

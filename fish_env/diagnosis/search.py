@@ -139,6 +139,51 @@ def second_look(
     return _best_first([*tried, *more])[0]
 
 
+def exchanged(current: Explanation, left: Sequence[Signal], report: Report) -> Explanation:
+    """The explanation, or a better one that has a look-alike in the place of an earlier cause.
+
+    The first cause is chosen while the others are still missing, and its nearest relative may then
+    make up for part of them.
+
+    Args:
+        current: at least two causes; the last one was chosen in view of the others.
+        left: what every other effect would still explain.
+        report: told what is being done.
+    """
+    own = current.fit
+    sketcher = Sketcher(own)
+    found: list[tuple[float, tuple[str, ...], Sketch]] = []
+    for name in current.causes[:-1]:
+        alike = own.problem.known[name].confusable_with if name in own.effects else ()
+        for signal in (s for s in left if s.cause.name in alike):
+            report(f"trying {signal.cause.name} instead of {name}")
+            causes = tuple(signal.cause.name if c == name else c for c in current.causes)
+            sketch = _exchange(sketcher, own, name, signal)
+            if sketch is not None:
+                found.append((sketch.objective, causes, sketch))
+    if not found:
+        return current
+    _, causes, sketch = min(found, key=lambda f: f[0])
+    if sketch.objective >= sketcher.base():
+        return current
+    report(f"fitting {' and '.join(causes)}")
+    other = Explanation(causes, _in_full(own.problem, sketch, own.noise))
+    better = score(own.problem, other) < score(own.problem, current)
+    return other if better else current
+
+
+def _exchange(sketcher: Sketcher, own: Fit, name: str, signal: Signal) -> Sketch | None:
+    """The sketch with one effect in the place of another, from all its sizes."""
+    kept = {p: v for p, v in own.point.effects.items() if p.split(".")[1] != name}
+    effects = tuple(signal.cause.name if e == name else e for e in own.effects)
+    sizes = _probed(own.problem, signal, every=True)
+    begin = [Point(own.point.z, {**kept, **values}) for values in sizes]
+    try:
+        return sketcher.sketch(effects, own.released, begin)
+    except np.linalg.LinAlgError:
+        return None
+
+
 def without(current: Explanation, name: str) -> Explanation:
     """The fit when one of its causes is dropped, under the same noise model."""
     own = current.fit
@@ -191,11 +236,11 @@ def starts(base: Fit, signal: Signal, z: FloatArray | None = None) -> list[Point
     return [Point(z, {**base.point.effects, **values}) for z in baselines for values in clipped]
 
 
-def _probed(problem: Problem, signal: Signal) -> list[dict[str, float]]:
+def _probed(problem: Problem, signal: Signal, every: bool = False) -> list[dict[str, float]]:
     """Settings to begin from: of the best shape at every size, or of every alternative."""
     cause = signal.cause
     shaped = any(p.shapes for p in problem.known[cause.name].parameters)
-    alternatives = (cause.probes[signal.probe],) if shaped else cause.probes
+    alternatives = (cause.probes[signal.probe],) if shaped and not every else cause.probes
     return [effect_values(problem, cause.name, p) for probes in alternatives for p in probes]
 
 

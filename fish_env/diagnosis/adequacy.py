@@ -82,8 +82,9 @@ def implausible(fit: Fit) -> tuple[str, ...]:
     """Numbers of the causes that nobody would believe: their nearest relative is what acts.
 
     A coefficient more than :data:`FAR_OFF` prior deviations off, an effect of a sign that it
-    cannot have, or :data:`FAR_OFF` times as strong as the strongest that is plausible. A
-    coefficient that does what an effect does may go as far as the effect.
+    cannot have, or :data:`FAR_OFF` times as strong as the strongest that is plausible, or of a
+    shape far from the plausible ones. A coefficient that does what an effect does may go as far
+    as the effect.
     """
     paths = fit.problem.baseline.paths
     effects_too = {path for effect in fit.problem.known.values() for path in effect.equals}
@@ -95,10 +96,21 @@ def implausible(fit: Fit) -> tuple[str, ...]:
     for name in fit.effects:
         for parameter in fit.problem.known[name].parameters:
             path = f"{PREFIX}{name}.{parameter.name}"
-            if not parameter.shapes and _beyond(parameter, fit.interval(path)):
-                value, unit = fit.point.effects[path], parameter.unit
+            value, unit = fit.point.effects[path], parameter.unit
+            beyond = (
+                _out_of_place(parameter, value)
+                if parameter.shapes
+                else _beyond(parameter, fit.interval(path))
+            )
+            if beyond:
                 found.append(f"{name} with a {parameter.name} of {value:.2g} {unit}")
     return tuple(found)
+
+
+def _out_of_place(parameter: EffectParameter, value: float) -> bool:
+    """Whether a shape is far from any plausible one: a tether to another town is a weight."""
+    low, high = parameter.plausible
+    return bool(abs(value - 0.5 * (low + high)) > 1.5 * (high - low))
 
 
 def _beyond(parameter: EffectParameter, interval: tuple[float, float]) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import t as student
 
-from fish_env.diagnosis.adequacy import strains
+from fish_env.diagnosis.adequacy import implausible, strains
 from fish_env.diagnosis.causes import Cause, same
 from fish_env.diagnosis.effort import FULL, Effort
 from fish_env.diagnosis.screening import Screen, Signal, screen
@@ -155,6 +155,7 @@ def extended(
             if alike(problem, best, e)
             and not same(problem.known, best.causes[-1], e.causes[-1])
             and explained_away(e.causes[-1], screens[-2], screens[-1])
+            and not implausible(e.fit)
         )
     current = pruned(problem, current)
     return Attribution(begun.baseline, tuple(screens), current, rivals, ranking, total)

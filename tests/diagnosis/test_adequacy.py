@@ -135,6 +135,8 @@ def test_a_coefficient_far_outside_its_prior_is_no_explanation():
         ("frequency_scale", (0.8, 0.85), True),
         ("servo_rate_limit", (1.0, 1.5), True),
         ("servo_rate_limit", (0.01, 0.05), False),
+        ("tether", (0.01, 0.03), True),
+        ("tether", (8.0, 9.0), False),  # anchored, and as stiff, far beyond any tank
     ],
 )
 def test_an_effect_needs_a_sign_and_size_that_it_can_have(effect, interval, believed):

@@ -1,0 +1,65 @@
+"""A look-alike that was taken for an earlier cause gives way once the others are there."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from fish_env.diagnosis import search
+from fish_env.diagnosis.causes import Cause, probes_of
+from fish_env.diagnosis.search import Explanation, exchanged
+from fish_env.effects import catalogue
+
+KNOWN = catalogue()
+
+
+def fit_of(effects, objective):
+    problem = SimpleNamespace(known=KNOWN, samples=1000, baseline=())
+    values = {f"effects.{e}.{n}": v for e in effects for n, v in KNOWN[e].neutral.items()}
+    return SimpleNamespace(
+        problem=problem, effects=effects, released=(), objective=objective, noise=None,
+        names=tuple(values), point=SimpleNamespace(z=np.zeros(1), effects=values),
+    )  # fmt: skip
+
+
+OBJECTIVES = {("servo_lag", "current"): -50.0, ("servo_delay", "current"): 20.0}
+
+
+class Judge:
+    """Sketches whose objective is told by their effects."""
+
+    def __init__(self, fit):
+        self.fit = fit
+
+    def base(self):
+        return self.fit.objective
+
+    def sketch(self, effects, released, begin):
+        names = {p.split(".")[1] for point in begin for p in point.effects}
+        assert names == set(effects)  # nothing of the effect that was taken out
+        return SimpleNamespace(effects=effects, objective=OBJECTIVES[effects])
+
+
+def signals(*names):
+    return [SimpleNamespace(cause=Cause(n, probes_of(KNOWN[n])), probe=0) for n in names]
+
+
+@pytest.mark.parametrize(
+    ("reached", "kept"), [(0.0, ("servo_lag", "current")), (-90.0, ("tail_flexibility", "current"))]
+)
+def test_a_better_look_alike_takes_the_place(monkeypatch, reached, kept):
+    monkeypatch.setattr(search, "Sketcher", Judge)
+    monkeypatch.setattr(
+        search, "_in_full", lambda problem, s, noise: fit_of(s.effects, s.objective)
+    )
+    effects = ("tail_flexibility", "current")
+    now = Explanation(effects, fit_of(effects, reached))
+    left = signals("servo_delay", "servo_lag", "gyro_bias")  # the last looks like neither
+    assert exchanged(now, left, lambda step: None).causes == kept
+
+
+def test_the_last_cause_is_not_exchanged(monkeypatch):
+    monkeypatch.setattr(search, "Sketcher", Judge)
+    effects = ("current", "tail_flexibility")
+    now = Explanation(effects, fit_of(effects, 0.0))
+    assert exchanged(now, signals("servo_lag"), lambda step: None) is now

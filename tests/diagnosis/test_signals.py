@@ -79,7 +79,7 @@ def test_the_expected_signal_is_there(still, swum, name):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("hidden", "modelled"), [("servo_lag", "tail_gain"), ("sensor_delay", "servo_delay")]
+    ("hidden", "modelled"), [("servo_lag", "tail_gain"), ("current", "tether")]
 )
 def test_the_signal_of_another_effect_is_not(still, swum, hidden, modelled):
     there, expected = signals(still, swum, hidden, modelled)

@@ -28,6 +28,8 @@ from fish_env.identification.problem import Problem
 FloatArray = npt.NDArray[np.float64]
 MOST_CAUSES = 3
 MOST_LOOSE = 4
+WORTH_A_SKETCH = 20.0
+"""Statistic above which an effect is tried; nothing is believed for it."""
 DOUBT = 6.0
 """Difference of scores (-2 log likelihood, penalised) that decides nothing."""
 
@@ -201,8 +203,8 @@ def _with_wandering_phase(
         return None
     loose = loosened(current)
     shown = screen(loose, causes, rng)
-    leading = [s for s in shown.best() if s.p_value < shown.threshold and s.cause.is_effect]
-    return loose, leading[:MOST_LOOSE]
+    effects = [s for s in shown.best() if s.cause.is_effect and s.unwidened > WORTH_A_SKETCH]
+    return loose, sorted(effects, key=lambda s: -s.unwidened)[:MOST_LOOSE]
 
 
 def _new(after: Screen, chosen: Sequence[Signal]) -> list[Signal]:

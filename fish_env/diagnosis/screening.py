@@ -64,6 +64,11 @@ class Signal:
         return float(self.score @ np.linalg.solve(self.projected, self.score)) / self.inflation
 
     @property
+    def unwidened(self) -> float:
+        """The statistic as if what is left were white: what is out of step all along is not."""
+        return self.statistic * self.inflation
+
+    @property
     def p_value(self) -> float:
         """Of this one test, in logarithm, so that overwhelming evidence still ranks."""
         return float(chi2.logsf(self.statistic, self.freedom))

@@ -13,8 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fish_env.diagnosis.causes import Probe, effect_values, longest_step, slow_enough
-from fish_env.diagnosis.screening import Projector, Screen, Signal, smallest_detectable
+from fish_env.diagnosis.causes import Probe, longest_step, slow_enough
+from fish_env.diagnosis.screening import (
+    Projector,
+    Screen,
+    Signal,
+    residual_changes,
+    smallest_detectable,
+)
 from fish_env.identification.estimator import Fit
 from fish_env.identification.free import Free
 from fish_env.identification.problem import Problem
@@ -179,26 +185,16 @@ def changes(fit: Fit, jobs: Jobs) -> FloatArray:
     """
     projector, own = Projector(fit), Free(fit.problem, (), fit.released)
     start = np.repeat(fit.point.z[:, None], len(jobs), axis=1)
-    seen = _simulated(fit, jobs, start)
+    seen = residual_changes(fit, jobs, start).T
     followed = projector.coefficients(seen.T)[: len(start)]
     far = np.flatnonzero(np.abs(followed).max(axis=0) > NEAR).tolist()
     for _ in range(REFITS if far else 0):
         there = np.array([own.clip(z) for z in (start[:, far] - followed[:, far]).T]).T
-        moved = _simulated(fit, [jobs[i] for i in far], there)
+        moved = residual_changes(fit, [jobs[i] for i in far], there).T
         moved -= (projector.lin.slopes[:, : len(start)] @ (there - start[:, far])).T
         seen[far] = np.where(np.isfinite(moved), moved, seen[far])
         followed[:, far] = projector.coefficients(seen[far].T)[: len(start)]
     return seen
-
-
-def _simulated(fit: Fit, jobs: Jobs, z: FloatArray) -> FloatArray:
-    """Change of the residuals (n, D) with each setting, at coefficients (coefficients, n)."""
-    problem = fit.problem
-    base = {**problem.neutral({name for name, _ in jobs}), **fit.point.effects}
-    values = [effect_values(problem, name, probe) for name, probe in jobs]
-    lanes = {path: np.array([own.get(path, base[path]) for own in values]) for path in base}
-    out = problem.innovations(z, lanes, fit.noise, fit.filtered)
-    return np.asarray(out - fit.linearised.residuals)
 
 
 def noncentrality(screen: Screen, effect: str, change: FloatArray) -> float:

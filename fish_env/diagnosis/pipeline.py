@@ -178,7 +178,7 @@ def _diagnose_runs(
     progress("comparing the channels with each other")
     floors = noise_floors(dataset)
     agreed = check_consistency(dataset, np.random.default_rng([seed, 2]), floors)
-    fitted, final = _split(dataset, seed)
+    fitted, final = fitted_and_final(dataset, seed)
     progress("refitting the baseline")
     problem = Problem(dataset, fish, fitted).subset(effort.runs)
     baseline = _refitted(problem)
@@ -232,7 +232,7 @@ def _refitted(problem: Problem) -> Fit:
         raise divergence(problem) from None
 
 
-def _split(dataset: Dataset, seed: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def fitted_and_final(dataset: Dataset, seed: int) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Runs to fit, and a quarter kept for judging where there are at least four.
 
     Repeats of a condition stay together: a run whose twin was fitted judges nothing.

@@ -16,19 +16,21 @@ from scipy.optimize import brentq
 from scipy.special import chdtrc
 from scipy.stats import chi2, ncx2
 
-from fish_env.diagnosis.causes import Cause, best_of_each, effect_values, finer
+from fish_env.diagnosis.causes import Cause, Probe, best_of_each, effect_values, finer
 from fish_env.identification.estimator import Fit
 from fish_env.identification.information import (
     BLOCK_S,
     LONG_BLOCK_S,
-    block_sums,
+    block_index,
     information,
     prior_precision,
+    sums_over,
 )
 from fish_env.identification.products import inner
 
 FloatArray = npt.NDArray[np.float64]
 DRAWS = 4000
+LANES_AT_ONCE = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,6 +112,9 @@ class Projector:
         self.vector = np.concatenate([fit.point.z, np.zeros(slopes.shape[1] - len(baseline))])
         self.hessian = information(slopes, self.prior)
         self.factor = np.linalg.cholesky(self.hessian)
+        self.blocks = [
+            block_index(self.lin.run_of, self.lin.time_of, s) for s in (BLOCK_S, LONG_BLOCK_S)
+        ]
 
     def coefficients(self, columns: FloatArray) -> FloatArray:
         """How a refit follows the columns: (n, m)."""
@@ -153,8 +158,8 @@ class Projector:
         scores = left * residuals[:, None]
         white = np.maximum(np.einsum("ij,ij->j", left, left), 1e-12)
         largest = 1.0
-        for length in (BLOCK_S, LONG_BLOCK_S):
-            sums = block_sums(scores, self.lin.run_of, self.lin.time_of, length)
+        for index in self.blocks:
+            sums = sums_over(index, scores)
             largest = max(largest, float((np.einsum("ij,ij->j", sums, sums) / white).max()))
         return largest
 
@@ -192,7 +197,6 @@ def zoomed(fit: Fit, signal: Signal) -> Signal:
 
 
 def _effect_signals(fit: Fit, projector: Projector, causes: Sequence[Cause]) -> list[Signal]:
-    problem = fit.problem
     jobs = [
         (cause, index, probe)
         for cause in causes
@@ -200,19 +204,8 @@ def _effect_signals(fit: Fit, projector: Projector, causes: Sequence[Cause]) -> 
         for index, alternative in enumerate(cause.probes)
         for probe in alternative
     ]
-    values = [effect_values(problem, cause.name, probe) for cause, _, probe in jobs]
-    base = dict(fit.point.effects)
-    for cause in causes:
-        if cause.is_effect:
-            base |= problem.neutral([cause.name])
-    columns = np.empty((len(fit.linearised.residuals), len(jobs)))
-    chunk = 64
-    for first in range(0, len(jobs), chunk):
-        part = values[first : first + chunk]
-        lanes = {path: np.array([own.get(path, base[path]) for own in part]) for path in base}
-        z = np.repeat(fit.point.z[:, None], len(part), axis=1)
-        out = problem.innovations(z, lanes, fit.noise, fit.filtered)
-        columns[:, first : first + len(part)] = (out - fit.linearised.residuals).T
+    start = np.repeat(fit.point.z[:, None], len(jobs), axis=1)
+    columns = residual_changes(fit, [(cause.name, probe) for cause, _, probe in jobs], start)
     signals = []
     names = [(cause.name, index) for cause, index, _ in jobs]
     for key in dict.fromkeys(names):
@@ -221,6 +214,28 @@ def _effect_signals(fit: Fit, projector: Projector, causes: Sequence[Cause]) -> 
         if signal is not None:
             signals.append(signal)
     return signals
+
+
+def residual_changes(fit: Fit, jobs: Sequence[tuple[str, Probe]], z: FloatArray) -> FloatArray:
+    """Change of the residuals (D, n) with each setting of an effect.
+
+    Args:
+        fit: what the change is from.
+        jobs: effect and setting, n of them.
+        z: (coefficients, n) where to simulate each.
+    """
+    problem = fit.problem
+    base = {**problem.neutral(dict.fromkeys(name for name, _ in jobs)), **fit.point.effects}
+    values = [effect_values(problem, name, probe) for name, probe in jobs]
+    columns = np.empty((len(fit.linearised.residuals), len(jobs)))
+    for first in range(0, len(jobs), LANES_AT_ONCE):
+        part = slice(first, first + LANES_AT_ONCE)
+        lanes = {
+            path: np.array([own.get(path, base[path]) for own in values[part]]) for path in base
+        }
+        out = problem.innovations(z[:, part], lanes, fit.noise, fit.filtered)
+        columns[:, part] = (out - fit.linearised.residuals).T
+    return columns
 
 
 def _coefficient_signals(projector: Projector, causes: Sequence[Cause], fit: Fit) -> list[Signal]:

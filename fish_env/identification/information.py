@@ -51,8 +51,19 @@ def block_sums(
     length_s: float = BLOCK_S,
 ) -> FloatArray:
     """Scores (D, m) summed over blocks of time of each run, shape (blocks, m)."""
+    return sums_over(block_index(run_of, time_of, length_s), scores)
+
+
+def block_index(
+    run_of: npt.NDArray[np.int64], time_of: FloatArray, length_s: float
+) -> npt.NDArray[np.int64]:
+    """(D,) number of the block of time that each residual lies in, counted over all runs."""
     block = run_of * 10_000 + np.floor(time_of / length_s).astype(np.int64)
-    _, index = np.unique(block, return_inverse=True)
+    return np.unique(block, return_inverse=True)[1]
+
+
+def sums_over(index: npt.NDArray[np.int64], scores: FloatArray) -> FloatArray:
+    """Scores (D, m) summed over the blocks of an index (D,), shape (blocks, m)."""
     sums = np.zeros((index.max() + 1, scores.shape[1]))
     np.add.at(sums, index, scores)
     return sums

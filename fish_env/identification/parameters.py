@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -16,6 +16,11 @@ from fish_env.params.packing import PATHS
 from fish_env.params.schema import FishParams
 
 FloatArray = npt.NDArray[np.float64]
+
+
+def effects_of(paths: Iterable[str]) -> set[str]:
+    """Names of the effects that some effect parameters belong to."""
+    return {path.removeprefix(PREFIX).split(".")[0] for path in paths}
 
 
 @dataclass(frozen=True)

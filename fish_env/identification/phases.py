@@ -12,11 +12,11 @@ import numpy as np
 
 from fish_env.identification.filtering import NoiseModel, RunFilter
 from fish_env.identification.problem import Point, Problem
-from fish_env.identification.runs import RunData
+from fish_env.identification.runs import FREQUENCY, RunData
 
 PHASES = 12
 WINDOW_S = 3.0
-FREQUENCY, AMPLITUDE, PHASE = 2, 1, 13
+AMPLITUDE, PHASE = 1, 13
 
 
 def settle_phases(problem: Problem, point: Point, noise: NoiseModel) -> Problem:

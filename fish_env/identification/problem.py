@@ -23,7 +23,13 @@ from fish_env.identification.filtering import (
     RunFilter,
 )
 from fish_env.identification.noise import white_noise_sd
-from fish_env.identification.parameters import Baseline, EffectFreedom, freedoms, measurement_of
+from fish_env.identification.parameters import (
+    Baseline,
+    EffectFreedom,
+    effects_of,
+    freedoms,
+    measurement_of,
+)
 from fish_env.identification.runs import RunData, prepare_run, usable_channels
 from fish_env.model.effect import Effect
 from fish_env.params.io import load_fish
@@ -115,7 +121,7 @@ class Problem:
 
     def filter_for(self, effects: Iterable[str]) -> RunFilter:
         """The quickest filter that computes with these effect parameters."""
-        names = {path.removeprefix(PREFIX).split(".")[0] for path in effects}
+        names = effects_of(effects)
         moving = {n for n in (*names, *self.model.effects) if self.known[n].acts_on_motion}
         return self.filter if moving else self.lean_filter
 
@@ -196,7 +202,7 @@ class Problem:
         """Whether one of these effect parameters asks for fine steps at any time."""
         if self.plain_steps:
             return False
-        names = {path.removeprefix(PREFIX).split(".")[0] for path in effects}
+        names = effects_of(effects)
         return any(self.known[n].step_error > 0.0 for n in (*names, *self.model.effects))
 
     def lane(self, point: Point) -> tuple[FloatArray, Measurement]:
@@ -211,12 +217,10 @@ class Problem:
         changes: dict[str, FloatArray] = dict(
             zip(self.baseline.paths, self.baseline.values(z), strict=True)
         )
-        names = {path.removeprefix(PREFIX).split(".")[0] for path in effects}
+        names = effects_of(effects)
         moving = {n for n in names if self.known[n].acts_on_motion}
         changes |= {
-            path: values
-            for path, values in effects.items()
-            if path.removeprefix(PREFIX).split(".")[0] in moving
+            path: values for path, values in effects.items() if effects_of([path]) <= moving
         }
         sensing = [self.known[n] for n in sorted(names - moving)]
         own = [e for e in self.model.measurement if e.name not in names]

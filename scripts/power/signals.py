@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from fish_env.data import Dataset, split_runs
+from fish_env.data import Dataset
 from fish_env.diagnosis.causes import Cause, effect_values
+from fish_env.diagnosis.pipeline import fitted_and_final
 from fish_env.diagnosis.screening import Projector
 from fish_env.identification.estimator import Fit, fit
 from fish_env.identification.problem import Problem
@@ -46,8 +47,7 @@ def agreement(design: int, published: Mapping[str, float]) -> dict[str, dict[str
 def problem_of(design: int, effects: Values) -> Problem:
     """The runs of a design that a diagnosis would fit, with some effects."""
     dataset: Dataset = measured(design, NOISE_NUMBER, "nominal", effects)[0]
-    split = split_runs(dataset, design, (0.75, 0.0, 0.25), by="condition")
-    return Problem(dataset, None, (*split.fit, *split.select))
+    return Problem(dataset, None, fitted_and_final(dataset, design)[0])
 
 
 def compared(base: Fit, design: int, target: Target, size: float) -> dict[str, float] | None:

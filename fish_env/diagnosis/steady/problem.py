@@ -15,7 +15,7 @@ from fish_env.effects.extended import PREFIX, build_model
 from fish_env.effects.registry import catalogue
 from fish_env.identification.applied_wrench import EFFECT as APPLIED_WRENCH
 from fish_env.identification.filtering import Measurement
-from fish_env.identification.parameters import Baseline, measurement_of
+from fish_env.identification.parameters import Baseline, effects_of, measurement_of
 from fish_env.identification.problem import Point, neutral_values
 from fish_env.params.schema import FishParams
 
@@ -115,7 +115,7 @@ class SteadyProblem:
         changes: dict[str, FloatArray] = dict(
             zip(self.baseline.paths, self.baseline.values(z), strict=True)
         )
-        names = {path.removeprefix(PREFIX).split(".")[0] for path in effects}
+        names = effects_of(effects)
         known = {**self.known, APPLIED_WRENCH.name: APPLIED_WRENCH}
         moving = {n for n in names if known[n].acts_on_motion}
         changes |= {p: v for p, v in effects.items() if p.split(".")[1] in moving}

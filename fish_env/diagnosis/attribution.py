@@ -12,7 +12,7 @@ from scipy.stats import t as student
 from fish_env.diagnosis.adequacy import implausible, strains
 from fish_env.diagnosis.causes import Cause, same
 from fish_env.diagnosis.effort import FULL, Effort
-from fish_env.diagnosis.screening import Screen, Signal, screen
+from fish_env.diagnosis.screening import Projector, Screen, Signal, screen
 from fish_env.diagnosis.search import (
     Explanation,
     exchanged,
@@ -31,7 +31,7 @@ MOST_LOOSE = 4
 WORTH_A_SKETCH = 20.0
 """Statistic above which an effect is tried; nothing is believed for it."""
 DOUBT = 6.0
-"""Difference of scores (-2 log likelihood, penalised) that decides nothing."""
+"""Difference of scores (-2 log evidence) that decides nothing."""
 
 
 @dataclass(frozen=True)
@@ -289,12 +289,11 @@ def explained_away(cause: str, before: Screen, after: Screen) -> bool:
 def alike(problem: Problem, best: Explanation, other: Explanation) -> bool:
     """Whether two explanations cannot be told apart on these runs.
 
-    They are alike when the penalised likelihoods differ by less than 6, or when the difference,
-    run by run, is within one standard error of zero.
+    They are alike when the evidence differs by less than :data:`DOUBT`, counted as the screen
+    counts it: where what is left is coloured, as much less as the colour widens the difference.
     """
     gap = score(problem, other) - score(problem, best)
-    if gap < DOUBT:
-        return True
-    by_run = _by_run(best.fit, other.fit)
-    error = by_run.std(ddof=1) / np.sqrt(len(by_run)) if len(by_run) > 1 else np.inf
-    return bool(by_run.mean() < error and gap < 40.0)
+    left, there = best.fit.linearised.residuals, other.fit.linearised.residuals
+    apart = (there - left)[:, None]
+    noise = left - apart[:, 0] * (apart[:, 0] @ left) / max(float(apart[:, 0] @ apart[:, 0]), 1e-12)
+    return bool(gap < DOUBT * Projector(best.fit).inflation(apart, noise))

@@ -147,13 +147,17 @@ class Projector:
             score += followed.T @ (self.prior * self.vector)
         step = np.linalg.solve(projected, score)
         remaining = self.lin.residuals + left @ step
-        inflation = self._inflation(left, remaining)
+        inflation = self.inflation(left, remaining)
         return Signal(cause, probe, left, float(energy.sum()), projected, score, inflation)
 
-    def _inflation(self, left: FloatArray, residuals: FloatArray) -> float:
+    def inflation(self, left: FloatArray, residuals: FloatArray) -> float:
         """Spread of block sums of the score against what white residuals would give.
 
         The larger of two spreads, over blocks long enough for most disturbances and for slow ones.
+
+        Args:
+            left: (D, m) change of the residuals.
+            residuals: (D,) without what changes along those directions would take from them.
         """
         scores = left * residuals[:, None]
         white = np.maximum(np.einsum("ij,ij->j", left, left), 1e-12)

@@ -14,6 +14,7 @@ from fish_env.diagnosis.screening import Signal, zoomed
 from fish_env.identification.estimator import Fit, fit
 from fish_env.identification.filtering import NoiseModel
 from fish_env.identification.free import REACH
+from fish_env.identification.information import information, prior_precision
 from fish_env.identification.problem import Point, Problem
 from fish_env.identification.sketch import Sketch, Sketcher
 
@@ -43,15 +44,27 @@ class Explanation:
 
 
 def score(problem: Problem, explanation: Explanation) -> float:
-    """-2 log likelihood and prior, with a penalty for what the causes added.
+    """-2 log evidence (Laplace's approximation), but for a constant of the problem.
 
-    Schwarz' for a parameter of an effect. A coefficient had a prior before, which it leaves for one
-    that is :data:`REACH` times as wide: that costs twice the logarithm of the widths' ratio.
+    The misfit and the prior at the best fit, and what it costs that the data narrowed each
+    parameter so far from what was known: an effect may be anywhere in its plausible range, a
+    coefficient whose prior is lifted within :data:`REACH` deviations. Source: Kass and Raftery
+    (1995), "Bayes factors", JASA 90, eq. 3; differences of 6 they call strong.
     """
     own = explanation.fit
-    added = len(own.names) - len(problem.baseline)
-    lifted = 2.0 * len(own.released) * float(np.log(REACH))
-    return own.objective + added * float(np.log(problem.samples)) + lifted
+    slopes = own.linearised.slopes
+    known = prior_precision(problem.baseline, slopes.shape[1] - len(problem.baseline), ())
+    lifted = [problem.baseline.paths.index(path) for path in own.released]
+    known[lifted] = REACH**-2
+    known[len(problem.baseline) :] = _precision_of_plausible(problem, own.effects)
+    narrowed = np.linalg.slogdet(information(slopes, known))[1] - np.log(known).sum()
+    return float(own.objective + known[lifted] @ own.point.z[lifted] ** 2 + narrowed)
+
+
+def _precision_of_plausible(problem: Problem, effects: Sequence[str]) -> FloatArray:
+    """Precision of each parameter of the effects, if any plausible value is as likely."""
+    ranges = [p.plausible for name in effects for p in problem.known[name].parameters]
+    return 12.0 / np.array([high - low for low, high in ranges]) ** 2
 
 
 def loosened(current: Explanation) -> Fit:

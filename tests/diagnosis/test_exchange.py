@@ -18,7 +18,8 @@ def fit_of(effects, objective):
     values = {f"effects.{e}.{n}": v for e in effects for n, v in KNOWN[e].neutral.items()}
     return SimpleNamespace(
         problem=problem, effects=effects, released=(), objective=objective, noise=None,
-        names=tuple(values), point=SimpleNamespace(z=np.zeros(1), effects=values),
+        names=tuple(values), point=SimpleNamespace(z=np.zeros(0), effects=values),
+        linearised=SimpleNamespace(slopes=np.eye(50, len(values))),
     )  # fmt: skip
 
 

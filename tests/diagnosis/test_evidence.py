@@ -1,0 +1,117 @@
+"""The evidence for an explanation, where it can be computed without approximation."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from fish_env.diagnosis.attribution import alike
+from fish_env.diagnosis.search import REACH, Explanation, score
+from fish_env.identification.free import Linearised
+from tests.diagnosis.linear import COEFFICIENTS, LinearProblem, Sized
+
+LINEAR = LinearProblem(signals=2)
+RANGE = 40.0
+"""Of the effect's plausible values: its prior spread is that over the square root of twelve."""
+PATHS = tuple(f"c{i}" for i in range(COEFFICIENTS))
+
+
+def effect(name):
+    return SimpleNamespace(parameters=[SimpleNamespace(plausible=(-0.5 * RANGE, 0.5 * RANGE))])
+
+
+KNOWN = {name: effect(name) for name in ("first", "second")}
+COLUMNS = dict(zip(KNOWN, LINEAR.columns, strict=True))
+PROBLEM = SimpleNamespace(baseline=Sized(PATHS), known=KNOWN)
+
+
+def explanation(data, effects=(), released=()):
+    """The best fit of coefficients under their priors and of effects without any."""
+    slopes = np.hstack([LINEAR.slopes, *(COLUMNS[name] for name in effects)])
+    prior = np.array([0.0 if path in released else 1.0 for path in PATHS] + [0.0] * len(effects))
+    best = -np.linalg.solve(slopes.T @ slopes + np.diag(prior), slopes.T @ data)
+    residuals = data + slopes @ best
+    times = np.repeat(3.0 * np.arange(60) + 1.0, 20)
+    fit = SimpleNamespace(
+        effects=effects,
+        released=released,
+        objective=residuals @ residuals + prior @ best**2,
+        point=SimpleNamespace(z=best[:COEFFICIENTS]),
+        linearised=Linearised(residuals, slopes, np.zeros(len(data), np.int64), times),
+        problem=PROBLEM,
+    )
+    return Explanation((*effects, *released), fit)
+
+
+def exact(data, effects=(), released=()):
+    """-2 log of the density of the data, everything unknown integrated out."""
+    widths = np.array([REACH if path in released else 1.0 for path in PATHS])
+    parts = [LINEAR.slopes * widths]
+    parts += [COLUMNS[name] * RANGE / np.sqrt(12.0) for name in effects]
+    factor = np.hstack(parts)
+    spread = np.eye(len(data)) + factor @ factor.T
+    return data @ np.linalg.solve(spread, data) + np.linalg.slogdet(spread)[1]
+
+
+def data(seed=0, strength=0.0, memory=0.0):
+    rng = np.random.default_rng(seed)
+    noise = rng.standard_normal(LINEAR.size)
+    for i in range(1, LINEAR.size) if memory else ():
+        noise[i] = memory * noise[i - 1] + np.sqrt(1 - memory**2) * noise[i]
+    return noise - LINEAR.slopes @ rng.standard_normal(COEFFICIENTS) - strength * COLUMNS["first"][
+        :, 0
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("effects", "released"), [(("first",), ()), (("first", "second"), ()), ((), ("c1",))]
+)
+def test_differences_of_scores_are_those_of_the_exact_evidence(effects, released):
+    y = data(strength=1.5)
+    found = score(PROBLEM, explanation(y, effects, released)) - score(PROBLEM, explanation(y))
+    expected = exact(y, effects, released) - exact(y)
+    assert found == pytest.approx(expected, abs=0.3)
+    naked = explanation(y, effects, released).fit.objective - explanation(y).fit.objective
+    assert naked < expected - 2.0  # what a fit without a price would claim
+
+
+def test_an_effect_that_is_not_there_costs_more_than_it_gains():
+    gains = []
+    for seed in range(200):
+        y = data(seed)
+        gains.append(score(PROBLEM, explanation(y)) - score(PROBLEM, explanation(y, ("first",))))
+    assert np.mean(np.array(gains) > 0.0) < 0.05
+    assert np.mean(gains) < -2.0
+
+
+def pair(y):
+    best, other = explanation(y, ("first",)), explanation(y, ("second",))
+    return best, other, score(PROBLEM, other) - score(PROBLEM, best)
+
+
+def test_explanations_are_alike_unless_the_evidence_tells_them_apart():
+    best, other, gap = pair(data(strength=0.5))
+    assert gap < 6.0
+    assert alike(PROBLEM, best, other)
+    best, other, gap = pair(data(strength=6.0))
+    assert gap > 30.0
+    assert not alike(PROBLEM, best, other)
+
+
+def test_coloured_residuals_tell_less():
+    """What tells two explanations apart in slow signals counts for less in slow noise."""
+    slow = {name: np.sin(np.arange(LINEAR.size) / turn)[:, None]
+            for name, turn in (("first", 160.0), ("second", 170.0))}  # fmt: skip
+    white, coloured = [], []
+    before = dict(COLUMNS)
+    COLUMNS.update(slow)
+    try:
+        for seed in range(60):
+            for memory, found in ((0.0, white), (0.95, coloured)):
+                best, other, gap = pair(data(seed, 1.5, memory))
+                if 6.0 < gap < 40.0:
+                    found.append(alike(PROBLEM, best, other))
+    finally:
+        COLUMNS.update(before)
+    assert np.mean(white) < 0.3
+    assert np.mean(coloured) > 0.6

@@ -64,8 +64,7 @@ def as_dict(diagnosis: Diagnosis) -> Plain:
 
 
 def _rank(ranked: Ranked) -> Plain:
-    entry: Plain = {"name": ranked.name, "score": ranked.score}
-    return entry | ({"ci95": list(ranked.interval)} if ranked.interval else {})
+    return {"name": ranked.name, "score": ranked.score, "ci95": list(ranked.interval)}
 
 
 def _noise(fit: Fit) -> Plain:

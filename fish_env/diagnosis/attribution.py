@@ -12,6 +12,7 @@ from scipy.stats import t as student
 from fish_env.diagnosis.adequacy import implausible, strains
 from fish_env.diagnosis.causes import Cause, same
 from fish_env.diagnosis.effort import FULL, Effort
+from fish_env.diagnosis.left_out import left_out_scores
 from fish_env.diagnosis.screening import Projector, Screen, Signal, screen
 from fish_env.diagnosis.search import (
     Explanation,
@@ -36,18 +37,18 @@ DOUBT = 6.0
 
 @dataclass(frozen=True)
 class Ranked:
-    """How much one cause explains.
+    """How much better one cause foretells runs than the baseline does.
 
     Attributes:
         name: the cause.
-        score: -2 log likelihood + prior, against that of the baseline under the same noise; less is
-            better.
-        interval: 95 % interval of the score over runs like these; None for a single run.
+        score: log score of all runs, each left out in turn, above that of the baseline under the
+            same noise.
+        interval: 95 % interval of the score over runs like these.
     """
 
     name: str
     score: float
-    interval: tuple[float, float] | None
+    interval: tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +131,7 @@ def extended(
         if base is None:
             break
         if not ranking:
-            ranking = tuple(ranked(e, base) for e in tried)
+            ranking = ranking_of(tried, base)
         gain = score(problem, base) - score(problem, tried[0])
         if gain < max(DOUBT, rough * total):
             break
@@ -163,21 +164,25 @@ def extended(
     return Attribution(begun.baseline, tuple(screens), current, rivals, ranking, total)
 
 
-def ranked(explanation: Explanation, base: Explanation) -> Ranked:
-    """The last cause of an explanation against the explanation without it."""
-    score_ = explanation.fit.objective - base.fit.objective
-    by_run = _by_run(base.fit, explanation.fit)
-    count = len(by_run)
-    if count < 2:
-        return Ranked(explanation.causes[-1], score_, None)
-    half = float(student.ppf(0.975, count - 1) * by_run.std(ddof=1) * np.sqrt(count))
-    return Ranked(explanation.causes[-1], score_, (score_ - half, score_ + half))
+def ranking_of(tried: Sequence[Explanation], base: Explanation) -> tuple[Ranked, ...]:
+    """Explanations by how well they foretell runs left out, the best first.
+
+    Args:
+        tried: explanations with one cause more than ``base``.
+        base: what they are judged against; a single run can be left out of nothing.
+    """
+    if len(base.fit.filtered) < 2:
+        return ()
+    before = left_out_scores(base)
+    found = [_ranked(e.causes[-1], left_out_scores(e) - before) for e in tried]
+    return tuple(sorted(found, key=lambda r: -r.score))
 
 
-def _by_run(fit: Fit, other: Fit) -> FloatArray:
-    """(runs,) how much -2 log likelihood the other fit has more."""
-    pairs = zip(fit.filtered, other.filtered, strict=True)
-    return np.array([2.0 * (a.log_likelihood - b.log_likelihood) for a, b in pairs])
+def _ranked(name: str, gains: FloatArray) -> Ranked:
+    """A cause by what it gains in each run (runs,)."""
+    count, total = len(gains), float(gains.sum())
+    half = float(student.ppf(0.975, count - 1) * gains.std(ddof=1) * np.sqrt(count))
+    return Ranked(name, total, (total - half, total + half))
 
 
 def roughness(explanation: Explanation) -> float:

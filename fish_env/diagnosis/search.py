@@ -51,20 +51,25 @@ def score(problem: Problem, explanation: Explanation) -> float:
     coefficient whose prior is lifted within :data:`REACH` deviations. Source: Kass and Raftery
     (1995), "Bayes factors", JASA 90, eq. 3; differences of 6 they call strong.
     """
-    own = explanation.fit
-    slopes = own.linearised.slopes
-    known = prior_precision(problem.baseline, slopes.shape[1] - len(problem.baseline), ())
+    own, known = explanation.fit, known_before(explanation)
     lifted = [problem.baseline.paths.index(path) for path in own.released]
-    known[lifted] = REACH**-2
-    known[len(problem.baseline) :] = _precision_of_plausible(problem, own.effects)
-    narrowed = np.linalg.slogdet(information(slopes, known))[1] - np.log(known).sum()
+    narrowed = np.linalg.slogdet(information(own.linearised.slopes, known))[1] - np.log(known).sum()
     return float(own.objective + known[lifted] @ own.point.z[lifted] ** 2 + narrowed)
 
 
-def _precision_of_plausible(problem: Problem, effects: Sequence[str]) -> FloatArray:
-    """Precision of each parameter of the effects, if any plausible value is as likely."""
-    ranges = [p.plausible for name in effects for p in problem.known[name].parameters]
-    return 12.0 / np.array([high - low for low, high in ranges]) ** 2
+def known_before(explanation: Explanation) -> FloatArray:
+    """Precision of what was known of each free parameter before the data (n,).
+
+    Any plausible value of an effect's parameter is as likely; a coefficient whose prior is lifted
+    may lie :data:`REACH` times as far from its nominal value as one whose prior is not.
+    """
+    own = explanation.fit
+    problem = own.problem
+    ranges = [p.plausible for name in own.effects for p in problem.known[name].parameters]
+    known = prior_precision(problem.baseline, len(ranges), ())
+    known[[problem.baseline.paths.index(path) for path in own.released]] = REACH**-2
+    known[len(problem.baseline) :] = [12.0 / (high - low) ** 2 for low, high in ranges]
+    return known
 
 
 def loosened(current: Explanation) -> Fit:

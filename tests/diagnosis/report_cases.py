@@ -61,8 +61,8 @@ def answer(verdict: str = "cause", **changes: Any) -> dict[str, Any]:
              "most_confusable": None, "excited": False},
         ],
         "ranking": [
-            {"name": "servo_lag", "score": -900.0, "ci95": [-1000.0, -800.0]},
-            {"name": "wake_memory", "score": -500.0},
+            {"name": "servo_lag", "score": 450.0, "ci95": [400.0, 500.0]},
+            {"name": "wake_memory", "score": 250.0},
         ],
         "unexplained": [
             {"depends_on": "depth", "direction": "surge", "rms": 0.01, "log_p": -30.0}

@@ -2,9 +2,7 @@
 
 from types import SimpleNamespace
 
-import pytest
-
-from fish_env.diagnosis.attribution import explained_away, ranked, shortlisted
+from fish_env.diagnosis.attribution import explained_away, shortlisted
 from fish_env.effects import catalogue
 
 
@@ -23,23 +21,6 @@ def test_a_rival_loses_its_evidence_to_the_accepted_cause():
 
 def test_a_cause_with_nothing_left_is_explained_away():
     assert explained_away("wave", screen_of(wave=50.0), screen_of())
-
-
-def explanation(objective, by_run):
-    filtered = [SimpleNamespace(log_likelihood=value) for value in by_run]
-    return SimpleNamespace(fit=SimpleNamespace(objective=objective, filtered=filtered))
-
-
-def test_a_gain_has_an_interval_over_runs():
-    base, better = explanation(0.0, [0.0, 0.0, 0.0]), explanation(-60.0, [8.0, 10.0, 12.0])
-    better.causes = ("current",)
-    found = ranked(better, base)
-    half = 4.303 * 4.0 * 3**0.5  # Student's quantile, spread of -2 log likelihoods, three runs
-    assert (found.name, found.score) == ("current", -60.0)
-    assert found.interval == pytest.approx((-60.0 - half, -60.0 + half), rel=1e-3)
-    base, better = explanation(0.0, [0.0]), explanation(-60.0, [30.0])
-    better.causes = ("current",)
-    assert ranked(better, base).interval is None
 
 
 def test_coefficients_after_the_first_are_judged_among_themselves():

@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fish_env.diagnosis.attribution import alike
+from fish_env.diagnosis.attribution import alike, ranking_of
+from fish_env.diagnosis.left_out import left_out_scores
 from fish_env.diagnosis.search import REACH, Explanation, score
 from fish_env.identification.free import Linearised
 from tests.diagnosis.linear import COEFFICIENTS, LinearProblem, Sized
@@ -13,6 +14,8 @@ from tests.diagnosis.linear import COEFFICIENTS, LinearProblem, Sized
 LINEAR = LinearProblem(signals=2)
 RANGE = 40.0
 """Of the effect's plausible values: its prior spread is that over the square root of twelve."""
+RUNS = 6
+RUN_OF = np.repeat(np.arange(RUNS), LINEAR.size // RUNS)
 PATHS = tuple(f"c{i}" for i in range(COEFFICIENTS))
 
 
@@ -37,8 +40,11 @@ def explanation(data, effects=(), released=()):
         released=released,
         objective=residuals @ residuals + prior @ best**2,
         point=SimpleNamespace(z=best[:COEFFICIENTS]),
-        linearised=Linearised(residuals, slopes, np.zeros(len(data), np.int64), times),
+        linearised=Linearised(
+            residuals, slopes, np.repeat(np.arange(RUNS), 20 * 60 // RUNS), times
+        ),
         problem=PROBLEM,
+        filtered=[SimpleNamespace(log_likelihood=-0.5 * r @ r) for r in np.split(residuals, RUNS)],
     )
     return Explanation((*effects, *released), fit)
 
@@ -51,6 +57,20 @@ def exact(data, effects=(), released=()):
     factor = np.hstack(parts)
     spread = np.eye(len(data)) + factor @ factor.T
     return data @ np.linalg.solve(spread, data) + np.linalg.slogdet(spread)[1]
+
+
+def foretold(data, run, effects=()):
+    """Log density of a run given the others, but for a constant: that of all less that of them."""
+    mine = run == RUN_OF
+    parts = [LINEAR.slopes, *(COLUMNS[name] * RANGE / np.sqrt(12.0) for name in effects)]
+    factor = np.hstack(parts)
+
+    def log_density(rows):
+        spread = np.eye(rows.sum()) + factor[rows] @ factor[rows].T
+        squares = data[rows] @ np.linalg.solve(spread, data[rows])
+        return -0.5 * (squares + np.linalg.slogdet(spread)[1])
+
+    return log_density(np.ones_like(mine)) - log_density(~mine)
 
 
 def data(seed=0, strength=0.0, memory=0.0):
@@ -82,6 +102,27 @@ def test_an_effect_that_is_not_there_costs_more_than_it_gains():
         gains.append(score(PROBLEM, explanation(y)) - score(PROBLEM, explanation(y, ("first",))))
     assert np.mean(np.array(gains) > 0.0) < 0.05
     assert np.mean(gains) < -2.0
+
+
+@pytest.mark.parametrize("effects", [(), ("first",)])
+def test_a_run_left_out_is_foretold_as_by_a_refit_to_the_others(effects):
+    y = data(strength=1.5)
+    found = left_out_scores(explanation(y, effects))
+    expected = [foretold(y, run, effects) for run in range(RUNS)]
+    assert found == pytest.approx(expected, abs=0.05)
+    inside = [f.log_likelihood for f in explanation(y, effects).fit.filtered]
+    assert (found < np.array(inside) - 0.1).all()  # a run that was fitted looks better than it is
+
+
+def test_the_ranking_is_by_runs_left_out_with_intervals_over_them():
+    y = data(strength=1.5)
+    causes = ("second", "first")
+    first, second = ranking_of([explanation(y, (c,)) for c in causes], explanation(y))
+    assert (first.name, second.name) == ("first", "second")
+    gains = [foretold(y, run, ("first",)) - foretold(y, run) for run in range(RUNS)]
+    half = 2.571 * np.std(gains, ddof=1) * RUNS**0.5  # Student's quantile of six runs
+    assert first.score == pytest.approx(sum(gains), abs=0.2)
+    assert first.interval == pytest.approx((sum(gains) - half, sum(gains) + half), abs=0.5)
 
 
 def pair(y):

@@ -103,6 +103,7 @@ def test_the_answer_about_a_table_is_read_with_its_own_signs_and_units(tmp_path)
     assert "1/m" in page
     assert "-2.5" in page
     assert "log score on conditions left out" in page
+    assert "log score on runs left out" in write_report(answer(), None, tmp_path).read_text()
 
 
 def test_a_quick_answer_draws_fewer_runs(tmp_path):

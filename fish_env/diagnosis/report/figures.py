@@ -32,8 +32,7 @@ LOOKS: dict[str, dict[str, Any]] = {
     "baseline": {"color": BASELINE, "ls": "--"},
     "extended": {"color": EXTENDED},
 }
-LIKELIHOOD_GAIN = "gain in -2 log likelihood over the refitted baseline (larger is better)"
-LEFT_OUT_GAIN = "log score on conditions left out, above the refitted baseline's"
+LEFT_OUT_GAIN = "log score on {} left out, above the refitted baseline's"
 
 
 @contextmanager
@@ -162,20 +161,18 @@ def _draw_map(ax: Axes, found: Localisation, name: str, top: float) -> Any:
 
 
 def draw_ranking(answer: Plain, folder: Path) -> Path:
-    """How much better each cause explains the data than the baseline, with intervals if known."""
+    """How much better each cause foretells what it has not seen, with intervals if known."""
     rows = list(answer["ranking"])[::-1]
     accepted = {cause["name"] for cause in answer["causes"]}
-    steady = answer.get("kind") == "steady"
-    sign, meaning = (1.0, LEFT_OUT_GAIN) if steady else (-1.0, LIKELIHOOD_GAIN)
-    gains = [sign * row["score"] for row in rows]
+    meaning = LEFT_OUT_GAIN.format("conditions" if answer.get("kind") == "steady" else "runs")
+    gains = [row["score"] for row in rows]
     with _page(7.0, 0.9 + 0.32 * len(rows)) as figure:
         ax = figure.subplots()
         for i, (row, gain) in enumerate(zip(rows, gains, strict=True)):
             colour = EXTENDED if row["name"] in accepted else "#8a8a8a"
             ax.barh(i, gain, color=colour, height=0.66)
             if row.get("ci95"):
-                ends = [sign * end for end in row["ci95"]]
-                ax.plot(ends, [i, i], color=MEASURED, lw=1.4, marker="|")
+                ax.plot(row["ci95"], [i, i], color=MEASURED, lw=1.4, marker="|")
         names = [row["name"].removeprefix(PARAMETER) for row in rows]
         ax.set_yticks(range(len(rows)), names)
         ax.set_ylim(-0.7, len(rows) - 0.3)

@@ -263,7 +263,10 @@ def ranking(answer: Answer, series: Series, folder: Path) -> str:
     """The refitted causes by how much each explains."""
     if not answer.get("ranking"):
         return ""
-    caption = "Gain of each refitted cause; blue: accepted; lines: 95 % intervals over runs."
+    caption = (
+        "How much better each refitted cause foretells what was left out of the fit; "
+        "blue: accepted; lines: 95 % intervals over runs."
+    )
     return section("Ranking", figure(draw.draw_ranking(answer, folder), caption), key="ranking")
 
 

@@ -8,8 +8,6 @@ Each finished case is kept, so a stopped run goes on where it was:
 from __future__ import annotations
 
 import argparse
-import datetime
-import json
 import os
 import sys
 from collections.abc import Iterator, Sequence
@@ -25,6 +23,7 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 from rich.progress import track  # noqa: E402
 
+from scripts.results import RESULTS, today, write_dated  # noqa: E402
 from tests.hidden.scoring import Row  # noqa: E402
 from tests.hidden.suite import FULL, PIPELINE, Job, do, jobs  # noqa: E402
 from tests.hidden.summary import markdown, summarise  # noqa: E402
@@ -55,7 +54,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     add("--fresh", action="store_true", help="do finished cases again")
     add("--processes", type=int, default=2)
     add("--work", type=Path, default=ROOT / "out" / "benchmark-diagnosis")
-    add("--out", type=Path, default=ROOT / "results", help="folder of the dated result")
+    add("--out", type=Path, default=RESULTS, help="folder of the dated result")
     add("--diagnose", default=PIPELINE, help="module:function to judge instead")
     return parser.parse_args(arguments)
 
@@ -78,14 +77,10 @@ def run(todo: list[Job], processes: int) -> Iterator[Row]:
 
 
 def write(rows: list[Row], folder: Path, quick: bool) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
     summary = summarise(rows)
-    today = datetime.date.today().isoformat()
-    name = f"diagnosis-{'quick-' if quick else ''}{today}"
-    content = {"date": today, **summary, "rows": [asdict(row) for row in rows]}
-    (folder / f"{name}.json").write_text(json.dumps(content, indent=1), encoding="utf-8")
-    page = f"# Hidden-effect suite, {today}\n\n{len(rows)} cases.\n\n{markdown(summary)}"
-    (folder / f"{name}.md").write_text(page, encoding="utf-8")
+    page = f"# Hidden-effect suite, {today()}\n\n{len(rows)} cases.\n\n{markdown(summary)}"
+    content = {**summary, "rows": [asdict(row) for row in rows]}
+    write_dated(folder, "diagnosis-quick" if quick else "diagnosis", content, page)
     print(page)
 
 

@@ -11,7 +11,6 @@ stopped run goes on where it was.
 from __future__ import annotations
 
 import argparse
-import datetime
 import json
 import os
 import resource
@@ -21,11 +20,15 @@ import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
+
+from scripts.results import RESULTS, kept, today, write_dated  # noqa: E402
+
 ONE_THREAD = dict.fromkeys(
     ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS", "ROBOFISH_THREADS"), "1"
 )
@@ -67,28 +70,19 @@ CASES = {
 
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--out", type=Path, default=ROOT / "results", help="folder of the result")
+    parser.add_argument("--out", type=Path, default=RESULTS, help="folder of the result")
     parser.add_argument("--work", type=Path, default=ROOT / "out" / "benchmark-time")
     parser.add_argument("--one", help=argparse.SUPPRESS)
     options = parser.parse_args(arguments)
     if options.one:
         print(json.dumps(measured(Experiment(**json.loads(options.one)))))
         return
-    options.work.mkdir(parents=True, exist_ok=True)
     rows = []
     for name, case in CASES.items():
-        rows.append({"case": name, **asdict(case), **kept(case, options.work)})
+        file = options.work / f"{'-'.join(str(value) for value in asdict(case).values())}.json"
+        rows.append({"case": name, **asdict(case), **kept(file, partial(alone, case))})
         print(table(rows).splitlines()[-1], flush=True)
     write(rows, options.out)
-
-
-def kept(case: Experiment, work: Path) -> dict[str, Any]:
-    """What was measured of a case; a finished one is read back."""
-    file = work / f"{'-'.join(str(value) for value in asdict(case).values())}.json"
-    if not file.exists():
-        file.write_text(json.dumps(alone(case)), encoding="utf-8")
-    result: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-    return result
 
 
 def alone(case: Experiment) -> dict[str, Any]:
@@ -156,13 +150,8 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
 
 
 def write(rows: list[dict[str, Any]], folder: Path) -> None:
-    today = datetime.date.today().isoformat()
-    folder.mkdir(parents=True, exist_ok=True)
-    name = f"diagnosis-time-{today}"
-    text = json.dumps({"date": today, "cases": rows}, indent=1)
-    (folder / f"{name}.json").write_text(text + "\n", encoding="utf-8")
-    page = f"# Time of a diagnosis, {today}\n\n{table(rows)}\n"
-    (folder / f"{name}.md").write_text(page, encoding="utf-8")
+    page = f"# Time of a diagnosis, {today()}\n\n{table(rows)}\n"
+    write_dated(folder, "diagnosis-time", {"cases": rows}, page)
     print(page)
 
 

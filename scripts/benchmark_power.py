@@ -13,12 +13,11 @@ Each finished data set is kept, so a stopped run goes on where it was:
 from __future__ import annotations
 
 import argparse
-import datetime
 import json
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -39,6 +38,7 @@ from scripts.power.looks import (  # noqa: E402
     without_effect,
 )
 from scripts.power.signals import agreement  # noqa: E402
+from scripts.results import RESULTS, kept  # noqa: E402
 
 SIZES = (0.6, 0.8, 1.0, 1.4)
 FEW = (1.0, 1.4)
@@ -91,9 +91,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     sizes = nothing[0]["published"]
     signals = kept(options.work / "signals.json", lambda: agreement(nothing[0]["design"], sizes))
     print(f"{time.monotonic() - begin:.0f} s")
-    today = datetime.date.today().isoformat()
     summary = report.summarise(rows, nothing, signals)
-    report.write(today, {**summary, "rows": rows, "without_effect": nothing}, options.out)
+    report.write({**summary, "rows": rows, "without_effect": nothing}, options.out)
     report.draw(summary, options.picture)
 
 
@@ -105,7 +104,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     add("--only", help="effects, separated by commas; default: all")
     add("--finished", action="store_true", help="only sum up what is finished so far")
     add("--work", type=Path, default=ROOT / "out" / "benchmark-power")
-    add("--out", type=Path, default=ROOT / "results", help="folder of the dated result")
+    add("--out", type=Path, default=RESULTS, help="folder of the dated result")
     add("--picture", type=Path, default=ROOT / "docs" / "images" / "power.png")
     return parser.parse_args(arguments)
 
@@ -149,16 +148,6 @@ def with_limits(file: Path) -> dict[str, Any]:
     design, noise = nothing["design"], nothing["noise"]
     name = file.with_name(file.name.replace("nothing", "limits"))
     return {**nothing, "limits": kept(name, lambda: allowed(design, noise, nothing))}
-
-
-def kept(file: Path, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-    """A result, made if there is none yet."""
-    if not file.exists():
-        unfinished = file.with_suffix(".part")
-        unfinished.write_text(json.dumps(make(), indent=1), encoding="utf-8")
-        unfinished.replace(file)
-    result: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-    return result
 
 
 if __name__ == "__main__":

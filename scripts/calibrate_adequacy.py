@@ -13,8 +13,6 @@ numbered from 1000 on, so that none of them is one that judges.
 from __future__ import annotations
 
 import argparse
-import datetime
-import json
 import os
 import sys
 import tempfile
@@ -35,6 +33,7 @@ from fish_env.data.schema import Dataset  # noqa: E402
 from fish_env.diagnosis.adequacy import strongest_alarm  # noqa: E402
 from fish_env.identification.estimator import fit  # noqa: E402
 from fish_env.identification.problem import Problem  # noqa: E402
+from scripts.results import RESULTS, write_dated  # noqa: E402
 from tests.hidden.cases import make_case  # noqa: E402
 
 FIRST = 1000
@@ -57,18 +56,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--cases", type=int, default=60)
     parser.add_argument("--processes", type=int, default=2)
-    parser.add_argument("--out", type=Path, default=ROOT / "results")
+    parser.add_argument("--out", type=Path, default=RESULTS)
     options = parser.parse_args(arguments)
     with ProcessPoolExecutor(options.processes) as pool:
         jobs = pool.map(ratio, range(FIRST, FIRST + options.cases))
         rows = list(track(jobs, f"{options.cases} cases", total=options.cases))
     ratios = np.array([row["ratio"] for row in rows], float)
     quantiles = {str(level): float(np.quantile(ratios, level)) for level in LEVELS}
-    today = datetime.date.today().isoformat()
-    content = {"date": today, "quantiles": quantiles, "cases": rows}
-    options.out.mkdir(parents=True, exist_ok=True)
-    file = options.out / f"adequacy-{today}.json"
-    file.write_text(json.dumps(content, indent=1), encoding="utf-8")
+    write_dated(options.out, "adequacy", {"quantiles": quantiles, "cases": rows})
     for level, value in quantiles.items():
         print(f"{level}: {value:.2f}")
 

@@ -13,8 +13,6 @@ Whatever is finished is kept, so a stopped run goes on where it was.
 from __future__ import annotations
 
 import argparse
-import datetime
-import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -25,9 +23,10 @@ from rich.console import Console
 from agents.controllers.pid import PIDController
 from scripts.bench.harness import machine, versions
 from scripts.loop.declaration import DECLARED, Declaration, load_declaration
-from scripts.loop.measuring import PIPELINE, Known, commit, measure_and_diagnose
+from scripts.loop.measuring import PIPELINE, Known, measure_and_diagnose
 from scripts.loop.report import fish_entry, markdown, summarise
 from scripts.loop.training import ARMS, Score, judge, scored
+from scripts.results import today, write_dated
 from scripts.update_readme import updated
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -92,8 +91,6 @@ def record_of(
 ) -> dict[str, Any]:
     """All that the results file holds."""
     return {
-        "date": datetime.date.today().isoformat(),
-        "commit": commit(),
         "machine": machine(),
         "versions": versions(("stable-baselines3", "torch", "gymnasium", "numpy", "numba")),
         "cpu_s": {
@@ -114,12 +111,8 @@ def write(
 ) -> Path:
     """Writes the dated result, as numbers and as a page."""
     record = record_of(declared, known, rows)
-    folder.mkdir(parents=True, exist_ok=True)
-    file = folder / f"{NAME}-{record['date']}.json"
-    file.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
-    text = f"# From measurement to policy, {record['date']}\n\n{markdown(record, declared, rows)}\n"
-    file.with_suffix(".md").write_text(text, encoding="utf-8")
-    return file
+    text = f"# From measurement to policy, {today()}\n\n{markdown(record, declared, rows)}\n"
+    return write_dated(folder, NAME, record, text)
 
 
 def latest(folder: Path = ROOT / "results") -> str:

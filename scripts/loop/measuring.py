@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib
 import json
 import shutil
-import subprocess
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -14,12 +13,12 @@ from typing import Any
 
 from fish_env.params import FishParams, load_fish, save_fish
 from scripts.loop.declaration import Declaration, HiddenFish
+from scripts.results import commit
 from tests.hidden.cases import make_case
 from tests.hidden.truth import Truth
 
 Diagnose = Callable[..., Mapping[str, Any]]
 PIPELINE = "fish_env.diagnosis.pipeline:diagnose"
-ROOT = Path(__file__).resolve().parents[2]
 SHOWN = ("verdict", "causes", "alternatives", "unexplained", "runtime_s")
 """What of a diagnosis goes into the results."""
 
@@ -87,14 +86,3 @@ def find(name: str) -> Diagnose:
     module, function = name.split(":")
     found: Diagnose = getattr(importlib.import_module(module), function)
     return found
-
-
-def commit() -> str:
-    """Commit of the sources, with a plus sign where fish_env differs from it."""
-
-    def git(*words: str) -> str:
-        done = subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True)
-        return done.stdout.strip()
-
-    changed = "+" if git("status", "--porcelain", "fish_env") else ""
-    return (git("rev-parse", "--short", "HEAD") or "unknown") + changed

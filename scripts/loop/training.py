@@ -19,12 +19,12 @@ import numpy as np
 from agents.evaluation.metrics import METRICS
 from agents.evaluation.record import swim_suite
 from agents.policies import PretrainedPolicy
-from agents.policies.files import replace_file
 from agents.registry import Agent
 from agents.training.config import TrainConfig
 from agents.training.run import train
 from scripts.loop.declaration import Declaration
 from scripts.loop.measuring import Known
+from scripts.results import kept
 
 BASELINE, EXTENDED, POSTERIOR, TRUTH = "baseline", "extended", "posterior", "truth"
 ARMS: dict[str, str] = {
@@ -83,18 +83,18 @@ def scored(declared: Declaration, known: Known, arm: str, seed: int, work: Path)
     config = replace(declared.recipe, seed=seed, environment=options)
     policy, mark = work / "policies" / f"{seed}-{_mark(config)}", _judged(declared, known)
     file = work / "scores" / f"{known.name}-{arm}-{policy.name}-{mark}.json"
-    if not file.is_file():
+
+    def row() -> dict[str, Any]:
         begun = time.process_time()
         outcome = train(config, policy, Quiet(), resume=True)
         means = judge(declared, known, PretrainedPolicy.load(outcome.policy))
         trained_on = BASELINE if options == {"fish": declared.printed} else arm
-        row = {
+        return {
             "fish": known.name, "arm": arm, "seed": seed, "trained_on": trained_on,
             "means": means, "cpu_s": round(time.process_time() - begun, 1),
         }  # fmt: skip
-        file.parent.mkdir(parents=True, exist_ok=True)
-        replace_file(file, json.dumps(row, indent=1).encode())
-    return Score(**json.loads(file.read_text(encoding="utf-8")))
+
+    return Score(**kept(file, row))
 
 
 def judge(declared: Declaration, known: Known, agent: Agent) -> dict[str, dict[str, float]]:

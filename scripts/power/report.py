@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -14,19 +13,17 @@ from scipy.stats import chi2
 from fish_env.plotting.style import BLACK, BLUE, DOTS_PER_INCH, VERMILION, drawing
 from scripts.power.curves import Curve, fit_curve, strength
 from scripts.power.limits import noncentrality
+from scripts.results import today, write_dated
 from tests.hidden.sizes import ABSORBED
 from tests.hidden.summary import rate
 
 Rows = Sequence[dict[str, Any]]
 
 
-def write(date: str, summary: dict[str, Any], folder: Path) -> None:
+def write(summary: dict[str, Any], folder: Path) -> None:
     """Writes `power-<date>.json` and `.md`."""
-    folder.mkdir(parents=True, exist_ok=True)
-    text = json.dumps({"date": date, **summary}, indent=1)
-    (folder / f"power-{date}.json").write_text(text + "\n", encoding="utf-8")
-    page = f"# Power of the screen, {date}\n\n{markdown(summary)}"
-    (folder / f"power-{date}.md").write_text(page, encoding="utf-8")
+    page = f"# Power of the screen, {today()}\n\n{markdown(summary)}"
+    write_dated(folder, "power", summary, page)
     print(page)
 
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import importlib
-import json
 import tempfile
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+from scripts.results import kept
 from tests.hidden.cases import make_case
 from tests.hidden.plans import PLANS
 from tests.hidden.scoring import Row, failed, score
@@ -87,8 +88,10 @@ def find(name: str) -> Diagnose:
 
 def do(job: Job) -> Row:
     """Makes, diagnoses and scores one case; a finished one is read back."""
-    if job.file.exists():
-        return read_row(job.file)
+    return row_of(kept(job.file, partial(_done, job)))
+
+
+def _done(job: Job) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place) / "data"
         truth = make_case(job.tier, job.seed, folder)
@@ -97,16 +100,12 @@ def do(job: Job) -> Row:
             row = score(truth, answer)
         except Exception:
             answer, row = {}, failed(truth, traceback.format_exc())
-    content = {"row": asdict(row), "effects": {**truth.effects, **truth.foreign}, "answer": answer}
-    unfinished = job.file.with_suffix(".part")
-    unfinished.write_text(json.dumps(content, indent=1, default=str), encoding="utf-8")
-    unfinished.replace(job.file)
-    return row
+    return {"row": asdict(row), "effects": {**truth.effects, **truth.foreign}, "answer": answer}
 
 
-def read_row(file: Path) -> Row:
-    """A finished row."""
-    content = json.loads(file.read_text(encoding="utf-8"))["row"]
+def row_of(finished: Mapping[str, Any]) -> Row:
+    """The row of a finished case."""
+    content = dict(finished["row"])
     content["named"] = tuple(content["named"])
     content["alternatives"] = tuple(map(tuple, content["alternatives"]))
     return Row(**content)

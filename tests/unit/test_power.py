@@ -12,6 +12,7 @@ from scripts.power.curves import Curve, fit_curve, strength
 from scripts.power.limits import noncentrality
 from scripts.power.looks import NOTHING, Target
 from scripts.power.report import draw, summarise, write
+from scripts.results import today
 from tests.hidden.designs import Noise, swim_design
 from tests.hidden.plans import Plan
 
@@ -135,13 +136,12 @@ def test_a_summary_is_written_with_its_picture(tmp_path):
     assert 0.8 < north["found"]["at"] < 1.2
     assert summary["noises"]["nominal"]["all"]["found"]["looks"] == len(SIZES) + 1
     assert summary["catalogue"]["current.north"]["same"] == pytest.approx(1 / 0.9)
-    write("2026-01-02", summary, tmp_path)
+    write(summary, tmp_path)
     draw(summary, tmp_path / "images" / "power.png")
-    page = (tmp_path / "power-2026-01-02.md").read_text()
+    page = (tmp_path / f"power-{today()}.md").read_text()
     assert "| current.north | 0/1 | 0/1 | 1/1 | 1/1 |" in page
     assert "| gyro_bias.r | - | - | 0/1 | - |" in page
     assert "| sensor_delay.delay | 0.40 | 0.50 |" in page
-    assert (
-        json.loads((tmp_path / "power-2026-01-02.json").read_text())["data_sets"] == len(rows) + 1
-    )
+    written = json.loads((tmp_path / f"power-{today()}.json").read_text())
+    assert written["data_sets"] == len(rows) + 1
     assert (tmp_path / "images" / "power.png").stat().st_size > 10_000

@@ -30,7 +30,7 @@ from fish_env.identification.products import inner
 
 FloatArray = npt.NDArray[np.float64]
 DRAWS = 4000
-LANES_AT_ONCE = 64
+LANES_AT_ONCE = 96
 
 
 @dataclass(frozen=True, eq=False)

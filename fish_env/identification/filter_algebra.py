@@ -39,28 +39,31 @@ def innovation(measured, predicted, turns):
 
 @kernel
 def cholesky_inverse(s, w):
-    """w = inverse of the lower Cholesky factor of s (small, in place); returns log det s."""
+    """w = inverse of the lower Cholesky factor of s (small, in place); returns log det s.
+
+    Only the lower triangle of s is read. Rows innermost, so that the compiler takes them at once.
+    """
     n = s.shape[0]
     log_det = 0.0
-    for i in range(n):
-        for j in range(i + 1):
-            total = s[i, j]
-            for k in range(j):
-                total -= s[i, k] * s[j, k]
-            if i == j:
-                s[i, i] = math.sqrt(max(total, 1e-30))
-                log_det += 2.0 * math.log(s[i, i])
-            else:
-                s[i, j] = total / s[j, j]
+    for j in range(n):
+        s[j, j] = math.sqrt(max(s[j, j], 1e-30))
+        log_det += 2.0 * math.log(s[j, j])
+        for i in range(j + 1, n):
+            s[i, j] = s[i, j] / s[j, j]
+        for i in range(j + 1, n):
+            factor = s[i, j]
+            for k in range(j + 1, i + 1):
+                s[i, k] -= factor * s[k, j]
     for i in range(n):
         for j in range(n):
             w[i, j] = 0.0
-        w[i, i] = 1.0 / s[i, i]
+        for k in range(i):
+            factor = s[i, k]
+            for j in range(k + 1):
+                w[i, j] += factor * w[k, j]
         for j in range(i):
-            total = 0.0
-            for k in range(j, i):
-                total += s[i, k] * w[k, j]
-            w[i, j] = -total / s[i, i]
+            w[i, j] = -w[i, j] / s[i, i]
+        w[i, i] = 1.0 / s[i, i]
     return log_det
 
 
@@ -104,8 +107,10 @@ def predict_covariance(p, f, keep, variance, wander, scratch):
 
 
 @kernel
-def update_covariance(p, rows, measured, noise_variance, s, w, ph, gain):
+def update_covariance(p, rows, measured, noise_variance, s, w, seen, gain):
     """Take a sample into the covariance, in place.
+
+    Channels first, error states last: the innermost loops run over rows of memory.
 
     Args:
         p: (19, 19) covariance.
@@ -114,46 +119,49 @@ def update_covariance(p, rows, measured, noise_variance, s, w, ph, gain):
         noise_variance: (C,).
         s: (C, C) scratch.
         w: (C, C) becomes the inverse Cholesky factor of the innovations' covariance.
-        ph: (19, C) scratch.
-        gain: (19, C) becomes the Kalman gain.
+        seen: (C, 19) scratch: covariance of channels and error states.
+        gain: (C, 19) becomes the Kalman gain, transposed.
 
     Returns:
         Logarithm of the determinant of the innovations' covariance.
     """
     channels = rows.shape[0]
-    for i in range(N_ERROR):
-        for j in range(channels):
-            total = 0.0
-            for m in range(N_MOVING):
-                total += p[i, m] * rows[j, m]
-            ph[i, j] = total
+    for j in range(channels):
+        for i in range(N_ERROR):
+            seen[j, i] = 0.0
+        for m in range(N_MOVING):
+            slope = rows[j, m]
+            if slope != 0.0:  # a channel shows one to three of them
+                for i in range(N_ERROR):
+                    seen[j, i] += slope * p[m, i]
     for i in range(channels):
-        for j in range(channels):
-            total = 0.0
-            for m in range(N_MOVING):
-                total += rows[i, m] * ph[m, j]
-            s[i, j] = total
+        for j in range(i + 1):
+            s[i, j] = 0.0
+        for m in range(N_MOVING):
+            slope = rows[i, m]
+            if slope != 0.0:
+                for j in range(i + 1):
+                    s[i, j] += slope * seen[j, m]
         present = measured[i] == measured[i]
         s[i, i] += noise_variance[i] if present else 1.0
     log_det = cholesky_inverse(s, w)
+    for j in range(channels):  # the gain is w' w seen; at first w seen, which p loses the square of
+        for i in range(N_ERROR):
+            gain[j, i] = 0.0
+        for m in range(j + 1):
+            factor = w[j, m]
+            for i in range(N_ERROR):
+                gain[j, i] += factor * seen[m, i]
     for i in range(N_ERROR):
-        # gain = ph w' w, through the whitened columns ph w' (kept in s's place row by row)
-        for j in range(channels):
-            total = 0.0
-            for m in range(j + 1):
-                total += ph[i, m] * w[j, m]
-            gain[i, j] = total
-    for i in range(N_ERROR):
-        for j in range(i + 1):
-            total = p[i, j]
-            for m in range(channels):
-                total -= gain[i, m] * gain[j, m]
-            p[i, j] = total
-            p[j, i] = total
-    for i in range(N_ERROR):
-        for j in range(channels):
-            total = 0.0
-            for m in range(j, channels):
-                total += gain[i, m] * w[m, j]
-            gain[i, j] = total
+        for m in range(channels):
+            factor = gain[m, i]
+            for j in range(N_ERROR):
+                p[i, j] -= factor * gain[m, j]
+    for j in range(channels):
+        for i in range(N_ERROR):
+            gain[j, i] *= w[j, j]
+        for m in range(j + 1, channels):
+            factor = w[m, j]
+            for i in range(N_ERROR):
+                gain[j, i] += factor * gain[m, i]
     return log_det

@@ -40,7 +40,7 @@ from fish_env.model.composed import (
 
 # --- end ---
 
-FILTER_LANES = 16
+FILTER_LANES = 24  # a fish's coefficients and an effect or two, each moved once
 EKF_LANES = 24  # the estimate and 19 neighbours, rounded up to whole vector registers
 PERTURB = 1e-5
 
@@ -130,8 +130,8 @@ def ekf_run(
     rows = np.zeros((channels, N_ERROR))
     s = np.zeros((channels, channels))
     w = np.zeros((channels, channels))
-    ph = np.zeros((N_ERROR, channels))
-    k_gain = np.zeros((N_ERROR, channels))
+    seen = np.zeros((channels, N_ERROR))
+    k_gain = np.zeros((channels, N_ERROR))
     e = np.zeros((channels, width))
     gains, biases = np.ones((channels, width)), np.zeros((channels, width))
     for i in range(channels):
@@ -153,7 +153,7 @@ def ekf_run(
         observation_rows(work, width, codes, gain, measured[sample], rows)
         innovations_of(work, width, measured[sample], codes, gains, biases, e)
         log_det = update_covariance(
-            p, rows, measured[sample], noise_variance, s, w, ph, k_gain
+            p, rows, measured[sample], noise_variance, s, w, seen, k_gain
         )  # fmt: skip
         log_likelihood -= 0.5 * log_det
         for i in range(channels):
@@ -165,10 +165,10 @@ def ekf_run(
         for i in range(N_ERROR):
             total = 0.0
             for j in range(channels):
-                total += k_gain[i, j] * e[j, 0]
+                total += k_gain[j, i] * e[j, 0]
+                k_out[sample, i, j] = k_gain[j, i]
             error[i, 0] = total
         move(work, width, error)
-        k_out[sample] = k_gain
         w_out[sample] = w
         for j in range(N_STATES):
             x_out[sample, j] = work[(X0 + j) * width]

@@ -230,7 +230,7 @@ class RunFilter:
 
         ``pushes`` adds a prescribed wrench to each lane.
         """
-        entry = self.kernels.entry("filter_lanes")
+        entry, lanes = self.kernels.entry("filter_lanes"), self.kernels.module.FILTER_LANES
         count = records.shape[1]
         outs = [np.empty((count, *data.measured.shape)) for data in self.runs]
         column = np.zeros(count, np.int64) if pushes is None else pushes.column
@@ -240,7 +240,7 @@ class RunFilter:
         jobs = []
         for data, gains, out, basis in zip(self.runs, filtered, outs, bases, strict=True):
             state0 = self._starts(data, measurement)
-            step = 16 * max(1, -(-count // 64))
+            step = lanes * max(1, -(-count // (4 * lanes)))
             for first in range(0, count, step):
                 last = min(count, first + step)
                 jobs.append((data, gains, out, basis, state0, first, last))

@@ -51,8 +51,8 @@ def replay_run(
     scratch = np.zeros((N_ERROR, N_ERROR))
     s = np.zeros((channels, channels))
     w = np.zeros((channels, channels))
-    ph = np.zeros((N_ERROR, channels))
-    gain = np.zeros((N_ERROR, channels))
+    seen = np.zeros((channels, N_ERROR))
+    gain = np.zeros((channels, N_ERROR))
     e = np.zeros(channels)
     stray = np.zeros(N_ERROR)
     moved = np.zeros(N_ERROR)
@@ -74,7 +74,7 @@ def replay_run(
             moved[N_ERROR - 1] = stray[N_ERROR - 1]
             stray[:] = moved
         log_det = update_covariance(
-            p, h_in[sample], measured[sample], noise_variance, s, w, ph, gain
+            p, h_in[sample], measured[sample], noise_variance, s, w, seen, gain
         )  # fmt: skip
         log_likelihood -= 0.5 * log_det
         for i in range(channels):
@@ -90,6 +90,6 @@ def replay_run(
         for i in range(N_ERROR):
             total = stray[i]
             for j in range(channels):
-                total += gain[i, j] * e[j] - k_in[sample, i, j] * raw_in[sample, j]
+                total += gain[j, i] * e[j] - k_in[sample, i, j] * raw_in[sample, j]
             stray[i] = total
     return log_likelihood

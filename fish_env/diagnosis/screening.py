@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +18,7 @@ from scipy.special import chdtrc
 from scipy.stats import chi2, ncx2
 
 from fish_env.diagnosis.causes import Cause, Probe, best_of_each, effect_values, finer
+from fish_env.effects.extended import PREFIX
 from fish_env.identification.estimator import Fit
 from fish_env.identification.information import (
     BLOCK_S,
@@ -74,6 +76,11 @@ class Signal:
     def p_value(self) -> float:
         """Of this one test, in logarithm, so that overwhelming evidence still ranks."""
         return float(chi2.logsf(self.statistic, self.freedom))
+
+    @cached_property
+    def span(self) -> FloatArray:
+        """(D, m) orthonormal, of what is left after a refit."""
+        return np.asarray(np.linalg.qr(self.left)[0])
 
     @property
     def absorbed_share(self) -> float:
@@ -228,18 +235,35 @@ def residual_changes(fit: Fit, jobs: Sequence[tuple[str, Probe]], z: FloatArray)
         jobs: effect and setting, n of them.
         z: (coefficients, n) where to simulate each.
     """
+    columns = np.empty((len(fit.linearised.residuals), len(jobs)))
+    for alike in _kinds(fit, jobs):
+        for first in range(0, len(alike), LANES_AT_ONCE):
+            part = alike[first : first + LANES_AT_ONCE]
+            columns[:, part] = _changes_at_once(fit, [jobs[i] for i in part], z[:, part])
+    return columns
+
+
+def _kinds(fit: Fit, jobs: Sequence[tuple[str, Probe]]) -> list[list[int]]:
+    """Jobs that one kernel computes, so that none pays for effects of another kind.
+
+    A few jobs stay together: kernels take whole blocks of lanes, however few are filled.
+    """
+    if len(jobs) <= LANES_AT_ONCE:
+        return [list(range(len(jobs)))]
+    kinds: dict[frozenset[str], list[int]] = {}
+    for i, (name, _) in enumerate(jobs):
+        stages = fit.problem.stages_for([*fit.point.effects, f"{PREFIX}{name}"])
+        kinds.setdefault(stages, []).append(i)
+    return list(kinds.values())
+
+
+def _changes_at_once(fit: Fit, jobs: Sequence[tuple[str, Probe]], z: FloatArray) -> FloatArray:
     problem = fit.problem
     base = {**problem.neutral(dict.fromkeys(name for name, _ in jobs)), **fit.point.effects}
     values = [effect_values(problem, name, probe) for name, probe in jobs]
-    columns = np.empty((len(fit.linearised.residuals), len(jobs)))
-    for first in range(0, len(jobs), LANES_AT_ONCE):
-        part = slice(first, first + LANES_AT_ONCE)
-        lanes = {
-            path: np.array([own.get(path, base[path]) for own in values[part]]) for path in base
-        }
-        out = problem.innovations(z[:, part], lanes, fit.noise, fit.filtered)
-        columns[:, part] = (out - fit.linearised.residuals).T
-    return columns
+    lanes = {path: np.array([own.get(path, base[path]) for own in values]) for path in base}
+    out = problem.innovations(z, lanes, fit.noise, fit.filtered)
+    return np.asarray((out - fit.linearised.residuals).T)
 
 
 def _coefficient_signals(projector: Projector, causes: Sequence[Cause], fit: Fit) -> list[Signal]:
@@ -316,5 +340,5 @@ def smallest_detectable(
 
 def confusability(a: Signal, b: Signal) -> float:
     """Largest cosine between what two causes leave after a refit of the baseline (0 to 1)."""
-    cosines = np.linalg.svd(np.linalg.qr(a.left)[0].T @ np.linalg.qr(b.left)[0], compute_uv=False)
+    cosines = np.linalg.svd(a.span.T @ b.span, compute_uv=False)
     return float(cosines[0])

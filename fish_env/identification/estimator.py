@@ -108,7 +108,8 @@ def fit(
         noise = _noise_at(problem, free.unpack(vector), noise, final=round_ > 0)
         if _settled(last, noise):
             break
-    value, filtered = objective(problem, free, vector, noise)
+    if refit_noise:
+        value, filtered = objective(problem, free, vector, noise)
     return _finish(problem, free, names, tuple(released), vector, noise, value, filtered)
 
 
@@ -198,7 +199,9 @@ def _noise_at(problem: Problem, point: Point, noise: NoiseModel, final: bool) ->
     found = noise
     for _ in range(3):
         filtered, made_with = few.filtered(point, found, keep_slopes=True), found
-        replay = partial(few.filter_for(point.effects).replay, filtered, made_with)
+        replay = partial(
+            few.lean_filter.replay, filtered, made_with
+        )  # effects or not, it is the same
         small = NoiseModel(found.sensor_sd, 3e-3, 1e-4, 1.0, found.phase_sd)
         start = max((found, small), key=replay)
         found = fit_noise(replay, start, within, 45, problem.sensor_sd if final else None)

@@ -64,6 +64,4 @@ def block_index(
 
 def sums_over(index: npt.NDArray[np.int64], scores: FloatArray) -> FloatArray:
     """Scores (D, m) summed over the blocks of an index (D,), shape (blocks, m)."""
-    sums = np.zeros((index.max() + 1, scores.shape[1]))
-    np.add.at(sums, index, scores)
-    return sums
+    return np.column_stack([np.bincount(index, weights=column) for column in scores.T])

@@ -12,6 +12,8 @@ import numpy.typing as npt
 
 FloatArray = npt.NDArray[np.float64]
 BLOCK = 64
+AT_ONCE = 1_000_000
+"""Numbers of the blocks' products held at a time."""
 
 
 def inner(a: FloatArray, b: FloatArray) -> FloatArray:
@@ -20,4 +22,10 @@ def inner(a: FloatArray, b: FloatArray) -> FloatArray:
     whole = count * BLOCK
     rows_a = a[:whole].T.reshape(a.shape[1], count, BLOCK).transpose(1, 0, 2)
     rows_b = b[:whole].T.reshape(b.shape[1], count, BLOCK).transpose(1, 2, 0)
-    return np.asarray((rows_a @ rows_b).sum(axis=0) + a[whole:].T @ b[whole:])
+    total: FloatArray = np.zeros((a.shape[1], b.shape[1]))
+    step = max(1, AT_ONCE // max(1, total.size))
+    for first in range(0, count, step):
+        products = rows_a[first : first + step] @ rows_b[first : first + step]
+        products[0] += total  # so that the order of the sum does not depend on the step
+        total = products.sum(axis=0)
+    return np.asarray(total + a[whole:].T @ b[whole:])

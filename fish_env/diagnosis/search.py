@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +17,7 @@ from fish_env.identification.filtering import NoiseModel
 from fish_env.identification.free import REACH
 from fish_env.identification.information import information, prior_precision
 from fish_env.identification.problem import Point, Problem
+from fish_env.identification.side_by_side import side_by_side
 from fish_env.identification.sketch import Sketch, Sketcher
 
 FloatArray = npt.NDArray[np.float64]
@@ -106,16 +108,20 @@ def refits(
     """
     base = current.fit
     sketcher = Sketcher(base)
-    sketches = []
     wandering, shown = loose or (base, ())
     follower = Sketcher(wandering)
-    for signal in shown:
+
+    def followed(signal: Signal) -> list[tuple[str, Sketch]]:
         report(f"trying {signal.cause.name} with a wandering phase")
-        for _, found in _sketches(follower, base, signal, starts(wandering, signal)):
-            sketches += _sketches(sketcher, base, signal, [found.point])
-    for signal in chosen:
+        first = _sketches(follower, base, signal, starts(wandering, signal))
+        return [s for _, f in first for s in _sketches(sketcher, base, signal, [f.point])]
+
+    def alone(signal: Signal) -> list[tuple[str, Sketch]]:
         report(f"trying {signal.cause.name}")
-        sketches += _sketches(sketcher, base, signal, starts(base, signal))
+        return _sketches(sketcher, base, signal, starts(base, signal))
+
+    tasks = [*(partial(followed, s) for s in shown), *(partial(alone, s) for s in chosen)]
+    sketches = [s for found in side_by_side(tasks) for s in found]
     finalists = _finalists(sketches, sketcher.base(), BEHIND, most)
     if not finalists:
         return [], None
@@ -144,12 +150,14 @@ def second_look(
     best = tried[0].fit
     sketcher = Sketcher(best)
     done = {e.causes[-1] for e in tried}
-    sketches = []
-    for signal in chosen:
-        if signal.cause.is_effect and signal.cause.name not in done:
-            report(f"trying {signal.cause.name} again")
-            begin = starts(current.fit, signal, best.point.z)
-            sketches += _sketches(sketcher, current.fit, signal, begin)
+
+    def again(signal: Signal) -> list[tuple[str, Sketch]]:
+        report(f"trying {signal.cause.name} again")
+        begin = starts(current.fit, signal, best.point.z)
+        return _sketches(sketcher, current.fit, signal, begin)
+
+    others = [s for s in chosen if s.cause.is_effect and s.cause.name not in done]
+    sketches = [s for found in side_by_side(partial(again, s) for s in others) for s in found]
     reached = sketcher.base()
     finalists = _finalists(sketches, reached, 0.0, FULL.finalists)
     finalists = [f for f in finalists if f[1].objective < reached + LEEWAY]
@@ -280,13 +288,13 @@ def _rest(
     current: Explanation, finalists: list[tuple[str, Sketch]], leader: Fit, report: Report
 ) -> list[Explanation]:
     """Full fits under the leader's noise."""
-    result = []
-    for name, sketch in finalists:
+
+    def fitted(name: str, sketch: Sketch) -> Explanation:
         report(f"fitting {name}")
-        result.append(
-            Explanation((*current.causes, name), _at_noise(leader.problem, sketch, leader.noise, 4))
-        )
-    return result
+        found = _at_noise(leader.problem, sketch, leader.noise, 4)
+        return Explanation((*current.causes, name), found)
+
+    return side_by_side(partial(fitted, name, sketch) for name, sketch in finalists)
 
 
 def _best_first(tried: list[Explanation]) -> tuple[list[Explanation], NoiseModel]:
@@ -297,7 +305,9 @@ def _best_first(tried: list[Explanation]) -> tuple[list[Explanation], NoiseModel
     if ranked[0] is leader:
         return ranked, leader.fit.noise
     first = _noise_too(problem, ranked[0].fit)
-    others = [Explanation(e.causes, _at_noise(problem, e.fit, first.noise, 2)) for e in ranked[1:]]
+    tasks = [partial(_at_noise, problem, e.fit, first.noise, 2) for e in ranked[1:]]
+    pairs = zip(ranked[1:], side_by_side(tasks), strict=True)
+    others = [Explanation(e.causes, fitted) for e, fitted in pairs]
     return [Explanation(ranked[0].causes, first), *others], first.noise
 
 

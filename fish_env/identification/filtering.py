@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from threading import Lock
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +26,8 @@ POSITIONS = {"x": 0, "y": 1, "z": 2}
 TEMPLATES = tuple(
     Path(__file__).with_name(f"{name}_template.py") for name in ("error_state", "filter", "replay")
 )
+
+_LOADING = Lock()
 
 
 @dataclass(frozen=True)
@@ -301,4 +304,5 @@ def filter_kernels(model: ExtendedModel) -> Kernels:
     """Compiled filter for a model whose last effect is the applied wrench."""
     composition = model.kernels.composition
     assert composition.effects[-1].name == APPLIED_WRENCH.name
-    return kernels(replace(composition, templates=(*composition.templates, *TEMPLATES)))
+    with _LOADING:  # fits side by side may ask for the same kernel
+        return kernels(replace(composition, templates=(*composition.templates, *TEMPLATES)))

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fish_env.identification import Problem
+from fish_env.identification import Problem, products
 from fish_env.identification.free import Free, linearise
 from fish_env.identification.phases import settle_phases
 from fish_env.identification.problem import Point
@@ -156,6 +156,33 @@ def test_lanes_repeat_the_filter_and_slope_with_its_likelihood():
         assert gradient[i] == pytest.approx(
             -(values[1] - values[0]) / 0.1, rel=0.05, abs=0.05 * np.abs(gradient).max()
         )
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("servo_lag.time_constant", 0.05), ("current.north", 0.1)]
+)
+def test_effects_left_out_of_a_kernel_would_change_no_bit(name, value):
+    setup = Setup()
+    problem = problem_of(setup)
+    own = {**problem.neutral([name.split(".")[0]]), f"effects.{name}": value}
+    all_of_them = {**own, **problem.neutral(["added_mass"])}
+    assert problem.stages_for(own) < problem.stages_for(all_of_them)
+    alone, among = (
+        problem.filtered(Point(problem.start.z, effects), setup.noise)
+        for effects in (own, all_of_them)
+    )
+    for a, b in zip(alone, among, strict=True):
+        np.testing.assert_array_equal(a.innovations, b.innovations)
+        np.testing.assert_array_equal(a.gains, b.gains)
+
+
+def test_products_of_tall_matrices_do_not_depend_on_how_many_blocks_are_held(monkeypatch):
+    rng = np.random.default_rng(0)
+    a, b = rng.standard_normal((1000, 7)), rng.standard_normal((1000, 5))
+    whole = products.inner(a, b)
+    monkeypatch.setattr(products, "AT_ONCE", 100)
+    np.testing.assert_array_equal(products.inner(a, b), whole)
+    np.testing.assert_allclose(whole, a.T @ b, rtol=1e-12, atol=1e-12)
 
 
 def test_a_replayed_noise_model_has_the_filters_likelihood():

@@ -38,11 +38,11 @@ FloatArray = npt.NDArray[np.float64]
 KERNELS = (
     frozenset[str](),
     frozenset({"inputs", "tail"}),
-    frozenset({"barycentre", "water", "body_drag", "wrench"}),
+    frozenset({"barycentre", "water", "tail_inflow", "tail_force", "body_drag", "wrench"}),
     frozenset(STAGES),
 )
 """Stages that are compiled together. An effect costs a little where it is neutral too, so one of
-what drives the tail, or of what pushes the hull, is computed without the other kinds: same bits,
+what drives the tail, or of what pushes hull and tail, is computed without the other kinds: same bits,
 two thirds of the time."""
 
 

@@ -207,6 +207,8 @@ def _with_wandering_phase(
     if current.causes or not chosen or not strains(current.fit):
         return None
     loose = loosened(current)
+    if loose is None:
+        return None
     shown = screen(loose, causes, rng)
     effects = [s for s in shown.best() if s.cause.is_effect and s.unwidened > WORTH_A_SKETCH]
     return loose, sorted(effects, key=lambda s: -s.unwidened)[:MOST_LOOSE]
@@ -230,7 +232,7 @@ def pruned(problem: Problem, current: Explanation) -> Explanation:
     """The explanation without causes that later ones made needless."""
     for name in current.causes[:-1]:
         smaller = without(current, name)
-        if score(problem, smaller) < score(problem, current) + DOUBT:
+        if smaller and score(problem, smaller) < score(problem, current) + DOUBT:
             return pruned(problem, smaller)
     return current
 

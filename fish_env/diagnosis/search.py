@@ -74,7 +74,15 @@ def known_before(explanation: Explanation) -> FloatArray:
     return known
 
 
-def loosened(current: Explanation) -> Fit:
+def reached(make: Callable[[], Fit]) -> Fit | None:
+    """A fit; None where the simulation diverges before it can begin."""
+    try:
+        return make()
+    except np.linalg.LinAlgError:
+        return None
+
+
+def loosened(current: Explanation) -> Fit | None:
     """The fit on a few runs when the tail's phase may wander from its command.
 
     A beat a little quicker or slower than commanded is soon out of step, and every slope along
@@ -84,7 +92,7 @@ def loosened(current: Explanation) -> Fit:
     own = current.fit
     noise = replace(own.noise, phase_sd=WANDER)
     few = own.problem.subset(3)
-    return fit(few, own.effects, own.point, noise, own.released, rounds=2)
+    return reached(lambda: fit(few, own.effects, own.point, noise, own.released, rounds=2))
 
 
 def refits(
@@ -123,14 +131,17 @@ def refits(
     tasks = [*(partial(followed, s) for s in shown), *(partial(alone, s) for s in chosen)]
     sketches = [s for found in side_by_side(tasks) for s in found]
     finalists = _finalists(sketches, sketcher.base(), BEHIND, most)
-    if not finalists:
+    leader = None
+    while finalists and leader is None:
+        (name, sketch), *finalists = finalists
+        report(f"fitting {name}")
+        leader = _in_full(base.problem, sketch, base.noise)
+    if leader is None:
         return [], None
-    name, sketch = finalists[0]
-    report(f"fitting {name}")
-    leader = Explanation((*current.causes, name), _in_full(base.problem, sketch, base.noise))
-    tried = [leader, *_rest(current, finalists[1:], leader.fit, report)]
-    tried, noise = _best_first(tried)
-    return tried, Explanation(current.causes, _at_noise(base.problem, base, noise, 2))
+    first = Explanation((*current.causes, name), leader)
+    tried, noise = _best_first([first, *_rest(current, finalists, leader, report)])
+    # A baseline that diverges under the smaller disturbance keeps the one that suits it.
+    return tried, Explanation(current.causes, _at_noise(base.problem, base, noise, 2) or base)
 
 
 def second_look(
@@ -193,7 +204,10 @@ def exchanged(current: Explanation, left: Sequence[Signal], report: Report) -> E
     if sketch.objective >= sketcher.base():
         return current
     report(f"fitting {' and '.join(causes)}")
-    other = Explanation(causes, _in_full(own.problem, sketch, own.noise))
+    fitted = _in_full(own.problem, sketch, own.noise)
+    if fitted is None:
+        return current
+    other = Explanation(causes, fitted)
     better = score(own.problem, other) < score(own.problem, current)
     return other if better else current
 
@@ -210,16 +224,23 @@ def _exchange(sketcher: Sketcher, own: Fit, name: str, signal: Signal) -> Sketch
         return None
 
 
-def without(current: Explanation, name: str) -> Explanation:
-    """The fit when one of its causes is dropped, under the same noise model."""
+def without(current: Explanation, name: str) -> Explanation | None:
+    """The fit when one of its causes is dropped, under the same noise model.
+
+    None where the simulation diverges without it.
+    """
     own = current.fit
     effects = tuple(e for e in own.effects if e != name)
     released = tuple(p for p in own.released if f"parameter:{p}" != name)
     values = {p: v for p, v in own.point.effects.items() if p.split(".")[1] != name}
-    smaller = fit(
-        own.problem, effects, Point(own.point.z, values), own.noise, released, refit_noise=False,
-        iterations=4,
-    )  # fmt: skip
+    begin = Point(own.point.z, values)
+    smaller = reached(
+        lambda: fit(
+            own.problem, effects, begin, own.noise, released, refit_noise=False, iterations=4
+        )
+    )
+    if smaller is None:
+        return None
     return Explanation(tuple(c for c in current.causes if c != name), smaller)
 
 
@@ -289,12 +310,13 @@ def _rest(
 ) -> list[Explanation]:
     """Full fits under the leader's noise."""
 
-    def fitted(name: str, sketch: Sketch) -> Explanation:
+    def fitted(name: str, sketch: Sketch) -> Explanation | None:
         report(f"fitting {name}")
         found = _at_noise(leader.problem, sketch, leader.noise, 4)
-        return Explanation((*current.causes, name), found)
+        return None if found is None else Explanation((*current.causes, name), found)
 
-    return side_by_side(partial(fitted, name, sketch) for name, sketch in finalists)
+    tasks = [partial(fitted, name, sketch) for name, sketch in finalists]
+    return [explanation for explanation in side_by_side(tasks) if explanation]
 
 
 def _best_first(tried: list[Explanation]) -> tuple[list[Explanation], NoiseModel]:
@@ -305,23 +327,27 @@ def _best_first(tried: list[Explanation]) -> tuple[list[Explanation], NoiseModel
     if ranked[0] is leader:
         return ranked, leader.fit.noise
     first = _noise_too(problem, ranked[0].fit)
+    if first is None:
+        return ranked, leader.fit.noise
     tasks = [partial(_at_noise, problem, e.fit, first.noise, 2) for e in ranked[1:]]
     pairs = zip(ranked[1:], side_by_side(tasks), strict=True)
-    others = [Explanation(e.causes, fitted) for e, fitted in pairs]
+    others = [Explanation(e.causes, fitted) for e, fitted in pairs if fitted]
     return [Explanation(ranked[0].causes, first), *others], first.noise
 
 
-def _in_full(problem: Problem, sketch: Sketch, noise: NoiseModel) -> Fit:
+def _in_full(problem: Problem, sketch: Sketch, noise: NoiseModel) -> Fit | None:
     few = problem.subset(3)
-    first = fit(few, sketch.effects, sketch.point, noise, sketch.released, rounds=2)
-    return first if few is problem else _noise_too(problem, first)
-
-
-def _at_noise(problem: Problem, at: Sketch | Fit, noise: NoiseModel, iterations: int) -> Fit:
-    return fit(
-        problem, at.effects, at.point, noise, at.released, refit_noise=False, iterations=iterations
+    first = reached(
+        lambda: fit(few, sketch.effects, sketch.point, noise, sketch.released, rounds=2)
     )
+    return first if first is None or few is problem else _noise_too(problem, first)
 
 
-def _noise_too(problem: Problem, own: Fit) -> Fit:
-    return fit(problem, own.effects, own.point, own.noise, own.released, rounds=2)
+def _at_noise(problem: Problem, at: Sketch | Fit, noise: NoiseModel, iterations: int) -> Fit | None:
+    free = (at.effects, at.point, noise, at.released)
+    return reached(lambda: fit(problem, *free, refit_noise=False, iterations=iterations))
+
+
+def _noise_too(problem: Problem, own: Fit) -> Fit | None:
+    free = (own.effects, own.point, own.noise, own.released)
+    return reached(lambda: fit(problem, *free, rounds=2))

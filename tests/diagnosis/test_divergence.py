@@ -1,0 +1,72 @@
+"""Simulations that diverge end an attempt, not the diagnosis."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from fish_env.diagnosis import attribution, search
+from fish_env.diagnosis.search import Explanation, reached, refits, without
+
+
+def diverge(*arguments, **options):
+    raise np.linalg.LinAlgError("the simulation diverges at the start of the fit")
+
+
+def fake(name="fit"):
+    problem = SimpleNamespace(baseline=(), known={})
+    problem.subset = lambda count: problem
+    return SimpleNamespace(
+        problem=problem, effects=("a", "b"), released=(), noise=None, name=name,
+        point=SimpleNamespace(z=np.zeros(0), effects={"effects.a.x": 1.0, "effects.b.x": 1.0}),
+    )  # fmt: skip
+
+
+def test_only_divergence_ends_a_fit_quietly():
+    assert reached(diverge) is None
+    with pytest.raises(ZeroDivisionError):
+        reached(lambda: 1 // 0)
+
+
+def test_a_cause_without_which_the_simulation_diverges_is_not_dropped(monkeypatch):
+    monkeypatch.setattr(search, "fit", diverge)
+    both = Explanation(("a", "b"), fake())
+    assert without(both, "a") is None
+    assert attribution.pruned(both.fit.problem, both) is both
+
+
+def contest(monkeypatch, results):
+    """Three sketches, best first, and what becomes of each when it is fitted in full."""
+    sketches = [(name, SimpleNamespace(objective=i, name=name)) for i, name in enumerate("abc")]
+    monkeypatch.setattr(search, "Sketcher", lambda base: SimpleNamespace(base=lambda: 1000.0))
+    monkeypatch.setattr(search, "starts", lambda *arguments: [])
+    by_name = dict(sketches)
+    monkeypatch.setattr(
+        search, "_sketches", lambda s, base, signal, begin: [(signal, by_name[signal])]
+    )
+    monkeypatch.setattr(search, "_in_full", lambda problem, s, noise: results[s.name])
+    monkeypatch.setattr(
+        search, "_at_noise", lambda problem, at, noise, n: results.get(getattr(at, "name", None))
+    )
+    monkeypatch.setattr(search, "_best_first", lambda tried: (tried, None))
+    monkeypatch.setattr(search, "_finalists", lambda found, base, behind, most: found)
+    named = [Signal(name) for name in "abc"]
+    return refits(Explanation((), fake("base")), named, lambda step: None)
+
+
+class Signal(str):
+    """A cause by its name."""
+
+    @property
+    def cause(self):
+        return SimpleNamespace(name=str(self))
+
+
+def test_the_best_of_those_that_do_not_diverge_leads(monkeypatch):
+    tried, base = contest(monkeypatch, {"a": None, "b": fake("b"), "c": None})
+    assert [e.causes for e in tried] == [("b",)]
+    assert base.fit.name == "base"  # it diverged as well, and keeps the disturbance that suits it
+
+
+def test_no_cause_is_found_where_all_diverge(monkeypatch):
+    assert contest(monkeypatch, dict.fromkeys("abc")) == ([], None)

@@ -42,8 +42,8 @@ KERNELS = (
     frozenset(STAGES),
 )
 """Stages that are compiled together. An effect costs a little where it is neutral too, so one of
-what drives the tail, or of what pushes hull and tail, is computed without the other kinds: same
-bits, two thirds of the time."""
+what drives the tail, or of what pushes the fish, is computed without the other kinds: the same
+bits, in two thirds of the time."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -203,7 +203,12 @@ def linearise(
 def objective(
     problem: Problem, free: Free, vector: FloatArray, noise: NoiseModel
 ) -> tuple[float, list[Filtered]]:
-    """-2 log likelihood + prior, and the filter results it comes from."""
+    """-2 log likelihood + prior, and the filter results it comes from.
+
+    Infinite, and nothing filtered, where no fish can have the coefficients.
+    """
+    if not problem.baseline.possible(vector[: free.count]):
+        return np.inf, []
     results = problem.filtered(free.unpack(vector), noise)
     value = -2.0 * sum(r.log_likelihood for r in results) + free.prior @ (vector * vector)
     return float(value), results

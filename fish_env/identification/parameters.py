@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fish_env.effects.extended import PREFIX, ExtendedModel
+from fish_env.errors import ParameterError
 from fish_env.identification.filtering import Measurement
 from fish_env.model.effect import Effect
 from fish_env.params.packing import PATHS
@@ -79,6 +80,15 @@ class Baseline:
     def values(self, z: FloatArray) -> FloatArray:
         """Coefficients (n, N) of normalised ones (n, N)."""
         return self.mean[:, None] + self.factor @ z
+
+    def possible(self, z: FloatArray) -> bool:
+        """Whether a fish can have normalised coefficients (n,), each by itself and all together."""
+        values = self.values(z[:, None])[:, 0].tolist()
+        try:
+            self.fish.replace(dict(zip(self.paths, values, strict=True)), "identified")
+        except ParameterError:
+            return False
+        return True
 
     @cached_property
     def bounds(self) -> tuple[FloatArray, FloatArray]:

@@ -6,8 +6,8 @@ Errors, because no body could have the numbers or the equations of motion break 
   and lengths are positive, drag and lift coefficients are not negative, damping takes power out;
 * a weight block as heavy as the fish; a crank as long as its connecting rod (it could not turn);
 * a moment of inertia larger than the sum of the other two of the same part, which no distribution
-  of mass has. An identified value is exempt and only warned of: a refit absorbs water that moves
-  with the hull, and such an effective inertia need not belong to any rigid body;
+  of mass has. An identified value is exempt, and files are warned of: a refit absorbs water that
+  moves with the hull, and such an effective inertia need not belong to any rigid body;
 * an inertia of the whole fish, block at rest, that is not positive definite about the centre of
   mass. The moments about O_b are positive whenever those of the parts are, but the model keeps no
   products of inertia, so a far off-axis balance can leave the mass matrix indefinite.
@@ -17,7 +17,7 @@ import difflib
 import math
 import numbers
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -45,8 +45,9 @@ def check_fish(fish: "FishParams") -> None:
         check_number(fish, leaf.path, leaf.value)
         check_bounds(fish, leaf)
     check_masses(fish)
-    check_triangle(fish, "inertia.rest", fish.inertia.rest)
-    check_triangle(fish, "inertia.weight_block", fish.inertia.weight_block)
+    for error, identified in broken_triangles(fish):
+        if not identified:
+            raise error
     check_central_inertia(fish)
     check_effects(fish)
     check_provenance(fish)
@@ -120,18 +121,31 @@ def check_masses(fish: "FishParams") -> None:
         )
 
 
-def check_triangle(fish: "FishParams", key: str, moments: tuple[float, ...]) -> None:
-    """Checks that each principal moment is at most the sum of the other two."""
-    worst = max(range(3), key=lambda axis: moments[axis])
-    others = sum(moments) - moments[worst]
-    if moments[worst] <= others * (1 + 1e-9):
-        return
-    problem = f"is {moments[worst]:g} kg m^2, more than the other two together, {others:g} kg m^2"
-    remedy = "no rigid body has such moments, check the three"
-    error = fault(fish, f"{key}[{worst}]", problem, remedy)
-    if all(fish.provenance.of(f"{key}[{axis}]").status != "identified" for axis in range(3)):
-        raise error
-    warnings.warn(f"{error} (accepted, as it is an identified, effective inertia)", stacklevel=2)
+def broken_triangles(fish: "FishParams") -> Iterator[tuple[ParameterError, bool]]:
+    """Parts with a moment above the sum of the other two, and whether it was identified."""
+    parts = {
+        "inertia.rest": fish.inertia.rest,
+        "inertia.weight_block": fish.inertia.weight_block,
+    }
+    for key, moments in parts.items():
+        worst = max(range(3), key=lambda axis: moments[axis])
+        others = sum(moments) - moments[worst]
+        if moments[worst] <= others * (1 + 1e-9):
+            continue
+        problem = (
+            f"is {moments[worst]:g} kg m^2, more than the other two together, {others:g} kg m^2"
+        )
+        remedy = "no rigid body has such moments, check the three"
+        status = {fish.provenance.of(f"{key}[{axis}]").status for axis in range(3)}
+        yield fault(fish, f"{key}[{worst}]", problem, remedy), "identified" in status
+
+
+def warn_of_effective_inertia(fish: "FishParams") -> None:
+    """Says which moments of inertia no rigid body has: for whoever reads or writes a file."""
+    for error, _ in broken_triangles(fish):
+        warnings.warn(
+            f"{error} (accepted, as it is an identified, effective inertia)", stacklevel=3
+        )
 
 
 def check_central_inertia(fish: "FishParams") -> None:

@@ -12,7 +12,7 @@ from typing import Any
 from fish_env.errors import ParameterError
 from fish_env.params import trees
 from fish_env.params.building import build_fish
-from fish_env.params.checks import closest
+from fish_env.params.checks import closest, warn_of_effective_inertia
 from fish_env.params.files import read_yaml, write_yaml
 from fish_env.params.provenance import Origin, Posterior, Provenance
 from fish_env.params.schema import FishParams
@@ -47,7 +47,9 @@ def load_fish(name_or_path: str | Path) -> FishParams:
             and remedy.
     """
     file = find_fish(name_or_path, Path())
-    return build_fish(read_merged(file, ()), file)
+    fish = build_fish(read_merged(file, ()), file)
+    warn_of_effective_inertia(fish)
+    return fish
 
 
 def find_fish(name_or_path: str | Path, folder: Path) -> Path:
@@ -131,6 +133,7 @@ def save_fish(fish: FishParams, path: str | Path) -> None:
     file = Path(path)
     if file.suffix not in SUFFIXES:
         raise ParameterError(f"{file}: give the file the ending .yaml")
+    warn_of_effective_inertia(fish)
     data: dict[str, Any] = {"name": fish.name, **trees.to_plain(fish)}
     save_tables(fish, data, file)
     data["prior"] = trees.to_plain(fish.prior)

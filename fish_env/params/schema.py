@@ -115,8 +115,10 @@ class FishParams:
         Raises:
             ParameterError: A path is unknown, or the copy would not be a possible fish.
         """
+        known = {leaf.path for leaf in leaves(self)}
         for path in values:
-            self._leaf(path)
+            if path not in known:
+                self._leaf(path)
         floats = {path: as_number(value) for path, value in values.items()}
         changes = trees.replaced_groups(self, floats)
         provenance = self.provenance.updated(values, status, source)

@@ -1,10 +1,14 @@
-"""The bounded step against a general solver of quadratic programmes."""
+"""What bounds a fit: the step against a general solver, and what no fish can be."""
 
 import numpy as np
 import pytest
 from scipy.optimize import LinearConstraint, minimize
 
+from fish_env.identification import Problem
 from fish_env.identification.bounded import bounded_step
+from fish_env.identification.estimator import default_noise, gauss_newton
+from fish_env.identification.free import Free, objective
+from tests.identification.synthetic import Setup, simulate
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -37,3 +41,23 @@ def test_without_bounds_it_is_newtons_step():
     none = np.full(2, np.inf)
     found = bounded_step(hessian, gradient, np.zeros(2), np.eye(2), -none, none)
     np.testing.assert_allclose(found, [-1.0, -0.5])
+
+
+def test_no_fit_goes_where_no_fish_can_be():
+    """Each number may be possible by itself, and all together leave a body without inertia."""
+    paths = ("mass.static_moment_rest[0]", "inertia.rest[2]")
+    problem = Problem(simulate(Setup(runs=1, duration=2.0)), paths=paths)
+    free = Free(problem, (), ())
+    noise = default_noise(problem)
+    value, filtered = objective(problem, free, np.zeros(2), noise)
+    assert np.isfinite(value)
+    assert len(filtered) == 1
+    moment, inertia = problem.fish.get(paths[0]), problem.fish.get(paths[1])
+    mean, sd = problem.baseline.mean, problem.baseline.sd
+    balance = -1.7 * np.sqrt(inertia / 1.7)  # as far aft as the inertia about the origin allows
+    assert balance < moment
+    impossible = (np.array([1.5 * balance, inertia]) - mean) / sd
+    assert not problem.baseline.possible(impossible)
+    assert objective(problem, free, impossible, noise) == (np.inf, [])
+    with pytest.raises(np.linalg.LinAlgError):
+        gauss_newton(problem, free, impossible, noise, 3, 0.1)

@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from fish_env.errors import ParameterError
-from fish_env.params import config_root, load_fish
+from fish_env.params import config_root, load_fish, save_fish
 from fish_env.params.balance import central_inertia
 
 PRESET = yaml.safe_load((config_root() / "fish" / "zheng-2021-a.yaml").read_text())
@@ -142,13 +142,17 @@ def test_a_boolean_is_no_number_even_where_one_would_do(tmp_path):
         load_fish("zheng-2021-a").replace({"mass.total": True})
 
 
-def test_an_identified_inertia_may_break_the_triangle_rule_with_a_warning():
+def test_an_identified_inertia_may_break_the_triangle_rule_and_files_are_warned_of(tmp_path):
     fish = load_fish("zheng-2021-a")
     flat = {"inertia.rest[2]": 0.02}
     with pytest.raises(ParameterError, match="more than the other two together"):
         fish.replace(flat)
+    effective = fish.replace(flat, status="identified", source="runs of May")
+    file = tmp_path / "effective.yaml"
     with pytest.warns(UserWarning, match=r"inertia\.rest\[2\].*identified"):
-        fish.replace(flat, status="identified", source="runs of May")
+        save_fish(effective, file)
+    with pytest.warns(UserWarning, match=r"inertia\.rest\[2\].*identified"):
+        assert load_fish(file).get("inertia.rest[2]") == 0.02
 
 
 def test_central_inertia_of_a_neutral_fish_matches_the_parallel_axis_theorem():

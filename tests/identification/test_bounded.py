@@ -52,11 +52,10 @@ def test_no_fit_goes_where_no_fish_can_be():
     value, filtered = objective(problem, free, np.zeros(2), noise)
     assert np.isfinite(value)
     assert len(filtered) == 1
-    moment, inertia = problem.fish.get(paths[0]), problem.fish.get(paths[1])
-    mean, sd = problem.baseline.mean, problem.baseline.sd
-    balance = -1.7 * np.sqrt(inertia / 1.7)  # as far aft as the inertia about the origin allows
-    assert balance < moment
-    impossible = (np.array([1.5 * balance, inertia]) - mean) / sd
+    # A centre of mass 0.25 m aft, about which less than nothing of the inertia is left.
+    impossible = (np.array([-0.5, problem.fish.get(paths[1])]) - problem.baseline.mean) / (
+        problem.baseline.sd
+    )
     assert not problem.baseline.possible(impossible)
     assert objective(problem, free, impossible, noise) == (np.inf, [])
     with pytest.raises(np.linalg.LinAlgError):

@@ -116,6 +116,12 @@ def diagnose(
     quick: Annotated[
         bool, typer.Option("--quick", help="A first look: fewer runs, no rival causes.")
     ] = False,
+    measured_beats: Annotated[
+        bool,
+        typer.Option(
+            "--measured-beats", help="Tail frequencies from the hull's swaying, not as commanded."
+        ),
+    ] = False,
     seed: Annotated[int, typer.Option(help="Of all that is random.")] = 0,
 ) -> None:
     """Find what the simulation gets wrong: a cause with numbers, or an honest "none I know".
@@ -128,7 +134,7 @@ def diagnose(
     """
     from fish_env.commands.diagnose import diagnose_dataset
 
-    diagnose_dataset(Console(), dataset, out, fish, quick, seed)
+    diagnose_dataset(Console(), dataset, out, fish, quick, seed, measured_beats)
 
 
 @app.command()

@@ -16,7 +16,13 @@ from fish_env.diagnosis.pipeline import diagnose
 
 
 def diagnose_dataset(
-    console: Console, dataset: str, out: Path, fish: str | None, quick: bool, seed: int
+    console: Console,
+    dataset: str,
+    out: Path,
+    fish: str | None,
+    quick: bool,
+    seed: int,
+    measured_beats: bool,
 ) -> dict[str, Any]:
     """Diagnoses a dataset, prints the verdict and writes the files.
 
@@ -27,6 +33,7 @@ def diagnose_dataset(
         fish: Another fish than the dataset names: preset or file.
         quick: Take a first look only.
         seed: Of the split into runs and of the null distributions.
+        measured_beats: Take the tail's frequencies from the hull's swaying.
 
     Raises:
         RoboticFishError: The data or the fish cannot be used.
@@ -34,9 +41,11 @@ def diagnose_dataset(
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as progress:
         task = progress.add_task("reading", total=None)
-        answer = diagnose(
-            dataset, out, seed, quick, fish, lambda step: progress.update(task, description=step)
-        )
+
+        def tell(step: str) -> None:
+            progress.update(task, description=step)
+
+        answer = diagnose(dataset, out, seed, quick, fish, tell, measured_beats)
     print_answer(console, answer)
     _print_files(console, out)
     return answer

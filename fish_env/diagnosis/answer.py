@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from fish_env.data.schema import Dataset
 from fish_env.diagnosis import consistency, noise_floor
 from fish_env.diagnosis.attribution import Ranked
+from fish_env.diagnosis.beats import beats_of, by_run, uneven
 from fish_env.diagnosis.causes import PARAMETER
 from fish_env.diagnosis.effort import QUICK
 from fish_env.diagnosis.entries import (
@@ -50,6 +52,7 @@ def as_dict(diagnosis: Diagnosis) -> Plain:
         "noise": _noise(diagnosis.accepted),
         "noise_floor": [noise_floor.as_dict(floor) for floor in diagnosis.floors],
         "consistency": consistency.as_dict(diagnosis.consistency),
+        "beats": _beats(diagnosis.dataset),
         "misfit": misfit_entry(diagnosis.misfit),
         "gain": gain_entry(diagnosis.gain),
         "preconditions": [precondition_entry(p) for p in diagnosis.preconditions],
@@ -61,6 +64,13 @@ def as_dict(diagnosis: Diagnosis) -> Plain:
         "notes": list(diagnosis.dataset.notes),
     }
     return {**answer, "doubts": doubts(answer)}
+
+
+def _beats(dataset: Dataset) -> Plain:
+    """Measured over commanded tail frequency of each run that shows it."""
+    beats = beats_of(dataset)
+    runs = {run: {"ratio": ratio, "sd": sd} for run, (ratio, sd) in by_run(beats).items()}
+    return {"uneven": uneven(beats), "runs": runs}
 
 
 def _rank(ranked: Ranked) -> Plain:

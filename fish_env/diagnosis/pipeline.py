@@ -15,6 +15,7 @@ from fish_env.data import Dataset, load_dataset, split_runs
 from fish_env.diagnosis.adequacy import Adequacy, adequacy
 from fish_env.diagnosis.answer import as_dict
 from fish_env.diagnosis.attribution import Attribution, attribute, extended
+from fish_env.diagnosis.beats import with_measured_beats
 from fish_env.diagnosis.causes import Cause, causes_of
 from fish_env.diagnosis.consistency import Consistency, check_consistency
 from fish_env.diagnosis.effort import FULL, QUICK
@@ -29,6 +30,7 @@ from fish_env.diagnosis.steady.pipeline import diagnose_steady
 from fish_env.diagnosis.suitability import check_runs, divergence
 from fish_env.diagnosis.verdict import Verdict, decide
 from fish_env.diagnosis.writing import EXTENDING, write_answer
+from fish_env.errors import DatasetError
 from fish_env.identification.estimator import Fit, fit
 from fish_env.identification.problem import Problem
 from fish_env.params.io import load_fish
@@ -92,6 +94,7 @@ def diagnose(
     quick: bool = False,
     fish: FishParams | str | Path | None = None,
     progress: Progress | None = None,
+    measured_beats: bool = False,
 ) -> dict[str, Any]:
     """Diagnose a folder of measured runs.
 
@@ -103,6 +106,7 @@ def diagnose(
         quick: a first look, which leaves out what :data:`~fish_env.diagnosis.effort.QUICK` says.
         fish: another fish than the dataset names: parameters, preset or file.
         progress: told the name of each step.
+        measured_beats: take the tail's frequencies from the hull's swaying, not from the commands.
 
     Returns:
         The content of ``diagnosis.json``.
@@ -115,8 +119,12 @@ def diagnose(
     tell = progress or (lambda step: None)
     dataset = load_dataset(folder)
     if not isinstance(dataset, Dataset):
+        if measured_beats:
+            raise DatasetError(f"{folder}: means hold no beat; leave out --measured-beats")
         where = Path(out) if out is not None else None
         return diagnose_steady(dataset, chosen, seed=seed, quick=quick, progress=tell, out=where)
+    if measured_beats:
+        dataset = with_measured_beats(dataset)
     diagnosis = diagnose_runs(dataset, chosen, seed, quick, tell)
     answer = as_dict(diagnosis)
     if out is not None:

@@ -118,15 +118,17 @@ ASTONISHING = 4.9
 
 
 def doubts(answer: Mapping[str, Any]) -> list[str]:
-    """Doubts to voice beside a verdict: signs that the parameter file is of another fish.
+    """Doubts to voice beside a verdict: signs that fish file or commands are not what was swum.
 
     Data cannot tell that for sure. A wrong geometry comes out as coefficients far from what was
-    known of them, and a wrong mass as an added mass that is the same in every direction.
+    known of them, a wrong mass as an added mass that is the same in every direction, and a tail
+    that does not follow its commands as hulls that sway at frequencies of their own.
 
     Args:
         answer: the content of ``diagnosis.json``.
     """
     found = [_far_coefficients(answer["parameters"]), _mass_in_disguise(answer["causes"])]
+    found.append(_uneven_beats(answer))
     found += [f"What fits best is not to be believed: {s}." for s in answer.get("strained", ())]
     return [doubt for doubt in found if doubt]
 
@@ -143,6 +145,18 @@ def _far_coefficients(parameters: Sequence[Mapping[str, Any]]) -> str:
         "The refit moved coefficients much further than their priors allow, in standard deviations "
         f"{named}. Perhaps the parameter file is of another fish, or the fish was rebuilt: check "
         "`fish` in dataset.yaml, or give --fish."
+    )
+
+
+def _uneven_beats(answer: Mapping[str, Any]) -> str:
+    beats = answer.get("beats", {})
+    if answer.get("verdict") != "outside_library" or not beats.get("uneven"):
+        return ""
+    ratios = sorted(run["ratio"] for run in beats["runs"].values())
+    return (
+        f"The hull sways at {ratios[0]:.3f} to {ratios[-1]:.3f} times the commanded frequency, "
+        "differently in each run, which no known cause explains. Repair the servo's timing, or "
+        "diagnose again with --measured-beats, which takes the frequencies from the swaying."
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -123,7 +123,7 @@ def extended(
     current, screens = begun.accepted, [*begun.screens]
     rivals, ranking = begun.rivals, begun.ranking
     total, rough = begun.gain, roughness(current)
-    while len(current.causes) < MOST_CAUSES and not rivals:
+    while len(current.causes) < MOST_CAUSES and not any(tied(problem, current, e) for e in rivals):
         found = len(current.fit.released)
         chosen = shortlisted(problem, screens[-1], effort.shortlist, rough * total, lenience, found)
         loose = _with_wandering_phase(current, chosen, causes, rng) if effort.retries else None
@@ -145,23 +145,45 @@ def extended(
             if again[0] is not tried[0]:
                 after = screen(again[0].fit, causes, rng)
             tried = again
-        current = best = tried[0]
-        if effort.retries and len(best.causes) > 1 and shortlisted(problem, after, 1):
-            current = exchanged(best, after.best(), report)
-            if current is not best:
-                after, tried, best = screen(current.fit, causes, rng), [current], current
-        rough = roughness(best)
+        unsettled = rivals or shortlisted(problem, after, 1)
+        exchanges: Sequence[Explanation] = ()
+        if effort.retries and len(tried[0].causes) > 1 and unsettled:
+            exchanges = exchanged(tried[0], after.best(), report)
+            if exchanges[0] is not tried[0]:
+                after, tried = screen(exchanges[0].fit, causes, rng), [exchanges[0]]
+        current = tried[0]
+        rough = roughness(current)
         screens.append(after)
-        rivals = tuple(
-            e
-            for e in tried[1:]
-            if alike(problem, best, e)
-            and not same(problem.known, best.causes[-1], e.causes[-1])
-            and explained_away(e.causes[-1], screens[-2], screens[-1])
-            and not implausible(e.fit)
-        )
+        others_like = [e for e in tried[1:] if explained_away(e.causes[-1], screens[-2], after)]
+        rivals = rivals_of(problem, current, [*others_like, *exchanges[1:]])
     current = pruned(problem, current)
     return Attribution(begun.baseline, tuple(screens), current, rivals, ranking, total)
+
+
+def rivals_of(
+    problem: Problem, best: Explanation, others: Iterable[Explanation]
+) -> tuple[Explanation, ...]:
+    """Those of other explanations that the runs cannot tell from the best one."""
+    return tuple(
+        e
+        for e in others
+        if alike(problem, best, e)
+        and not _says_the_same(problem, best, e)
+        and not implausible(e.fit)
+    )
+
+
+def _says_the_same(problem: Problem, best: Explanation, other: Explanation) -> bool:
+    pairs = zip(best.causes, other.causes, strict=True)
+    return all(a == b or same(problem.known, a, b) for a, b in pairs)
+
+
+def tied(problem: Problem, best: Explanation, other: Explanation) -> bool:
+    """Whether the evidence for two explanations is the same, however coloured what is left is.
+
+    Where it is not, but what else is missing drowns the difference, that comes first.
+    """
+    return score(problem, other) - score(problem, best) < DOUBT
 
 
 def ranking_of(tried: Sequence[Explanation], base: Explanation) -> tuple[Ranked, ...]:
@@ -229,8 +251,8 @@ def _like(winner: str, before: Screen, chosen: Sequence[Signal], problem: Proble
 
 
 def pruned(problem: Problem, current: Explanation) -> Explanation:
-    """The explanation without causes that later ones made needless."""
-    for name in current.causes[:-1]:
+    """The explanation without causes that others made needless, which may have come later."""
+    for name in current.causes if len(current.causes) > 1 else ():
         smaller = without(current, name)
         if smaller and score(problem, smaller) < score(problem, current) + DOUBT:
             return pruned(problem, smaller)

@@ -176,8 +176,8 @@ def second_look(
     return _best_first([*tried, *more])[0]
 
 
-def exchanged(current: Explanation, left: Sequence[Signal], report: Report) -> Explanation:
-    """The explanation, or a better one that has a look-alike in the place of an earlier cause.
+def exchanged(current: Explanation, left: Sequence[Signal], report: Report) -> list[Explanation]:
+    """The explanation, and one that has a look-alike in the place of an earlier cause, best first.
 
     The first cause is chosen while the others are still missing, and its nearest relative may then
     make up for part of them.
@@ -199,17 +199,16 @@ def exchanged(current: Explanation, left: Sequence[Signal], report: Report) -> E
             if sketch is not None:
                 found.append((sketch.objective, causes, sketch))
     if not found:
-        return current
+        return [current]
     _, causes, sketch = min(found, key=lambda f: f[0])
-    if sketch.objective >= sketcher.base():
-        return current
+    if sketch.objective >= sketcher.base() + LEEWAY:
+        return [current]
     report(f"fitting {' and '.join(causes)}")
     fitted = _in_full(own.problem, sketch, own.noise)
     if fitted is None:
-        return current
-    other = Explanation(causes, fitted)
-    better = score(own.problem, other) < score(own.problem, current)
-    return other if better else current
+        return [current]
+    both = [current, Explanation(causes, fitted)]
+    return sorted(both, key=lambda e: score(own.problem, e))
 
 
 def _exchange(sketcher: Sketcher, own: Fit, name: str, signal: Signal) -> Sketch | None:
@@ -217,7 +216,7 @@ def _exchange(sketcher: Sketcher, own: Fit, name: str, signal: Signal) -> Sketch
     kept = {p: v for p, v in own.point.effects.items() if p.split(".")[1] != name}
     effects = tuple(signal.cause.name if e == name else e for e in own.effects)
     sizes = _probed(own.problem, signal, every=True)
-    begin = [Point(own.point.z, {**kept, **values}) for values in sizes]
+    begin = [Point(z, {**kept, **values}) for z in _baselines(own) for values in sizes]
     try:
         return sketcher.sketch(effects, own.released, begin)
     except np.linalg.LinAlgError:
@@ -260,8 +259,7 @@ def _sketches(
 def starts(base: Fit, signal: Signal, z: FloatArray | None = None) -> list[Point]:
     """Where to begin: the linear estimate and every probe, with baselines near and far.
 
-    A baseline refitted without the cause may have gone far to make up for it, so the nominal one
-    is a start of its own. With ``z`` given, that is the only one.
+    With ``z`` given, that is the only baseline.
     """
     problem, cause = base.problem, signal.cause
     if not cause.is_effect:
@@ -277,10 +275,18 @@ def starts(base: Fit, signal: Signal, z: FloatArray | None = None) -> list[Point
         {path: float(np.clip(value, *bounds[path])) for path, value in values.items()}
         for values in (linear, *_probed(problem, signal))
     ]
-    far = np.abs(base.point.z).max() > FAR
-    near = (base.point.z, np.zeros_like(base.point.z)) if far else (base.point.z,)
-    baselines = near if z is None else (z,)
+    baselines = _baselines(base) if z is None else (z,)
     return [Point(z, {**base.point.effects, **values}) for z in baselines for values in clipped]
+
+
+def _baselines(base: Fit) -> tuple[FloatArray, ...]:
+    """Coefficients to begin from.
+
+    Those refitted without a cause may have gone far to make up for it, so the nominal ones are a
+    start of their own.
+    """
+    far = np.abs(base.point.z).max() > FAR
+    return (base.point.z, np.zeros_like(base.point.z)) if far else (base.point.z,)
 
 
 def _probed(problem: Problem, signal: Signal, every: bool = False) -> list[dict[str, float]]:

@@ -2,6 +2,9 @@
 
 from types import SimpleNamespace
 
+import pytest
+
+from fish_env.diagnosis import attribution
 from fish_env.diagnosis.attribution import explained_away, shortlisted
 from fish_env.effects import catalogue
 
@@ -58,3 +61,45 @@ def test_what_looks_like_the_first_is_always_tried():
     nothing = SimpleNamespace(best=lambda: signals, threshold=-200.0)
     assert shortlisted(problem, nothing, 2) == []
     assert shortlisted(problem, screen, 2, least=100.0) == []  # within the simulation's own error
+
+
+def settled(problem, best, other):
+    return other.gap < 6.0
+
+
+def drowned(problem, best, other):
+    return other.gap < 600.0
+
+
+@pytest.mark.parametrize(("gap", "steps"), [(3.0, 1), (300.0, 2), (3000.0, 2)])
+def test_a_tie_ends_the_search_but_not_a_difference_that_a_misfit_drowns(monkeypatch, gap, steps):
+    """Two causes that look alike while a third is missing are judged when it is there."""
+    problem = SimpleNamespace(known={}, subset=None)
+    screens = SimpleNamespace(best=lambda: [])
+    done = []
+
+    def explanation(causes, gap=0.0):
+        fit = SimpleNamespace(problem=problem, effects=(), released=(), point=None)
+        return SimpleNamespace(causes=causes, fit=fit, gap=gap)
+
+    def refits(current, *arguments):
+        done.append(current.causes)
+        if len(current.causes) == 2:
+            return [], None
+        best = explanation((*current.causes, "abc"[len(current.causes)]))
+        other = explanation((*current.causes, "x"), gap if not current.causes else 1e9)
+        return [best, other], explanation(current.causes, 1e6)
+
+    nothing = explanation((), 1e6)
+    for name, value in {
+        "refits": refits, "screen": lambda *a: screens, "score": lambda p, e: e.gap,
+        "tied": settled, "alike": drowned, "explained_away": lambda *a: True,
+        "shortlisted": lambda *a: [], "implausible": lambda fit: (), "ranking_of": lambda *a: (),
+        "pruned": lambda p, e: e, "exchanged": lambda e, *a: [e],
+        "_with_wandering_phase": lambda *a: None,
+    }.items():  # fmt: skip
+        monkeypatch.setattr(attribution, name, value)
+    begun = attribution.Attribution(nothing, (screens,), nothing, (), (), 0.0)
+    found = attribution.extended(begun, (), None)
+    assert len(found.accepted.causes) == steps
+    assert len(found.rivals) == (1 if steps == 1 else 0)

@@ -113,7 +113,12 @@ class PIDController:
     Args:
         gains: default: those that come with the package.
         period_s: control period of the environment (s).
+
+    Attributes:
+        speed_window: speed error (m/s) within which the integral of speed grows.
     """
+
+    speed_window = np.inf
 
     def __init__(self, gains: PIDGains | None = None, period_s: float = 0.1) -> None:
         self.gains = gains or tuned_gains()
@@ -138,19 +143,29 @@ class PIDController:
         return np.asarray(np.clip(actions, -1.0, 1.0), np.float32)
 
     def _block_displacement(self, seen: Seen) -> FloatArray:
+        return self._for_pitch(self._wanted_pitch(seen), seen) + self._for_depth(seen)
+
+    def _wanted_pitch(self, seen: Seen) -> FloatArray:
         gains = self.gains
         climb = np.clip(gains.depth * seen.depth_error, -gains.climb_limit, gains.climb_limit)
         climb = climb + seen.goal_depth_rate - gains.climb_damping * seen.depth_rate
         # Down is positive and so is the nose up.
-        pitch = -np.clip(climb / np.maximum(seen.surge, SLOWEST_SURGE), -0.5, 0.5)
+        return -np.clip(climb / np.maximum(seen.surge, SLOWEST_SURGE), -0.5, 0.5)
+
+    def _for_pitch(self, pitch: FloatArray, seen: Seen) -> FloatArray:
+        gains = self.gains
+        action = gains.pitch * pitch + gains.pitch_error * (pitch - seen.pitch)
+        return np.asarray(action - gains.pitch_rate * seen.pitch_rate)
+
+    def _for_depth(self, seen: Seen) -> FloatArray:
+        gains = self.gains
         self._depth = _integrated(
             self._depth,
             -gains.depth_integral * seen.depth_error * self.period_s,
             np.abs(seen.depth_error) < DEPTH_WINDOW,
             gains.depth_windup,
         )
-        action = gains.pitch * pitch + gains.pitch_error * (pitch - seen.pitch)
-        return np.asarray(action - gains.pitch_rate * seen.pitch_rate + self._depth)
+        return self._depth
 
     def _tail_offset(self, seen: Seen) -> FloatArray:
         gains = self.gains
@@ -169,7 +184,8 @@ class PIDController:
         rest = (seen.goal_speed <= 0.0) & (seen.speed_error <= 0.0)
         goal, error = (np.where(rest, 0.0, x + extra) for x in (seen.goal_speed, seen.speed_error))
         step = gains.speed_integral * error * self.period_s
-        self._speed = _integrated(self._speed, step, ~rest, SPEED_WINDUP)
+        grows = ~rest & (np.abs(error) < self.speed_window)
+        self._speed = _integrated(self._speed, step, grows, SPEED_WINDUP)
         action = (gains.frequency + 1.0) * goal / 0.1 - 1.0 + gains.speed * error + self._speed
         return np.where(rest, -1.0, action)
 

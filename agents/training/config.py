@@ -10,12 +10,12 @@ from typing import Any
 
 import yaml
 
-from agents.controllers.pid import GAIN_NAMES, LARGEST_EXTRA_SPEED
 from agents.evaluation.suites import load_suite
 from agents.policies.files import ACTIONS
 from agents.policies.history import HistorySpec
 from agents.policies.network import ACTIVATIONS
 from agents.training.schema import build
+from agents.training.teacher_gains import TEACHER_GAIN_NAMES
 from fish_env.envs.config_checks import is_number
 from fish_env.envs.options import env_options
 from fish_env.errors import ConfigError
@@ -128,26 +128,21 @@ class Imitation:
     Attributes:
         rounds: episodes that all fish swim for it, the first by the teacher; 0: none.
         epochs: passes through what was collected, after each round.
-        lead_s: how far the teacher looks ahead of the goal depth's rate (s).
-        hurry: speed beyond the goal where the teacher is short of force (m/s).
-        saving: speed below the goal elsewhere (m/s).
-        gains: gains of the teacher that differ from those of the PID controller.
+        gains: gains of the teacher that differ from those of the PID controller, see
+            :class:`agents.training.teacher_gains.TeacherGains`.
     """
 
     rounds: int = 0
     epochs: int = 8
-    lead_s: float = 0.0
-    hurry: float = LARGEST_EXTRA_SPEED
-    saving: float = 0.0
     gains: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         _check(self.rounds >= 0 and self.epochs > 0, "imitate: rounds >= 0 and epochs > 0")
-        least = min(self.lead_s, self.hurry, self.saving)
-        _check(least >= 0.0, "imitate: lead_s, hurry and saving must not be negative")
         for name, value in self.gains.items():
-            known = ", ".join(GAIN_NAMES)
-            _check(name in GAIN_NAMES, f"imitate.gains: unknown gain '{name}'; known: {known}")
+            known = ", ".join(TEACHER_GAIN_NAMES)
+            _check(
+                name in TEACHER_GAIN_NAMES, f"imitate.gains: unknown gain '{name}'; known: {known}"
+            )
             _check(is_number(value), f"imitate.gains.{name} must be a finite number")
 
 

@@ -1,53 +1,97 @@
-"""Who a training may begin from: the PID controller, told more than any fish can know.
+"""The teacher of an imitation: a controller that knows more than any fish can.
 
-It sees the true state, without noise or delay, and where the goal depth is going; it hurries while
-the weight block or the turn is at its limit, and saves speed otherwise. A network that is fitted to
-its actions but sees only what sensors show has to work all that out from the past (learning by
-cheating, Chen et al. 2019).
+It is the PID controller on the true state, without noise or delay; it knows which trim the fish
+has, looks ahead along the goals, and swims faster where the block or the turn is at its limit.
+What it does can be told from what sensors show over some time, which is what the learner works out.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import numpy.typing as npt
 
-from agents.controllers.pid import LARGEST_EXTRA_SPEED, PIDController, tuned_gains
+from agents.controllers.pid import PIDController
 from agents.controllers.seen import Seen
 from agents.training.config import Imitation
+from agents.training.course import Course
+from agents.training.teacher_gains import TeacherGains, teacher_gains
 from fish_env.envs.batch import FishBatch
 from fish_env.envs.layout import OBSERVATION, OUTPUTS
 from fish_env.envs.sb3 import FishVecEnv
 
 FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
-GOAL_DEPTH_RATE = 2
-"""Index of the rate of the goal depth in an observation."""
-FASTEST_BEND = 0.5
-"""Largest change of the goal's depth rate that is looked ahead for, scaled units a second; more is
-a step."""
-TURN_FROM, TURN_RANGE = 0.2, 0.3
-"""Heading error (rad) from which it hurries, and over which that becomes whole."""
+JUMP_OF_DEPTH, JUMP_OF_HEADING = 0.05, 0.3
+"""Largest smooth change of a goal's rate (m/s^2, rad/s^2)."""
+MOMENT, LIFT = "mass.static_moment_rest[0]", "mass.buoyancy"
 
 
-class HurryingPID(PIDController):
-    """The PID controller with a speed goal that is higher where control is short of force.
+class ForesightPID(PIDController):
+    """The PID controller with foresight, and with a speed goal that is higher where that helps.
 
     Args:
-        hurry: speed beyond the goal when it is (m/s).
-        saving: speed below the goal when it is not (m/s).
-        **gains: gains other than the tuned ones.
+        gains: see :class:`TeacherGains`.
     """
 
-    def __init__(self, hurry: float, saving: float, **gains: float) -> None:
-        self.hurry, self.saving = hurry, saving
-        super().__init__(replace(tuned_gains(), **gains))
+    gains: TeacherGains
+    speed_window = 0.04
+
+    def __init__(self, gains: TeacherGains) -> None:
+        self._depth_goal = Course(JUMP_OF_DEPTH, 0.1)
+        self._heading_goal = Course(JUMP_OF_HEADING, 0.1)
+        super().__init__(gains)
+
+    def reset(self, count: int) -> None:
+        """Episodes of ``count`` fish begin: forget the integrals and the goals' courses."""
+        super().reset(count)
+        self._depth_goal.reset(count)
+        self._heading_goal.reset(count)
+
+    def trim(self, moment: FloatArray, lift: FloatArray) -> None:
+        """Begins with a block where the fish's trim asks for it.
+
+        Args:
+            moment: (N,) static moment beyond the nominal fish's (kg m).
+            lift: (N,) displaced water beyond the nominal fish's (kg).
+        """
+        given = self.gains
+        block = given.trim_moment * moment + given.trim_lift * lift
+        self._depth = np.clip(block, -given.depth_windup, given.depth_windup)
+
+    def _block_displacement(self, seen: Seen) -> FloatArray:
+        given, goal = self.gains, self._depth_goal
+        goal.see(seen.goal_depth_rate)
+        later = goal.change_in(given.depth_ahead) - given.depth_ahead * seen.depth_rate
+        foreseen = seen._replace(
+            depth_error=seen.depth_error + later, goal_depth_rate=goal.rate_in(given.climb_ahead)
+        )
+        return self._for_pitch(self._wanted_pitch(foreseen), seen) + self._for_depth(seen)
+
+    def _tail_offset(self, seen: Seen) -> FloatArray:
+        goal = self._heading_goal
+        goal.see(seen.goal_heading_rate)
+        rate = goal.rate_in(self.gains.turn_ahead)
+        return super()._tail_offset(seen._replace(goal_heading_rate=rate))
 
     def _tail_frequency(self, seen: Seen, extra: FloatArray) -> FloatArray:
-        turn = np.clip((np.abs(seen.heading_error) - TURN_FROM) / TURN_RANGE, 0.0, 1.0)
-        share = np.maximum(extra / LARGEST_EXTRA_SPEED, turn)
-        return super()._tail_frequency(seen, share * self.hurry - (1.0 - share) * self.saving)
+        given = self.gains
+        haste = self._haste(seen, extra)
+        haste = haste - given.saving * (1.0 - np.minimum(haste / given.hurry, 1.0))
+        return super()._tail_frequency(seen, haste)
+
+    def _haste(self, seen: Seen, extra: FloatArray) -> FloatArray:
+        """Speed (m/s) beyond the goal that something asks for."""
+        given = self.gains
+        swing = given.swing_speed * (self._depth_goal.fastest - given.swing_from)
+        turn = (np.abs(seen.heading_error) - given.turn_from) / given.turn_range
+        far = given.far_speed * (np.abs(seen.depth_error) - given.far_from)
+        asked = (
+            np.minimum(extra, given.hurry),
+            np.clip(swing, 0.0, given.hurry),
+            given.turn_speed * np.clip(turn, 0.0, 1.0),
+            np.clip(far, 0.0, given.far_limit),
+        )
+        return np.asarray(np.maximum.reduce(asked))
 
 
 class Teacher:
@@ -59,27 +103,30 @@ class Teacher:
     """
 
     def __init__(self, parts: tuple[FishVecEnv, ...], settings: Imitation) -> None:
-        self._parts = parts
-        self._lead_s = settings.lead_s
-        self._pid = HurryingPID(settings.hurry, settings.saving, **settings.gains)
-        self._rate: FloatArray | None = None
+        self._batches = tuple(part.env.batch for part in parts)
+        self._pid = ForesightPID(teacher_gains(settings.gains))
 
     def reset(self, count: int) -> None:
-        """Episodes of all fish begin."""
+        """Episodes of all fish have begun."""
         self._pid.reset(count)
-        self._rate = None
+        moment, lift = (
+            np.concatenate([beyond(path, batch) for batch in self._batches])
+            for path in (MOMENT, LIFT)
+        )
+        self._pid.trim(moment, lift)
 
     def act(self, observations: Float32Array) -> Float32Array:
         """What it would do (N, 5), for the fish as they are and what their sensors show (N, 33)."""
-        ends = np.cumsum([part.num_envs for part in self._parts])[:-1]
-        rows = zip(np.split(observations, ends), self._parts, strict=True)
-        true = np.concatenate([true_observations(seen, part.env.batch) for seen, part in rows])
-        rate = true[:, GOAL_DEPTH_RATE].copy()
-        if self._rate is not None:
-            bend = (rate - self._rate) / self._pid.period_s
-            true[:, GOAL_DEPTH_RATE] += self._lead_s * np.clip(bend, -FASTEST_BEND, FASTEST_BEND)
-        self._rate = rate
-        return self._pid.act(true)
+        ends = np.cumsum([batch.count for batch in self._batches])[:-1]
+        rows = zip(np.split(observations, ends), self._batches, strict=True)
+        return self._pid.act(np.concatenate([true_observations(*row) for row in rows]))
+
+
+def beyond(path: str, batch: FishBatch) -> FloatArray:
+    """What each fish (N,) has beyond the nominal one of a parameter."""
+    nominal = batch.options.model.fish.get(path)
+    drawn = batch.drawn.get(path)
+    return np.zeros(batch.count) if drawn is None else drawn - nominal
 
 
 def true_observations(observations: Float32Array, batch: FishBatch) -> FloatArray:

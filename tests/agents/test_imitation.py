@@ -13,7 +13,8 @@ from agents.training.config import Evaluation, Imitation, TrainConfig
 from agents.training.imitation import Swim, _returns, imitate
 from agents.training.model import make_model
 from agents.training.stack import make_stack, seed_episodes
-from agents.training.teacher import HurryingPID, true_observations
+from agents.training.teacher import ForesightPID, beyond, true_observations
+from agents.training.teacher_gains import teacher_gains
 from agents.training.trial import try_policy
 from fish_env.errors import ConfigError
 
@@ -68,13 +69,77 @@ def test_the_teacher_sees_what_sensors_show_without_noise_and_delay(suite):
     assert exact == (suite == "calm")
 
 
-def test_the_teacher_hurries_in_a_turn_and_saves_speed_otherwise():
-    swift, plain = HurryingPID(0.015, 0.003), HurryingPID(0.0, 0.0)
-    frequency = {}
-    for name, error in (("on course", 0.0), ("in a turn", 1.0)):
-        seen = np.zeros((1, 33))
-        seen[0, [4, 6]], seen[0, [5, 7]] = np.sin(error), np.cos(error)
-        seen[0, [10, 12, 14, 15]] = 1.0, 1.0, 1.0, 0.5
-        frequency[name] = [pid.act(seen)[0, 2] for pid in (swift, plain)]
-    assert frequency["on course"][0] < frequency["on course"][1]
-    assert frequency["in a turn"][0] > frequency["in a turn"][1]
+def seen_on_course(**entries: float) -> np.ndarray:
+    """An observation (1, 33) of a fish that cruises at its goal, but for these entries."""
+    seen = np.zeros((1, 33))
+    seen[0, [5, 7, 10, 12, 14]] = 1.0
+    seen[0, 15] = 0.5
+    names = {"depth_error": 0, "goal_depth_rate": 2}
+    for name, value in entries.items():
+        seen[0, names[name]] = value
+    return seen
+
+
+def test_without_gains_of_its_own_the_teacher_is_nearly_the_pid_controller():
+    env = load_suite("calm").make("hold", 16, 1)
+    observations, _ = env.reset(seed=4)
+    teacher, pid = ForesightPID(teacher_gains({})), PIDController()
+    for agent in (teacher, pid):
+        agent.reset(16)
+    for _ in range(40):
+        wanted = pid.act(observations)
+        np.testing.assert_allclose(
+            teacher.act(observations)[:, [0, 1, 3, 4]], wanted[:, [0, 1, 3, 4]]
+        )
+        observations, *_ = env.step(wanted)
+
+
+@pytest.mark.parametrize(
+    ("gains", "why"),
+    [
+        ({"turn_speed": 0.01}, "turn"),
+        ({"far_speed": 0.1, "far_limit": 0.03}, "far"),
+        ({"swing_speed": 0.5}, "swing"),
+    ],
+)
+def test_the_teacher_hurries_where_it_is_told_to(gains, why):
+    seen = seen_on_course()
+    if why == "turn":
+        seen[0, [4, 6]], seen[0, [5, 7]] = np.sin(1.0), np.cos(1.0)
+    elif why == "far":
+        seen = seen_on_course(depth_error=0.6)
+    else:
+        seen = seen_on_course(goal_depth_rate=0.5)
+    plain, swift = (ForesightPID(teacher_gains(changes)) for changes in ({}, gains))
+    assert swift.act(seen)[0, 2] > plain.act(seen)[0, 2] + 0.01
+    level = seen_on_course()
+    assert swift.act(level)[0, 2] == pytest.approx(plain.act(level)[0, 2], abs=0.02)
+
+
+def test_the_teacher_saves_speed_on_course():
+    slow, plain = (ForesightPID(teacher_gains({"saving": x})) for x in (0.003, 0.0))
+    assert slow.act(seen_on_course())[0, 2] < plain.act(seen_on_course())[0, 2]
+
+
+def test_the_teacher_begins_with_the_trim_of_its_fish():
+    pid = ForesightPID(teacher_gains({"trim_lift": -500.0}))
+    pid.reset(3)
+    pid.trim(np.zeros(3), np.array([-1e-3, 0.0, 1.0]))
+    trimmed = pid._depth
+    np.testing.assert_allclose(
+        trimmed,
+        [
+            0.5 if pid.gains.depth_windup > 0.5 else pid.gains.depth_windup,
+            0.0,
+            -pid.gains.depth_windup,
+        ],
+    )
+
+
+def test_what_a_fish_has_beyond_the_nominal_one_is_told():
+    hard, calm = (load_suite(name).make("hold", 5, 1) for name in ("hard", "calm"))
+    for env in (hard, calm):
+        env.reset(seed=1)
+    mass = hard.batch.drawn["mass.buoyancy"]
+    np.testing.assert_allclose(beyond("mass.buoyancy", hard.batch), mass - 2.0)
+    assert not beyond("mass.buoyancy", calm.batch).any()

@@ -53,7 +53,7 @@ def test_a_shipped_configuration_reads_and_writes(name, tmp_path):
         ({"network": {"first_action": [0.0, 2.0, 0.0, 0.0, 0.0]}}, "first_action"),
         ({"network": {"first_action": [0.5]}}, "first_action"),
         ({"imitate": {"gains": {"depht": 1.0}}}, "unknown gain .depht."),
-        ({"imitate": {"lead_s": -1.0}}, "negative"),
+        ({"imitate": {"gains": {"hurry": "much"}}}, "finite number"),
         ({"history": {"frames": 0}}, "frames"),
         ({"history": {"low_pass_s": [0.01]}}, "low_pass_s"),
         ({"environment": {"curent": [0, 0, 0]}}, "unknown key 'curent'"),

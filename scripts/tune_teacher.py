@@ -1,0 +1,252 @@
+"""Tunes the teacher of `ppo-track` and prints the gains for configs/train/ppo-track.yaml.
+
+    python -m scripts.tune_teacher --generations 100 > gains.yaml
+
+Candidates of an evolution strategy (CMA-ES) swim side by side, each the same episodes; seeds are
+none of the suites', the trainings' or the evaluations on the side. Many of the episodes are picked
+for being difficult: those that the gains to begin with, or the PID controller, hold barely or not.
+Maximised is success, made smooth and with margins for the learner to lose, less depth and heading
+errors and power; power beyond that of the PID controller on the same episodes costs dearly.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import yaml
+
+from agents.controllers import PIDController
+from agents.evaluation.suites import RESERVED_SEEDS, load_suite
+from agents.training.config import load_train_config
+from agents.training.teacher import LIFT, MOMENT, ForesightPID, beyond, true_observations
+from agents.training.teacher_gains import TEACHER_GAIN_NAMES, TeacherGains, teacher_gains
+from scripts.tune_pid import BOUNDS
+
+FloatArray = npt.NDArray[np.float64]
+IntArray = npt.NDArray[np.int64]
+FIRST_SEED, CHECK_SEED = 6_000_000, 7_000_000
+"""Of the episodes that are tuned on, and of those that the result is checked on."""
+assert not {FIRST_SEED, CHECK_SEED} & set(RESERVED_SEEDS)
+ALL_BOUNDS = BOUNDS | {
+    "depth": (0.2, 3.0),
+    "pitch_error": (-1.0, 4.0),
+    "speed_for_climb": (0.0, 0.1),
+    "roll": (-2.5, 0.5),
+    "depth_ahead": (0.0, 3.0),
+    "climb_ahead": (0.0, 3.5),
+    "turn_ahead": (0.0, 1.5),
+    "trim_moment": (-3000.0, 3000.0),
+    "trim_lift": (-1000.0, 1000.0),
+    "hurry": (0.005, 0.018),
+    "saving": (0.0, 0.006),
+    "swing_from": (0.015, 0.05),
+    "swing_speed": (0.0, 2.0),
+    "turn_from": (0.02, 0.5),
+    "turn_range": (0.05, 0.6),
+    "turn_speed": (0.0, 0.06),
+    "far_from": (0.02, 0.15),
+    "far_speed": (0.0, 1.0),
+    "far_limit": (0.01, 0.06),
+}
+LOW, HIGH = np.array([ALL_BOUNDS[name] for name in TEACHER_GAIN_NAMES]).T
+MARGINS = {"depth": (0.044, 0.004), "heading": (0.065, 0.007), "speed": (0.018, 0.0007)}
+"""Largest late errors that count as success, less than the environment's, and how softly."""
+SETS = (
+    ("hard", "track", 44, True, 0.30),
+    ("calm", "track", 14, True, 0.12),
+    ("hard", "track", 24, False, 0.20),
+    ("calm", "hold", 12, False, 0.12),
+    ("hard", "hold", 12, False, 0.13),
+    ("hard", "hold", 20, True, 0.13),
+)
+"""Suite, task, episodes, whether they are picked for being difficult, weight."""
+
+
+class Scores(NamedTuple):
+    """Of each fish (N,): largest late errors (m, rad, m/s), rms errors, power (W), success."""
+
+    late: FloatArray
+    depth: FloatArray
+    heading: FloatArray
+    power: FloatArray
+    success: FloatArray
+
+
+class Trial:
+    """Episodes of one suite and task for many candidates side by side."""
+
+    def __init__(self, suite: str, task: str, seeds: IntArray, candidates: int) -> None:
+        given = load_suite(suite)
+        self.env = given.make(task, candidates * len(seeds), 1)
+        self.steps, self.shape = given.episode_steps, (candidates, len(seeds))
+        self.seeds = np.tile(seeds, candidates).tolist()
+
+    def teacher(self, gains: FloatArray) -> Scores:
+        """Of gains (candidates, names)."""
+        lanes = np.repeat(gains, self.shape[1], axis=0).T
+        pid = ForesightPID(TeacherGains(**dict(zip(TEACHER_GAIN_NAMES, lanes, strict=True))))
+        batch = self.env.batch
+
+        def begin() -> None:
+            pid.reset(batch.count)
+            pid.trim(beyond(MOMENT, batch), beyond(LIFT, batch))
+
+        return self.swim(begin, lambda seen: pid.act(true_observations(seen, batch)))
+
+    def pid(self) -> Scores:
+        """Of the PID controller."""
+        pid = PIDController()
+        return self.swim(lambda: pid.reset(self.env.num_envs), pid.act)
+
+    def swim(self, begin: Callable[[], None], act: Callable[..., npt.ArrayLike]) -> Scores:
+        """Of whatever acts on observations."""
+        observations, _ = self.env.reset(seed=self.seeds)
+        begin()
+        alive = np.ones(self.env.num_envs, bool)
+        kept: dict[str, list[FloatArray]] = {"depth": [], "heading": [], "speed": []}
+        power = np.zeros(self.env.num_envs)
+        for _ in range(self.steps):
+            observations, _, terminated, _, info = self.env.step(act(observations))
+            for name, values in kept.items():
+                values.append(np.abs(info[f"{name}_error"]))
+            power += info["power"] / self.steps
+            alive &= ~terminated
+        series = {name: np.array(values) for name, values in kept.items()}
+        late = np.stack([values[-100:].max(axis=0) for values in series.values()])
+        rms = {name: np.sqrt(np.mean(values**2, axis=0)) for name, values in series.items()}
+        late = np.where(alive, late, np.inf)
+        return Scores(late, rms["depth"], rms["heading"], power, info["is_success"] * alive)
+
+
+def merit(trial: Trial, gains: FloatArray, allowed_w: float) -> FloatArray:
+    """To be maximised, (candidates,)."""
+    scores = trial.teacher(gains)
+    soft = np.ones(len(scores.power))
+    for late, (limit, width) in zip(scores.late, MARGINS.values(), strict=True):
+        soft /= 1.0 + np.exp(np.clip((late - limit) / width, -30.0, 30.0))
+    each = soft - 10.0 * scores.depth - 0.04 * np.degrees(scores.heading) - 3.0 * scores.power
+    power = scores.power.reshape(trial.shape).mean(axis=1)
+    means = each.reshape(trial.shape).mean(axis=1)
+    return np.asarray(means - 20.0 * np.maximum(power - allowed_w, 0.0))
+
+
+def difficult(suite: str, task: str, first: int, count: int, gains: FloatArray) -> IntArray:
+    """Seeds of episodes that are held barely or not."""
+    trial = Trial(suite, task, np.arange(first, first + 40 * count), 1)
+    both = [trial.teacher(gains[None])] + ([trial.pid()] if task == "hold" else [])
+    limits = np.array([0.025, 0.05, 0.017])[:, None]
+    if task == "hold":
+        barely = np.any([scores.success == 0.0 for scores in both], axis=0)
+    else:
+        barely = (both[0].late > limits).any(axis=0)
+    return first + np.flatnonzero(barely)[:count]
+
+
+def evolve(
+    merits: Callable[[FloatArray], FloatArray], start: FloatArray, sigma: float, generations: int,
+    candidates: int, seed: int,
+) -> Iterator[tuple[FloatArray, float]]:  # fmt: skip
+    """CMA-ES as in Hansen's tutorial (arXiv:1604.00772): the mean and its merit, each generation.
+
+    Points lie in the unit cube; those outside are judged at its surface, with a penalty.
+    """
+    n, parents = len(start), candidates // 2
+    rng = np.random.default_rng(seed)
+    weights = np.log(parents + 0.5) - np.log(np.arange(1, parents + 1))
+    weights /= weights.sum()
+    mass = 1.0 / (weights**2).sum()
+    c_path = (4 + mass / n) / (n + 4 + 2 * mass / n)
+    c_sigma = (mass + 2) / (n + mass + 5)
+    c_one = 2 / ((n + 1.3) ** 2 + mass)
+    c_rank = min(1 - c_one, 2 * (mass - 2 + 1 / mass) / ((n + 2) ** 2 + mass))
+    damping = 1 + 2 * max(0.0, np.sqrt((mass - 1) / (n + 1)) - 1) + c_sigma
+    length = np.sqrt(n) * (1 - 1 / (4 * n) + 1 / (21 * n * n))
+    mean, covariance = start.copy(), np.eye(n)
+    path, path_sigma = np.zeros((2, n))
+    for generation in range(generations):
+        squares, axes = np.linalg.eigh(covariance)
+        spread = np.sqrt(np.maximum(squares, 1e-12))
+        steps = (rng.standard_normal((candidates, n)) * spread) @ axes.T
+        steps[0] = 0.0
+        points = mean + sigma * steps
+        inside = np.clip(points, 0.0, 1.0)
+        found = merits(inside) - ((points - inside) ** 2).sum(axis=1)
+        best = steps[np.argsort(-found)[:parents]]
+        move = weights @ best
+        mean = mean + sigma * move
+        yield np.clip(mean, 0.0, 1.0), float(found[0])
+        path_sigma = (1 - c_sigma) * path_sigma
+        path_sigma += np.sqrt(c_sigma * (2 - c_sigma) * mass) * axes @ ((axes.T @ move) / spread)
+        ratio = np.linalg.norm(path_sigma) / length
+        settled = ratio / np.sqrt(1 - (1 - c_sigma) ** (2 * generation + 2)) < 1.4 + 2 / (n + 1)
+        path = (1 - c_path) * path + settled * np.sqrt(c_path * (2 - c_path) * mass) * move
+        covariance = (1 - c_one - c_rank) * covariance + c_one * np.outer(path, path)
+        covariance += c_rank * (best.T * weights) @ best
+        sigma *= np.exp(c_sigma / damping * (ratio - 1))
+
+
+def tune(start: FloatArray, options: argparse.Namespace) -> FloatArray:
+    swims = []
+    for i, (suite, task, count, picked, weight) in enumerate(SETS):
+        first = FIRST_SEED + 100_000 * i
+        seeds = np.arange(first, first + count)
+        if picked:
+            seeds = difficult(suite, task, first, count, start)
+        allowed = 0.96 * float(Trial(suite, task, seeds, 1).pid().power.mean())
+        swims.append((Trial(suite, task, seeds, options.candidates), weight, allowed))
+
+    def merits(points: FloatArray) -> FloatArray:
+        gains = LOW + (HIGH - LOW) * points
+        return np.sum([weight * merit(trial, gains, w) for trial, weight, w in swims], axis=0)
+
+    first_point = np.clip((start - LOW) / (HIGH - LOW), 0.0, 1.0)
+    means = [first_point]
+    search = evolve(
+        merits, first_point, options.spread, options.generations, options.candidates, options.seed
+    )
+    for mean, value in search:
+        print(f"generation {len(means)}: {value:.4f}", file=sys.stderr)
+        means.append(mean)
+    return np.asarray(LOW + (HIGH - LOW) * means[-1])
+
+
+def check(label: str, gains: FloatArray, episodes: int) -> None:
+    """Says how gains do on episodes that were not tuned on."""
+    for suite in ("calm", "current", "noisy", "hard"):
+        for task in ("track", "hold"):
+            trial = Trial(suite, task, np.arange(CHECK_SEED, CHECK_SEED + episodes), 1)
+            for name, scores in ((label, trial.teacher(gains[None])), ("pid", trial.pid())):
+                print(
+                    f"{suite} {task} {name}: success {scores.success.mean():.3f}, "
+                    f"{100 * scores.depth.mean():.2f} cm, "
+                    f"{np.degrees(scores.heading.mean()):.2f} degrees, "
+                    f"{1000 * scores.power.mean():.1f} mW",
+                    file=sys.stderr,
+                )
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    add = parser.add_argument
+    add("--generations", type=int, default=100)
+    add("--candidates", type=int, default=32)
+    add("--check", type=int, default=500, help="episodes that the result is checked on")
+    add("--seed", type=int, default=0, help="of the search")
+    add("--start", default="ppo-track", help="training whose teacher is begun with")
+    add("--spread", type=float, default=0.05, help="of the first candidates, share of the bounds")
+    options = parser.parse_args(arguments)
+    known = teacher_gains(load_train_config(options.start).imitate.gains)
+    start = np.array([getattr(known, name) for name in TEACHER_GAIN_NAMES], float)
+    found = tune(start, options)
+    values = {n: float(f"{x:.4g}") for n, x in zip(TEACHER_GAIN_NAMES, found, strict=True)}
+    yaml.safe_dump({"gains": values}, sys.stdout, sort_keys=False)
+    check("teacher", found, options.check)
+
+
+if __name__ == "__main__":
+    main()

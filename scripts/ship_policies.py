@@ -1,6 +1,6 @@
 """Measures trained policies on the frozen suites and puts them, with cards, into the package.
 
-    python -m scripts.ship_policies out/train/ppo-track-seed-*
+    python -m scripts.ship_policies out/train/ppo-track-seed-* out/train/ppo-hold-all-seed-*
 
 Each folder is that of a finished training; what it trained becomes
 ``agents/pretrained/TASK/seed-SEED.npz``, for its own task or those given with --task.

@@ -1,9 +1,9 @@
-"""Tunes the teacher of `ppo-track` and prints the gains for configs/train/ppo-track.yaml.
+"""Tunes the teacher of a training and prints the gains for its configuration.
 
-    python -m scripts.tune_teacher --generations 100 > gains.yaml
+    python -m scripts.tune_teacher ppo-track --generations 100 > gains.yaml
 
 Candidates of an evolution strategy (CMA-ES) swim side by side, each the same episodes; seeds are
-none of the suites', the trainings' or the evaluations on the side. Many of the episodes are picked
+none of the suites', the trainings' or the evaluations on the side. Some of the episodes are picked
 for being difficult: those that the gains to begin with, or the PID controller, hold barely or not.
 Maximised is success, made smooth and with margins for the learner to lose, less depth and heading
 errors and power; power beyond that of the PID controller on the same episodes costs dearly.
@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -54,17 +55,48 @@ ALL_BOUNDS = BOUNDS | {
     "far_limit": (0.01, 0.06),
 }
 LOW, HIGH = np.array([ALL_BOUNDS[name] for name in TEACHER_GAIN_NAMES]).T
-MARGINS = {"depth": (0.044, 0.004), "heading": (0.065, 0.007), "speed": (0.018, 0.0007)}
-"""Largest late errors that count as success, less than the environment's, and how softly."""
-SETS = (
-    ("hard", "track", 44, True, 0.30),
-    ("calm", "track", 14, True, 0.12),
-    ("hard", "track", 24, False, 0.20),
-    ("calm", "hold", 12, False, 0.12),
-    ("hard", "hold", 12, False, 0.13),
-    ("hard", "hold", 20, True, 0.13),
-)
-"""Suite, task, episodes, whether they are picked for being difficult, weight."""
+
+
+@dataclass(frozen=True)
+class Aim:
+    """What is maximised for a task.
+
+    Attributes:
+        sets: suite, task, episodes, whether they are picked for being difficult, weight.
+        margins: largest late errors of depth (m), heading (rad) and speed (m/s) that count as
+            success, less than the environment's, and how softly.
+        weights: of success, of rms errors of depth (per m) and heading (per degree), of power
+            (per W).
+    """
+
+    sets: tuple[tuple[str, str, int, bool, float], ...]
+    margins: tuple[tuple[float, float], ...]
+    weights: tuple[float, float, float, float]
+
+
+AIMS = {
+    "track": Aim(
+        (
+            ("hard", "track", 44, True, 0.30),
+            ("calm", "track", 14, True, 0.12),
+            ("hard", "track", 24, False, 0.20),
+            ("calm", "hold", 12, False, 0.12),
+            ("hard", "hold", 12, False, 0.13),
+            ("hard", "hold", 20, True, 0.13),
+        ),
+        ((0.044, 0.004), (0.065, 0.007), (0.018, 0.0007)),
+        (1.0, 10.0, 0.04, 3.0),
+    ),
+    "hold": Aim(
+        (
+            ("hard", "hold", 28, False, 0.45),
+            ("calm", "hold", 24, False, 0.35),
+            ("hard", "hold", 14, True, 0.20),
+        ),
+        ((0.030, 0.004), (0.040, 0.006), (0.017, 0.0007)),
+        (0.5, 30.0, 0.06, 1.5),
+    ),
+}
 
 
 class Scores(NamedTuple):
@@ -123,16 +155,18 @@ class Trial:
         return Scores(late, rms["depth"], rms["heading"], power, info["is_success"] * alive)
 
 
-def merit(trial: Trial, gains: FloatArray, allowed_w: float) -> FloatArray:
+def merit(aim: Aim, trial: Trial, gains: FloatArray, allowed_w: float) -> FloatArray:
     """To be maximised, (candidates,)."""
     scores = trial.teacher(gains)
     soft = np.ones(len(scores.power))
-    for late, (limit, width) in zip(scores.late, MARGINS.values(), strict=True):
+    for late, (limit, width) in zip(scores.late, aim.margins, strict=True):
         soft /= 1.0 + np.exp(np.clip((late - limit) / width, -30.0, 30.0))
-    each = soft - 10.0 * scores.depth - 0.04 * np.degrees(scores.heading) - 3.0 * scores.power
-    power = scores.power.reshape(trial.shape).mean(axis=1)
+    success, depth, heading, power = aim.weights
+    each = success * soft - depth * scores.depth - power * scores.power
+    each -= heading * np.degrees(scores.heading)
+    used = scores.power.reshape(trial.shape).mean(axis=1)
     means = each.reshape(trial.shape).mean(axis=1)
-    return np.asarray(means - 20.0 * np.maximum(power - allowed_w, 0.0))
+    return np.asarray(means - 20.0 * np.maximum(used - allowed_w, 0.0))
 
 
 def difficult(suite: str, task: str, first: int, count: int, gains: FloatArray) -> IntArray:
@@ -190,9 +224,9 @@ def evolve(
         sigma *= np.exp(c_sigma / damping * (ratio - 1))
 
 
-def tune(start: FloatArray, options: argparse.Namespace) -> FloatArray:
+def tune(aim: Aim, start: FloatArray, options: argparse.Namespace) -> FloatArray:
     swims = []
-    for i, (suite, task, count, picked, weight) in enumerate(SETS):
+    for i, (suite, task, count, picked, weight) in enumerate(aim.sets):
         first = FIRST_SEED + 100_000 * i
         seeds = np.arange(first, first + count)
         if picked:
@@ -202,7 +236,7 @@ def tune(start: FloatArray, options: argparse.Namespace) -> FloatArray:
 
     def merits(points: FloatArray) -> FloatArray:
         gains = LOW + (HIGH - LOW) * points
-        return np.sum([weight * merit(trial, gains, w) for trial, weight, w in swims], axis=0)
+        return np.sum([weight * merit(aim, trial, gains, w) for trial, weight, w in swims], axis=0)
 
     first_point = np.clip((start - LOW) / (HIGH - LOW), 0.0, 1.0)
     means = [first_point]
@@ -215,37 +249,37 @@ def tune(start: FloatArray, options: argparse.Namespace) -> FloatArray:
     return np.asarray(LOW + (HIGH - LOW) * means[-1])
 
 
-def check(label: str, gains: FloatArray, episodes: int) -> None:
+def check(task: str, gains: FloatArray, episodes: int) -> None:
     """Says how gains do on episodes that were not tuned on."""
     for suite in ("calm", "current", "noisy", "hard"):
-        for task in ("track", "hold"):
-            trial = Trial(suite, task, np.arange(CHECK_SEED, CHECK_SEED + episodes), 1)
-            for name, scores in ((label, trial.teacher(gains[None])), ("pid", trial.pid())):
-                print(
-                    f"{suite} {task} {name}: success {scores.success.mean():.3f}, "
-                    f"{100 * scores.depth.mean():.2f} cm, "
-                    f"{np.degrees(scores.heading.mean()):.2f} degrees, "
-                    f"{1000 * scores.power.mean():.1f} mW",
-                    file=sys.stderr,
-                )
+        trial = Trial(suite, task, np.arange(CHECK_SEED, CHECK_SEED + episodes), 1)
+        for name, scores in (("teacher", trial.teacher(gains[None])), ("pid", trial.pid())):
+            print(
+                f"{suite} {task} {name}: success {scores.success.mean():.3f}, "
+                f"{100 * scores.depth.mean():.2f} cm, "
+                f"{np.degrees(scores.heading.mean()):.2f} degrees, "
+                f"{1000 * scores.power.mean():.1f} mW",
+                file=sys.stderr,
+            )
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     add = parser.add_argument
+    add("training", help="a shipped training, or its file: begin with its teacher")
     add("--generations", type=int, default=100)
     add("--candidates", type=int, default=32)
     add("--check", type=int, default=500, help="episodes that the result is checked on")
     add("--seed", type=int, default=0, help="of the search")
-    add("--start", default="ppo-track", help="training whose teacher is begun with")
     add("--spread", type=float, default=0.05, help="of the first candidates, share of the bounds")
     options = parser.parse_args(arguments)
-    known = teacher_gains(load_train_config(options.start).imitate.gains)
+    config = load_train_config(options.training)
+    known = teacher_gains(config.imitate.gains)
     start = np.array([getattr(known, name) for name in TEACHER_GAIN_NAMES], float)
-    found = tune(start, options)
+    found = tune(AIMS[config.task], start, options)
     values = {n: float(f"{x:.4g}") for n, x in zip(TEACHER_GAIN_NAMES, found, strict=True)}
     yaml.safe_dump({"gains": values}, sys.stdout, sort_keys=False)
-    check("teacher", found, options.check)
+    check(config.task, found, options.check)
 
 
 if __name__ == "__main__":

@@ -56,9 +56,8 @@ def imitate(model: PPO, stack: Stack, config: TrainConfig, settings: Imitation) 
     swims: list[Swim] = []
     for round_ in range(settings.rounds):
         swims.append(_swim(model, stack, teacher, rng, by_teacher=round_ == 0))
-        seen = np.concatenate([_rows(swim.seen) for swim in swims])
         wanted = np.concatenate([_rows(swim.wanted) for swim in swims])
-        _fit(model, _policy, outside.normalize_obs(seen), wanted, settings.epochs)
+        _fit(model, _policy, _normalised(outside, swims), wanted, settings.epochs)
     last, discount = swims[-1], config.ppo.gamma
     # The return of a step near the end is cut off by the end of the swim.
     whole = len(last.reward) - round(2.0 / (1.0 - discount))
@@ -86,6 +85,15 @@ def _swim(
 
 def _rows(values: Float32Array) -> Float32Array:
     return values.reshape(-1, values.shape[-1])
+
+
+def _normalised(outside: Any, swims: list[Swim]) -> Float32Array:
+    # A step at a time: of all at once there would be several copies of gigabytes.
+    steps = [step for swim in swims for step in swim.seen]
+    normal = np.empty((len(steps), *steps[0].shape), np.float32)
+    for into, step in zip(normal, steps, strict=True):
+        into[:] = outside.normalize_obs(step)
+    return _rows(normal)
 
 
 def _returns(swim: Swim, discount: float) -> FloatArray:

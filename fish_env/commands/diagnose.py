@@ -22,7 +22,7 @@ def diagnose_dataset(
     fish: str | None,
     quick: bool,
     seed: int,
-    measured_beats: bool,
+    measured_beats: bool = False,
 ) -> dict[str, Any]:
     """Diagnoses a dataset, prints the verdict and writes the files.
 

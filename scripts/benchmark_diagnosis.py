@@ -23,7 +23,7 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 from rich.progress import track  # noqa: E402
 
-from scripts.results import RESULTS, today, write_dated  # noqa: E402
+from scripts.results import RESULTS, commit, today, write_dated  # noqa: E402
 from tests.hidden.scoring import Row  # noqa: E402
 from tests.hidden.suite import FULL, PIPELINE, Job, do, jobs  # noqa: E402
 from tests.hidden.summary import markdown, summarise  # noqa: E402
@@ -40,7 +40,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if options.finished:
         todo = [job for job in todo if job.file.exists()]
     finished = track(run(todo, options.processes), f"{len(todo)} cases", total=len(todo))
-    write(sorted(finished, key=lambda row: (row.tier, row.seed)), options.out, options.quick)
+    rows = sorted(finished, key=lambda row: (row.tier, row.seed))
+    write(rows, options.seed0, options.out, options.quick)
 
 
 def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
@@ -76,10 +77,11 @@ def run(todo: list[Job], processes: int) -> Iterator[Row]:
             yield future.result()
 
 
-def write(rows: list[Row], folder: Path, quick: bool) -> None:
+def write(rows: list[Row], seed0: int, folder: Path, quick: bool) -> None:
     summary = summarise(rows)
-    page = f"# Hidden-effect suite, {today()}\n\n{len(rows)} cases.\n\n{markdown(summary)}"
-    content = {**summary, "rows": [asdict(row) for row in rows]}
+    said = f"{len(rows)} cases, numbered from {seed0} in each tier, diagnosed at {commit()}."
+    page = f"# Hidden-effect suite, {today()}\n\n{said}\n\n{markdown(summary)}"
+    content = {"seed0": seed0, **summary, "rows": [asdict(row) for row in rows]}
     write_dated(folder, "diagnosis-quick" if quick else "diagnosis", content, page)
     print(page)
 

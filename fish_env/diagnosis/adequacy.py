@@ -137,7 +137,7 @@ def adequacy(fit: Fit, rng: np.random.Generator, tolerated: float = 0.0) -> Adeq
     for column, signal in signals:
         function, direction = divmod(column, 6)
         amount = float(abs(signal.score[0] / signal.projected[0, 0])) * unit[direction]
-        found.append(Misfit(names[function], DIRECTIONS[direction], signal.p_value, amount))
+        found.append(Misfit(names[function], DIRECTIONS[direction], signal.log_p, amount))
     found.sort(key=lambda m: m.log_p)
     strongest = max((signal.statistic for _, signal in signals), default=0.0)
     reached = not found or found[0].log_p >= threshold or strongest < tolerated
@@ -148,7 +148,7 @@ def adequacy(fit: Fit, rng: np.random.Generator, tolerated: float = 0.0) -> Adeq
 def strongest_alarm(fit: Fit, rng: np.random.Generator) -> tuple[float, float]:
     """The smallest log p-value, and the threshold it has in white residuals: to calibrate by."""
     signals = [signal for _, signal in generic_forces(fit)[1]]
-    return min(s.p_value for s in signals), null_threshold(signals, rng, LEVEL)
+    return min(s.log_p for s in signals), null_threshold(signals, rng, LEVEL)
 
 
 def generic_forces(fit: Fit) -> tuple[list[str], list[tuple[int, Signal]]]:

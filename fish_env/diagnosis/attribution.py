@@ -239,7 +239,7 @@ def _with_wandering_phase(
 def _new(after: Screen, chosen: Sequence[Signal]) -> list[Signal]:
     """Effects that the first screen had not shown: the misfit then hid them."""
     known = {s.cause.name for s in chosen}
-    leading = [s for s in after.best() if s.p_value < after.threshold and s.cause.is_effect]
+    leading = [s for s in after.best() if s.log_p < after.threshold and s.cause.is_effect]
     return [s for s in leading if s.cause.name not in known][:3]
 
 
@@ -282,10 +282,10 @@ def shortlisted(
         found: coefficients in the present explanation.
     """
     strong = [s for s in screen.best() if s.statistic >= least]
-    effects = [s for s in strong if s.cause.is_effect and s.p_value < screen.threshold + lenience]
+    effects = [s for s in strong if s.cause.is_effect and s.log_p < screen.threshold + lenience]
     lifted = [s for s in strong if not s.cause.is_effect]
     enough = _threshold_of_coefficients(screen, found) + lenience
-    coefficients = [s for s in lifted if s.p_value < enough]
+    coefficients = [s for s in lifted if s.log_p < enough]
     first = problem.known.get(effects[0].cause.name) if effects else None
     alike = set(first.confusable_with) if first else set()
     like_first = [s for s in effects[count:] if s.cause.name in alike]

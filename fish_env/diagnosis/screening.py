@@ -73,8 +73,8 @@ class Signal:
         return self.statistic * self.inflation
 
     @property
-    def p_value(self) -> float:
-        """Of this one test, in logarithm, so that overwhelming evidence still ranks."""
+    def log_p(self) -> float:
+        """Logarithm of the p-value of this one test: overwhelming evidence still ranks."""
         return float(chi2.logsf(self.statistic, self.freedom))
 
     @cached_property
@@ -105,7 +105,7 @@ class Screen:
 
     def best(self) -> list[Signal]:
         """The best alternative of each cause, most significant first."""
-        return best_of_each(self.signals, lambda signal: signal.p_value)
+        return best_of_each(self.signals, lambda signal: signal.log_p)
 
 
 class Projector:
@@ -204,7 +204,7 @@ def zoomed(fit: Fit, signal: Signal) -> Signal:
     if not around:
         return signal
     close = Cause(cause.name, around)
-    return min((signal, *_effect_signals(fit, Projector(fit), [close])), key=lambda s: s.p_value)
+    return min((signal, *_effect_signals(fit, Projector(fit), [close])), key=lambda s: s.log_p)
 
 
 def _effect_signals(fit: Fit, projector: Projector, causes: Sequence[Cause]) -> list[Signal]:

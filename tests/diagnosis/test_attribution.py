@@ -30,7 +30,7 @@ def test_coefficients_after_the_first_are_judged_among_themselves():
     signals = [
         SimpleNamespace(
             cause=SimpleNamespace(name=f"parameter:{i}", is_effect=False),
-            p_value=p,
+            log_p=p,
             statistic=20.0,
         )
         for i, p in enumerate([-7.0, -5.5, -5.0, *[-1.0] * 37])
@@ -49,7 +49,7 @@ def test_what_looks_like_the_first_is_always_tried():
     names = ["servo_lag", "tether", "wave", "current", "tail_flexibility"]
     signals = [
         SimpleNamespace(
-            cause=SimpleNamespace(name=n, is_effect=True), p_value=-100.0 + i, statistic=90.0
+            cause=SimpleNamespace(name=n, is_effect=True), log_p=-100.0 + i, statistic=90.0
         )
         for i, n in enumerate(names)
     ]

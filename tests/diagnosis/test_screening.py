@@ -32,7 +32,7 @@ def alarms(problem, threshold, repeats=400, corrected=True, **data):
         if not corrected:
             for s in tested:
                 object.__setattr__(s, "inflation", 1.0)
-        found += min(s.p_value for s in tested) < threshold
+        found += min(s.log_p for s in tested) < threshold
     return found / repeats
 
 
@@ -71,7 +71,7 @@ def test_p_values_are_uniform_where_nothing_is_wrong(settings):
     for _ in range(500):
         signal = signals(problem.fit(rng), problem)[0]
         object.__setattr__(signal, "inflation", 1.0)
-        values.append(np.exp(signal.p_value))
+        values.append(np.exp(signal.log_p))
     assert kstest(values, "uniform").pvalue > 0.01
     assert kstest(np.array(values) ** 1.5, "uniform").pvalue < 0.01
 

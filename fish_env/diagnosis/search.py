@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +23,7 @@ from fish_env.identification.sketch import Sketch, Sketcher
 
 FloatArray = npt.NDArray[np.float64]
 Report = Callable[[str], None]
+T = TypeVar("T")
 WANDER = 0.3
 """rad/s^0.5. Enough to stay in step with a beat that is a tenth off."""
 FAR = 2.0
@@ -44,19 +46,20 @@ class Explanation:
     causes: tuple[str, ...]
     fit: Fit
 
+    @cached_property
+    def score(self) -> float:
+        """-2 log evidence (Laplace's approximation), but for a constant of the problem.
 
-def score(problem: Problem, explanation: Explanation) -> float:
-    """-2 log evidence (Laplace's approximation), but for a constant of the problem.
-
-    The misfit and the prior at the best fit, and what it costs that the data narrowed each
-    parameter so far from what was known: an effect may be anywhere in its plausible range, a
-    coefficient whose prior is lifted within :data:`REACH` deviations. Source: Kass and Raftery
-    (1995), "Bayes factors", JASA 90, eq. 3; differences of 6 they call strong.
-    """
-    own, known = explanation.fit, known_before(explanation)
-    lifted = [problem.baseline.paths.index(path) for path in own.released]
-    narrowed = np.linalg.slogdet(information(own.linearised.slopes, known))[1] - np.log(known).sum()
-    return float(own.objective + known[lifted] @ own.point.z[lifted] ** 2 + narrowed)
+        The misfit and the prior at the best fit, and what it costs that the data narrowed each
+        parameter so far from what was known: an effect may be anywhere in its plausible range, a
+        coefficient whose prior is lifted within :data:`REACH` deviations. Source: Kass and Raftery
+        (1995), "Bayes factors", JASA 90, eq. 3; differences of 6 they call strong.
+        """
+        own, known = self.fit, known_before(self)
+        lifted = [own.problem.baseline.paths.index(path) for path in own.released]
+        narrowed = np.linalg.slogdet(information(own.linearised.slopes, known))[1]
+        strained = known[lifted] @ own.point.z[lifted] ** 2
+        return float(own.objective + strained + narrowed - np.log(known).sum())
 
 
 def known_before(explanation: Explanation) -> FloatArray:
@@ -74,8 +77,8 @@ def known_before(explanation: Explanation) -> FloatArray:
     return known
 
 
-def reached(make: Callable[[], Fit]) -> Fit | None:
-    """A fit; None where the simulation diverges before it can begin."""
+def reached(make: Callable[[], T]) -> T | None:
+    """A fit or a sketch; None where the simulation diverges before it can begin."""
     try:
         return make()
     except np.linalg.LinAlgError:
@@ -208,7 +211,7 @@ def exchanged(current: Explanation, left: Sequence[Signal], report: Report) -> l
     if fitted is None:
         return [current]
     both = [current, Explanation(causes, fitted)]
-    return sorted(both, key=lambda e: score(own.problem, e))
+    return sorted(both, key=lambda e: e.score)
 
 
 def _exchange(sketcher: Sketcher, own: Fit, name: str, signal: Signal) -> Sketch | None:
@@ -217,10 +220,7 @@ def _exchange(sketcher: Sketcher, own: Fit, name: str, signal: Signal) -> Sketch
     effects = tuple(signal.cause.name if e == name else e for e in own.effects)
     sizes = _probed(own.problem, signal, every=True)
     begin = [Point(z, {**kept, **values}) for z in _baselines(own) for values in sizes]
-    try:
-        return sketcher.sketch(effects, own.released, begin)
-    except np.linalg.LinAlgError:
-        return None
+    return reached(lambda: sketcher.sketch(effects, own.released, begin))
 
 
 def without(current: Explanation, name: str) -> Explanation | None:
@@ -250,10 +250,8 @@ def _sketches(
     cause = signal.cause
     effects = (*base.effects, cause.name) if cause.is_effect else base.effects
     released = base.released if cause.is_effect else (*base.released, cause.path or "")
-    try:
-        return [(cause.name, sketcher.sketch(effects, released, begin))]
-    except np.linalg.LinAlgError:
-        return []
+    found = reached(lambda: sketcher.sketch(effects, released, begin))
+    return [] if found is None else [(cause.name, found)]
 
 
 def starts(base: Fit, signal: Signal, z: FloatArray | None = None) -> list[Point]:
@@ -329,7 +327,7 @@ def _best_first(tried: list[Explanation]) -> tuple[list[Explanation], NoiseModel
     """Explanations by score, the first with the noise it leaves, and the others under that."""
     leader = tried[0]
     problem = leader.fit.problem
-    ranked = sorted(tried, key=lambda e: score(problem, e))
+    ranked = sorted(tried, key=lambda e: e.score)
     if ranked[0] is leader:
         return ranked, leader.fit.noise
     first = _noise_too(problem, ranked[0].fit)

@@ -199,9 +199,8 @@ def _noise_at(problem: Problem, point: Point, noise: NoiseModel, final: bool) ->
     found = noise
     for _ in range(3):
         filtered, made_with = few.filtered(point, found, keep_slopes=True), found
-        replay = partial(
-            few.lean_filter.replay, filtered, made_with
-        )  # effects or not, it is the same
+        # The lean filter will do: covariances are replayed, and no effect is computed again.
+        replay = partial(few.lean_filter.replay, filtered, made_with)
         small = NoiseModel(found.sensor_sd, 3e-3, 1e-4, 1.0, found.phase_sd)
         start = max((found, small), key=replay)
         found = fit_noise(replay, start, within, 45, problem.sensor_sd if final else None)

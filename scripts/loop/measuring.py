@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import importlib
 import json
 import shutil
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,10 +14,9 @@ from fish_env.params import FishParams, load_fish, save_fish
 from scripts.loop.declaration import Declaration, HiddenFish
 from scripts.results import commit
 from tests.hidden.cases import make_case
+from tests.hidden.suite import PIPELINE, find
 from tests.hidden.truth import Truth
 
-Diagnose = Callable[..., Mapping[str, Any]]
-PIPELINE = "fish_env.diagnosis.pipeline:diagnose"
 SHOWN = ("verdict", "causes", "alternatives", "unexplained", "runtime_s")
 """What of a diagnosis goes into the results."""
 
@@ -79,10 +77,3 @@ def true_fish(truth: Truth) -> FishParams:
     """The hidden fish as the environment swims it."""
     fish = load_fish(truth.fish).replace(truth.coefficients)
     return replace(fish, name="hidden", effects=truth.effects)
-
-
-def find(name: str) -> Diagnose:
-    """The function that "module:function" names."""
-    module, function = name.split(":")
-    found: Diagnose = getattr(importlib.import_module(module), function)
-    return found

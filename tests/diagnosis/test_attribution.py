@@ -63,12 +63,12 @@ def test_what_looks_like_the_first_is_always_tried():
     assert shortlisted(problem, screen, 2, least=100.0) == []  # within the simulation's own error
 
 
-def settled(problem, best, other):
-    return other.gap < 6.0
+def settled(best, other):
+    return other.score < 6.0
 
 
-def drowned(problem, best, other):
-    return other.gap < 600.0
+def drowned(best, other):
+    return other.score < 600.0
 
 
 @pytest.mark.parametrize(("gap", "steps"), [(3.0, 1), (300.0, 2), (3000.0, 2)])
@@ -80,7 +80,7 @@ def test_a_tie_ends_the_search_but_not_a_difference_that_a_misfit_drowns(monkeyp
 
     def explanation(causes, gap=0.0):
         fit = SimpleNamespace(problem=problem, effects=(), released=(), point=None)
-        return SimpleNamespace(causes=causes, fit=fit, gap=gap)
+        return SimpleNamespace(causes=causes, fit=fit, score=gap)
 
     def refits(current, *arguments):
         done.append(current.causes)
@@ -92,10 +92,10 @@ def test_a_tie_ends_the_search_but_not_a_difference_that_a_misfit_drowns(monkeyp
 
     nothing = explanation((), 1e6)
     for name, value in {
-        "refits": refits, "screen": lambda *a: screens, "score": lambda p, e: e.gap,
+        "refits": refits, "screen": lambda *a: screens,
         "tied": settled, "alike": drowned, "explained_away": lambda *a: True,
         "shortlisted": lambda *a: [], "implausible": lambda fit: (), "ranking_of": lambda *a: (),
-        "pruned": lambda p, e: e, "exchanged": lambda e, *a: [e],
+        "pruned": lambda e: e, "exchanged": lambda e, *a: [e],
         "_with_wandering_phase": lambda *a: None,
     }.items():  # fmt: skip
         monkeypatch.setattr(attribution, name, value)

@@ -32,7 +32,7 @@ def test_a_cause_without_which_the_simulation_diverges_is_not_dropped(monkeypatc
     monkeypatch.setattr(search, "fit", diverge)
     both = Explanation(("a", "b"), fake())
     assert without(both, "a") is None
-    assert attribution.pruned(both.fit.problem, both) is both
+    assert attribution.pruned(both) is both
 
 
 def contest(monkeypatch, results):

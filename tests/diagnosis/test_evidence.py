@@ -7,7 +7,7 @@ import pytest
 
 from fish_env.diagnosis.attribution import alike, ranking_of
 from fish_env.diagnosis.left_out import left_out_scores
-from fish_env.diagnosis.search import REACH, Explanation, score
+from fish_env.diagnosis.search import REACH, Explanation
 from fish_env.identification.free import Linearised
 from tests.diagnosis.linear import COEFFICIENTS, LinearProblem, Sized
 
@@ -88,7 +88,7 @@ def data(seed=0, strength=0.0, memory=0.0):
 )
 def test_differences_of_scores_are_those_of_the_exact_evidence(effects, released):
     y = data(strength=1.5)
-    found = score(PROBLEM, explanation(y, effects, released)) - score(PROBLEM, explanation(y))
+    found = explanation(y, effects, released).score - explanation(y).score
     expected = exact(y, effects, released) - exact(y)
     assert found == pytest.approx(expected, abs=0.3)
     naked = explanation(y, effects, released).fit.objective - explanation(y).fit.objective
@@ -99,7 +99,7 @@ def test_an_effect_that_is_not_there_costs_more_than_it_gains():
     gains = []
     for seed in range(200):
         y = data(seed)
-        gains.append(score(PROBLEM, explanation(y)) - score(PROBLEM, explanation(y, ("first",))))
+        gains.append(explanation(y).score - explanation(y, ("first",)).score)
     assert np.mean(np.array(gains) > 0.0) < 0.05
     assert np.mean(gains) < -2.0
 
@@ -127,16 +127,16 @@ def test_the_ranking_is_by_runs_left_out_with_intervals_over_them():
 
 def pair(y):
     best, other = explanation(y, ("first",)), explanation(y, ("second",))
-    return best, other, score(PROBLEM, other) - score(PROBLEM, best)
+    return best, other, other.score - best.score
 
 
 def test_explanations_are_alike_unless_the_evidence_tells_them_apart():
     best, other, gap = pair(data(strength=0.5))
     assert gap < 6.0
-    assert alike(PROBLEM, best, other)
+    assert alike(best, other)
     best, other, gap = pair(data(strength=6.0))
     assert gap > 30.0
-    assert not alike(PROBLEM, best, other)
+    assert not alike(best, other)
 
 
 def test_coloured_residuals_tell_less():
@@ -151,7 +151,7 @@ def test_coloured_residuals_tell_less():
             for memory, found in ((0.0, white), (0.95, coloured)):
                 best, other, gap = pair(data(seed, 1.5, memory))
                 if 6.0 < gap < 40.0:
-                    found.append(alike(PROBLEM, best, other))
+                    found.append(alike(best, other))
     finally:
         COLUMNS.update(before)
     assert np.mean(white) < 0.3

@@ -20,12 +20,11 @@ from typing import Any
 
 from rich.console import Console
 
-from agents.controllers.pid import PIDController
 from scripts.bench.harness import machine, versions
 from scripts.loop.declaration import DECLARED, Declaration, load_declaration
 from scripts.loop.measuring import Known, measure_and_diagnose
 from scripts.loop.report import fish_entry, markdown, summarise
-from scripts.loop.training import ARMS, Score, judge, scored
+from scripts.loop.training import ARMS, Score, judge_beside, scored
 from scripts.results import today, write_dated
 from scripts.update_readme import updated
 from tests.hidden.suite import PIPELINE
@@ -102,7 +101,7 @@ def record_of(
         "suite": {"name": declared.suite.name, "episodes": declared.suite.episodes},
         "recipe": declared.recipe.tree(),
         "summary": summarise(declared, rows),
-        "pid": {fish.name: judge(declared, fish, PIDController()) for fish in known},
+        "beside": {fish.name: judge_beside(declared, fish) for fish in known},
         "scores": [asdict(row) for row in rows],
     }
 

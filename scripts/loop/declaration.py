@@ -15,6 +15,7 @@ from agents.training.config import TrainConfig, load_train_config
 from agents.training.schema import build
 from fish_env.envs.tasks import TASKS
 from fish_env.errors import ConfigError
+from fish_env.params.io import merged
 from tests.hidden.cases import NOMINAL
 from tests.hidden.plans import PLANS
 from tests.hidden.sizes import SIZES
@@ -103,6 +104,6 @@ def _hidden(file: Path, name: str, entry: Mapping[str, Any], printed: str) -> Hi
 
 
 def _recipe(file: Path, recipe: str, changes: Mapping[str, Any]) -> TrainConfig:
-    tree = {**load_train_config(recipe).tree(), **changes, "name": file.stem}
+    tree = merged(load_train_config(recipe).tree(), {**changes, "name": file.stem})
     config: TrainConfig = build(TrainConfig, tree, str(file))
     return config

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,17 @@ from agents.evaluation.labels import LABELS
 from scripts.loop.declaration import Declaration
 from scripts.loop.gains import Scores, difference, over_seeds, per_fish, share_closed
 from scripts.loop.measuring import Known
-from scripts.loop.training import ARMS, BASELINE, EXTENDED, POSTERIOR, TRUTH, Score
+from scripts.loop.training import (
+    ARMS,
+    BASELINE,
+    EXTENDED,
+    PID,
+    POSTERIOR,
+    SHIPPED,
+    TRUTH,
+    Means,
+    Score,
+)
 
 COMPARED = (
     (EXTENDED, BASELINE),
@@ -22,6 +32,8 @@ COMPARED = (
     (TRUTH, EXTENDED),
 )
 CLOSING = (EXTENDED, POSTERIOR)
+BESIDE = (PID, SHIPPED)
+MEAN = "mean of these"
 MORE_IS_BETTER = ("episode_return", "success_rate")
 
 
@@ -81,10 +93,11 @@ def markdown(record: dict[str, Any], declared: Declaration, rows: Sequence[Score
         f"### Each fish: {label} on `{declared.tasks[0]}`",
         "Mean over the seeds, in brackets their standard deviation; differences with their 95 % "
         "intervals over the seeds. No gap: its interval reaches zero.",
-        _each_fish(primary, [entry["name"] for entry in record["fish"]]),
+        _each_fish(primary, _beside(record["beside"], declared.tasks[0], declared.metrics[0])),
         "### Means over fish and seeds",
-        "Beside them the PID controller, tuned on the printed fish.",
-        _means_table(record["summary"], list(record["pid"].values())),
+        f"Beside them the PID controller, tuned on the printed fish, and the policies shipped for "
+        f"`{declared.tasks[0]}`, trained on many fish around it.",
+        _means_table(record["summary"], record["beside"]),
         "### Differences",
         "With 95 % intervals over the fish; in brackets, on how many of them it is better.",
         _differences_table(record["summary"], len(record["fish"])),
@@ -128,14 +141,26 @@ def _estimate(name: str, found: dict[str, Any]) -> str:
     return f"{name} {found['estimate']:.3g}, {low:.3g} to {high:.3g}"
 
 
-def _each_fish(scores: Scores, names: Sequence[str]) -> str:
+def _beside(
+    beside: Mapping[str, Mapping[str, Means]], task: str, metric: str
+) -> dict[str, dict[str, float]]:
+    """Fish -> who was not trained here -> one metric; the last row is the mean over the fish."""
+    rows = {
+        fish: {name: means[name][task][metric] for name in BESIDE} for fish, means in beside.items()
+    }
+    mean = {name: float(np.mean([row[name] for row in rows.values()])) for name in BESIDE}
+    return {**rows, MEAN: mean}
+
+
+def _each_fish(scores: Scores, beside: Mapping[str, Mapping[str, float]]) -> str:
     """A row for each fish, and one for the mean over them, seed by seed."""
     scores = {arm: np.vstack([v, v.mean(axis=0)]) for arm, v in scores.items()}
-    names = [*names, "mean of these"]
-    head = ("fish", *ARMS, "gap: truth - baseline", "gain: extended - baseline", "gain / gap (%)")
+    compared = ("gap: truth - baseline", "gain: extended - baseline", "gain / gap (%)")
+    head = ("fish", *ARMS, *BESIDE, *compared)
     rows = []
-    for i, name in enumerate(names):
+    for i, (name, others) in enumerate(beside.items()):
         cells = [f"{v[i].mean():.1f} ({v[i].std(ddof=1):.1f})" for v in scores.values()]
+        cells += [f"{value:.1f}" for value in others.values()]
         gap = over_seeds(scores, TRUTH, BASELINE, i)
         gain = over_seeds(scores, EXTENDED, BASELINE, i)
         share = f"{100 * gain.mean / gap.mean:.0f}" if gap.low > 0.0 else "no gap"
@@ -152,15 +177,17 @@ def _shown(metric: str, value: float, sign: str = "") -> str:
     return format(value, f"{sign}.{2 if abs(value) < 10 else 1}f")
 
 
-def _means_table(summary: Sequence[dict[str, Any]], pid: Sequence[dict[str, Any]]) -> str:
+def _means_table(
+    summary: Sequence[dict[str, Any]], beside: Mapping[str, Mapping[str, Means]]
+) -> str:
     rows = []
     for entry in summary:
         task, metric = entry["task"], entry["metric"]
         values = [entry["means"][arm] for arm in ARMS]
-        values.append(float(np.mean([means[task][metric] for means in pid])))
+        values += _beside(beside, task, metric)[MEAN].values()
         cells = [_shown(metric, value) for value in values]
         rows.append([task, LABELS[metric][0], *cells])
-    return _table(("task", "metric", *ARMS, "PID"), rows, left=2)
+    return _table(("task", "metric", *ARMS, *BESIDE), rows, left=2)
 
 
 def _differences_table(summary: Sequence[dict[str, Any]], fish: int) -> str:

@@ -16,9 +16,10 @@ from typing import Any
 
 import numpy as np
 
+from agents.controllers.pid import PIDController
 from agents.evaluation.metrics import METRICS
 from agents.evaluation.record import swim_suite
-from agents.policies import PretrainedPolicy
+from agents.policies import PretrainedPolicy, shipped
 from agents.registry import Agent
 from agents.training.config import TrainConfig
 from agents.training.run import train
@@ -34,6 +35,10 @@ ARMS: dict[str, str] = {
     TRUTH: "the hidden fish itself",
 }
 """What a policy is trained on. Without an extended model the designer only has the printed one."""
+PID, SHIPPED = "PID", "shipped"
+"""Who swims beside them, and was trained on none of these."""
+Means = Mapping[str, Mapping[str, float]]
+"""Task -> metric -> mean over the episodes."""
 
 
 class Quiet:
@@ -55,7 +60,7 @@ class Score:
         arm: what it was trained on.
         seed: of the training.
         trained_on: the arm whose policy it is; ``baseline`` where there is no extended model.
-        means: task -> metric -> mean over the episodes.
+        means: what it reached.
         cpu_s: processor time of training and judging spent for it; 0 for a policy trained before.
     """
 
@@ -63,7 +68,7 @@ class Score:
     arm: str
     seed: int
     trained_on: str
-    means: Mapping[str, Mapping[str, float]]
+    means: Means
     cpu_s: float
 
 
@@ -97,8 +102,19 @@ def scored(declared: Declaration, known: Known, arm: str, seed: int, work: Path)
     return Score(**kept(file, row))
 
 
-def judge(declared: Declaration, known: Known, agent: Agent) -> dict[str, dict[str, float]]:
-    """Task -> metric -> mean over the episodes of the suite, swum by the hidden fish."""
+def judge_beside(declared: Declaration, known: Known) -> dict[str, Means]:
+    """What the PID controller reaches, and the shipped policies of the first task in the mean."""
+    policies = [PretrainedPolicy.load(file) for file in shipped(declared.tasks[0])]
+    rows = [judge(declared, known, policy) for policy in policies]
+    shipped_means = {
+        task: {key: float(np.mean([row[task][key] for row in rows])) for key in declared.metrics}
+        for task in declared.tasks
+    }
+    return {PID: judge(declared, known, PIDController()), SHIPPED: shipped_means}
+
+
+def judge(declared: Declaration, known: Known, agent: Agent) -> Means:
+    """Means over the episodes of the suite, swum by the hidden fish."""
     environment = {**declared.suite.environment, "fish": str(known.true)}
     suite = replace(declared.suite, environment=environment)
     means = {}

@@ -39,6 +39,7 @@ def tiny(tmp_path_factory) -> Path:
     tree["training"]["changes"] |= {
         "total_steps": 512, "num_envs": 4, "checkpoint_every": 128,
         "ppo": {"n_steps": 32, "batch_size": 64, "n_epochs": 1},
+        "imitate": {"rounds": 2, "epochs": 1},
         "evaluation": {"every": 512, "episodes": 1},
     }  # fmt: skip
     file = folder / "tiny.yaml"

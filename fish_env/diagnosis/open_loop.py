@@ -15,7 +15,9 @@ from fish_env.model.state import BASE_STATES
 FloatArray = npt.NDArray[np.float64]
 
 
-def without_feedback(run: RunData, states: int = len(BASE_STATES), fine: bool = False) -> Filtered:
+def without_feedback(
+    run: RunData, states: int = len(BASE_STATES), corners: bool = False
+) -> Filtered:
     """Gains of zero, so that "innovations" are plain prediction errors."""
     samples, channels = run.measured.shape
     return Filtered(
@@ -25,15 +27,15 @@ def without_feedback(run: RunData, states: int = len(BASE_STATES), fine: bool = 
         np.zeros((samples, states)),
         np.zeros((samples, 6)),
         0.0,
-        fine=fine,
+        corners=corners,
     )
 
 
 def errors(problem: Problem, point: Point, noise: NoiseModel) -> list[FloatArray]:
     """Measured minus predicted of each run from its initial state, (T, C), NaN where missing."""
     effects = {path: np.array([value]) for path, value in point.effects.items()}
-    fine = problem.has_corners(point.effects)
-    still = [without_feedback(run, fine=fine) for run in problem.runs]
+    corners = problem.has_corners(point.effects)
+    still = [without_feedback(run, corners=corners) for run in problem.runs]
     flat = problem.innovations(point.z[:, None], effects, noise, still)[0]
     parts = np.split(flat, np.cumsum([run.measured.size for run in problem.runs])[:-1])
     return [

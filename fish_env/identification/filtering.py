@@ -66,7 +66,7 @@ class Filtered:
         wrench: (T, 6) filtered disturbance, body frame (N, N m).
         log_likelihood: without its constant.
         slopes: what another noise model's likelihood is computed from, if it was asked for.
-        fine: whether fine steps were taken everywhere.
+        corners: whether its steps are those of motion with corners.
     """
 
     gains: FloatArray
@@ -76,7 +76,7 @@ class Filtered:
     wrench: FloatArray
     log_likelihood: float
     slopes: Slopes | None = None
-    fine: bool = False
+    corners: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +131,7 @@ class RunFilter:
 
     def _history_rows(self, records: FloatArray, data: RunData) -> int:
         """Room for tail commands that come late."""
-        step = float(np.min(np.diff(data.clock) / data.fine_substeps[1:]))
+        step = float(np.min(np.diff(data.clock) / data.corner_substeps[1:]))
         return history_rows(self.kernels.longest_delay(records), step)
 
     def _starts(self, data: RunData, measurement: Measurement) -> FloatArray:
@@ -156,7 +156,7 @@ class RunFilter:
         measurement: Measurement,
         noise: NoiseModel,
         keep_slopes: bool = False,
-        fine: bool = False,
+        corners: bool = False,
     ) -> list[Filtered]:
         """Filter every run with one parameter set.
 
@@ -165,7 +165,7 @@ class RunFilter:
             measurement: for one lane.
             noise: noise model.
             keep_slopes: keep what :meth:`replay` needs.
-            fine: take fine steps everywhere.
+            corners: take the steps of motion with corners.
         """
         entry = self.kernels.entry("ekf_run")
 
@@ -186,13 +186,13 @@ class RunFilter:
             state0 = self._starts(data, measurement)[:, 0].copy()
             value = entry(
                 state0, record, measurement.pace[0], measurement.delay[0], measurement.gain[:, 0],
-                measurement.bias[:, 0], data.clock, steps_of(data, fine), data.command_times,
+                measurement.bias[:, 0], data.clock, steps_of(data, corners), data.command_times,
                 data.command_values, data.measured, self.codes, noise.sensor_sd**2,
                 data.covariance0, noise.wrench_variance, noise.correlation_s, noise.phase_sd**2,
                 self._history_rows(record, data), self.model.tables, k, w, e, x, d,
                 slopes.motion, slopes.channels, slopes.raw,
             )  # fmt: skip
-            return Filtered(k, w, e, x, d, float(value), slopes if keep_slopes else None, fine)
+            return Filtered(k, w, e, x, d, float(value), slopes if keep_slopes else None, corners)
 
         return list(_threads().map(one, self.runs))
 
@@ -254,7 +254,7 @@ class RunFilter:
             data, gains, out, basis, state0, first, last = job
             entry(
                 state0, records, measurement.pace, measurement.delay, measurement.gain,
-                measurement.bias, data.clock, steps_of(data, gains.fine), data.command_times,
+                measurement.bias, data.clock, steps_of(data, gains.corners), data.command_times,
                 data.command_values, data.measured, self.codes, gains.gains, gains.whitening,
                 noise.correlation_s, self._history_rows(records, data), basis, column, size,
                 self.model.tables, out, first, last,
@@ -286,9 +286,9 @@ def turned(quaternion: FloatArray, angle: FloatArray) -> FloatArray:
     return np.array([c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w])
 
 
-def steps_of(data: RunData, fine: bool) -> npt.NDArray[np.int64]:
+def steps_of(data: RunData, corners: bool) -> npt.NDArray[np.int64]:
     """(T,) RK4 steps up to each sample."""
-    return data.fine_substeps if fine else data.substeps
+    return data.corner_substeps if corners else data.substeps
 
 
 @cache

@@ -33,8 +33,8 @@ def settle_phases(problem: Problem, point: Point, noise: NoiseModel) -> Problem:
     trials = [trial for i in unknown for trial in _trials(problem.runs[i])]
     judge = RunFilter(problem.filter_for(point.effects).model, trials, problem.channels)
     record, measurement = problem.lane(point)
-    fine = problem.has_corners(point.effects)
-    values = [r.log_likelihood for r in judge.run(record, measurement, noise, fine=fine)]
+    corners = problem.has_corners(point.effects)
+    values = [r.log_likelihood for r in judge.run(record, measurement, noise, corners=corners)]
     best = np.argmax(np.reshape(values, (-1, PHASES)), axis=1)
     runs = list(problem.runs)
     for n, i in enumerate(unknown):

@@ -204,8 +204,8 @@ class Problem:
     ) -> list[Filtered]:
         """Extended Kalman filter of every run at one point."""
         record, measurement = self.lane(point)
-        fine = self.has_corners(point.effects)
-        return self.filter_for(point.effects).run(record, measurement, noise, keep_slopes, fine)
+        corners = self.has_corners(point.effects)
+        return self.filter_for(point.effects).run(record, measurement, noise, keep_slopes, corners)
 
     def with_plain_steps(self) -> Problem:
         """The same problem without finer steps for effects that make the tail's rate jump."""
@@ -214,7 +214,7 @@ class Problem:
         return other
 
     def has_corners(self, effects: Iterable[str]) -> bool:
-        """Whether one of these effect parameters asks for fine steps at any time."""
+        """Whether one of these effect parameters makes the tail's rate jump."""
         if self.plain_steps:
             return False
         names = effects_of(effects)

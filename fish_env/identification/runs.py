@@ -33,9 +33,13 @@ of a run from rest, the first samples judge nothing (s)."""
 SAME_INSTANT_S = 1e-6
 BEFORE_S = 1e3
 FREQUENCY = 2  # column of the commands
-FINE_STEP_S = 0.0025
 SWITCH_S = 0.04
 """After a switch of the commands a servo may move its tail as fast as it can: steps are fine."""
+FINE_STEP_S = 0.0025
+CORNER_STEP_S = 0.0025
+CORNER_FINE_STEP_S = 0.000625
+"""The same two where the tail's rate may jump at any time; just after a switch of the commands it
+may do so twice within a few milliseconds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +51,7 @@ class RunData:
         condition: repeats share it.
         clock: (T,) sample times from the first (s).
         substeps: (T,) RK4 steps up to each sample.
+        corner_substeps: (T,) the same for motion with corners.
         command_times: (m,) switch times on the same clock (s); the first may be long before it.
         command_values: (m, 5).
         measured: (T, C), NaN where missing.
@@ -61,6 +66,7 @@ class RunData:
     condition: str | None
     clock: FloatArray
     substeps: npt.NDArray[np.int64]
+    corner_substeps: npt.NDArray[np.int64]
     command_times: FloatArray
     command_values: FloatArray
     measured: FloatArray
@@ -68,11 +74,6 @@ class RunData:
     covariance0: FloatArray
     phase_known: bool
     as_measured: bool = True
-
-    @property
-    def fine_substeps(self) -> npt.NDArray[np.int64]:
-        """(T,) steps for motion with corners everywhere, not only where commands switch."""
-        return np.maximum(self.substeps, _steps(self.clock, FINE_STEP_S))
 
     @property
     def commands(self) -> tuple[FloatArray, FloatArray]:
@@ -111,7 +112,7 @@ def prepare_run(
         run.time_s - run.time_s[0], np.column_stack([run.channels[name] for name in channels])
     )
     switches = run.commands.times_s - run.time_s[0]
-    substeps = _steps(clock, np.where(_after(switches, clock), min(dt, FINE_STEP_S), dt))
+    fresh = _after(switches, clock)
     state0, covariance0 = _initial(run, channels, measured, clock, noise_sd)
     if run.start == "rest":
         measured[clock < UNTOLD_S] = np.nan
@@ -119,7 +120,8 @@ def prepare_run(
         run.id,
         run.condition,
         clock,
-        substeps,
+        _steps(clock, np.where(fresh, min(dt, FINE_STEP_S), dt)),
+        _steps(clock, np.where(fresh, min(dt, CORNER_FINE_STEP_S), min(dt, CORNER_STEP_S))),
         *_commands(run, switches),
         np.ascontiguousarray(measured),
         state0,

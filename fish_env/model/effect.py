@@ -110,8 +110,9 @@ class Effect:
         sample_time: (recorded time array, parameters) -> true time array (measurement).
         measure: (channel arrays by name, parameters) -> channel arrays (measurement).
         time_scale: parameters -> its fastest time constant (s); a physics step must not be longer.
-        step_error: share of its effect that steps of 2.5 ms get wrong, for an effect that makes the
-            tail's rate jump. Above zero, the identification takes such steps.
+        step_error: share of its effect that steps of 2.5 ms get wrong, and finer ones just after a
+            command, for an effect that makes the tail's rate jump. Above zero, the identification
+            takes such steps.
         equals: baseline coefficients (paths) other values of which do exactly the same.
         confusable_with: names of effects with a similar signature.
         file: source file, for effects that users bring.

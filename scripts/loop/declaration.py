@@ -48,6 +48,7 @@ class Declaration:
         tier: how they are measured, a tier of the hidden-effect suite.
         recipe: how policies are trained, on whichever fish.
         seeds: of the trainings.
+        spread: parameters of the fish around the printed one, each with its spread.
         suite: whose episodes the policies are judged on.
         tasks: the first is what the comparison is about.
         metrics: as for tasks.
@@ -58,6 +59,7 @@ class Declaration:
     tier: str
     recipe: TrainConfig
     seeds: tuple[int, ...]
+    spread: Mapping[str, Any]
     suite: Suite
     tasks: tuple[str, ...]
     metrics: tuple[str, ...]
@@ -82,6 +84,7 @@ def load_declaration(file: Path = DECLARED) -> Declaration:
         tree["tier"],
         _recipe(file, **tree["training"]),
         tuple(tree["seeds"]),
+        load_suite(tree["spread"]).environment["randomization"],
         load_suite(tree["suite"]),
         tuple(tree["tasks"]),
         tuple(tree["metrics"]),

@@ -2,8 +2,8 @@
 
 The hidden fish are the units of replication: they stand for all fish that a designer may have, so
 the spread of a difference from fish to fish says how sure its mean is. Seeds only make each fish's
-number more exact. The policies trained on the printed fish are the same for all hidden ones, so
-what chance made of them is common to all and does not show in that spread; it is added.
+number more exact. Policies trained without measurements are the same for all hidden fish, so what
+chance made of them is common to all and does not show in that spread; it is added.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy.typing as npt
 from scipy.stats import t as student
 
 from agents.evaluation.intervals import CONFIDENCE, Interval
-from scripts.loop.training import BASELINE, TRUTH
+from scripts.loop.training import BASELINE, TRUTH, WITHOUT_MEASUREMENTS
 
 FloatArray = npt.NDArray[np.float64]
 Scores = Mapping[str, FloatArray]
@@ -36,7 +36,8 @@ def difference(scores: Scores, arm: str, reference: str) -> Interval:
         reference: what it is compared with.
     """
     values = per_fish(scores, arm, reference)
-    shared = _shared(scores) if reference == BASELINE else 0.0
+    common = {arm, reference} & set(WITHOUT_MEASUREMENTS)
+    shared = sum(_shared(scores, name) for name in common)
     width = _quantile(len(values)) * np.sqrt(values.var(ddof=1) / len(values) + shared)
     mean = float(values.mean())
     return Interval(mean, mean - float(width), mean + float(width))
@@ -50,7 +51,7 @@ def share_closed(scores: Scores, arm: str) -> Interval:
     1954). Infinite where the gap itself could be zero.
     """
     gain, gap = per_fish(scores, arm, BASELINE), per_fish(scores, TRUTH, BASELINE)
-    covariance = np.cov(gain, gap) / len(gain) + _shared(scores)
+    covariance = np.cov(gain, gap) / len(gain) + _shared(scores, BASELINE)
     t2 = _quantile(len(gain)) ** 2
     mean, full = float(gain.mean()), float(gap.mean())
     # (mean - s full)^2 <= t2 var(gain - s gap) is a quadratic in s: a s^2 - 2 b s + c <= 0.
@@ -72,9 +73,9 @@ def over_seeds(scores: Scores, arm: str, reference: str, fish: int) -> Interval:
     return Interval(mean, mean - float(width), mean + float(width))
 
 
-def _shared(scores: Scores) -> float:
-    """Variance of the baseline's mean that all fish share: that of its policies."""
-    policies = scores[BASELINE].mean(axis=0)
+def _shared(scores: Scores, arm: str) -> float:
+    """Variance of an arm's mean that all fish share: that of its policies."""
+    policies = scores[arm].mean(axis=0)
     return float(policies.var(ddof=1) / len(policies))
 
 

@@ -18,6 +18,7 @@ from scripts.loop.training import (
     EXTENDED,
     PID,
     POSTERIOR,
+    RANDOMISED,
     SHIPPED,
     TRUTH,
     Means,
@@ -28,6 +29,8 @@ COMPARED = (
     (EXTENDED, BASELINE),
     (POSTERIOR, BASELINE),
     (TRUTH, BASELINE),
+    (RANDOMISED, BASELINE),
+    (EXTENDED, RANDOMISED),
     (POSTERIOR, EXTENDED),
     (TRUTH, EXTENDED),
 )

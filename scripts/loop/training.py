@@ -27,14 +27,18 @@ from scripts.loop.declaration import Declaration
 from scripts.loop.measuring import Known
 from scripts.results import kept
 
-BASELINE, EXTENDED, POSTERIOR, TRUTH = "baseline", "extended", "posterior", "truth"
+BASELINE, RANDOMISED = "baseline", "randomised"
+EXTENDED, POSTERIOR, TRUTH = "extended", "posterior", "truth"
 ARMS: dict[str, str] = {
     BASELINE: "the printed fish",
+    RANDOMISED: "fish around it, another in each episode",
     EXTENDED: "the extended model",
     POSTERIOR: "draws from its posterior, another in each episode",
     TRUTH: "the hidden fish itself",
 }
 """What a policy is trained on. Without an extended model the designer only has the printed one."""
+WITHOUT_MEASUREMENTS = (BASELINE, RANDOMISED)
+"""Arms whose policies are the same for all hidden fish."""
 PID, SHIPPED = "PID", "shipped"
 """Who swims beside them, and was trained on none of these."""
 Means = Mapping[str, Mapping[str, float]]
@@ -76,6 +80,8 @@ def fish_options(declared: Declaration, known: Known, arm: str) -> dict[str, Any
     """Options of the environment to train in."""
     if arm == TRUTH:
         return {"fish": str(known.true)}
+    if arm == RANDOMISED:
+        return {"fish": declared.printed, "randomization": declared.spread}
     if arm == BASELINE or known.extended is None:
         return {"fish": declared.printed}
     drawn = {"randomization": "posterior"} if arm == POSTERIOR else {}

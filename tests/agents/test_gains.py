@@ -7,6 +7,7 @@ from scipy.stats import ttest_1samp
 from agents.evaluation.intervals import Interval
 from scripts.loop import gains
 from scripts.loop.gains import difference, over_seeds, per_fish, share_closed
+from scripts.loop.training import WITHOUT_MEASUREMENTS
 
 FISH, SEEDS = 5, 5
 GAP, SHARE = 80.0, 0.8
@@ -57,7 +58,7 @@ def test_fish_times_seeds_as_units_would_be_too_sure():
 
 
 def test_leaving_out_that_fish_share_the_baselines_policies_would_be_too_sure(monkeypatch):
-    monkeypatch.setattr(gains, "_shared", lambda scores: 0.0)
+    monkeypatch.setattr(gains, "_shared", lambda scores, arm: 0.0)
     assert coverage(gain, GAP * SHARE, policies=60.0) < 0.85
 
 
@@ -89,3 +90,17 @@ def test_the_same_seeds_are_pairs_on_one_fish():
     values = scores["extended"][2] - scores["baseline"][2]
     low, high = ttest_1samp(values, 0.0).confidence_interval()
     assert over_seeds(scores, "extended", "baseline", 2)[1:] == pytest.approx((low, high))
+
+
+def test_two_arms_without_measurements_both_bring_their_chance():
+    """Neither differs from fish to fish: all that makes the interval is their policies."""
+    rng = np.random.default_rng(0)
+    arms = {arm: np.tile(rng.normal(0.0, 5.0, SEEDS), (FISH, 1)) for arm in WITHOUT_MEASUREMENTS}
+
+    def width(scores) -> float:
+        low, high = difference(scores, *WITHOUT_MEASUREMENTS)[1:]
+        return high - low
+
+    alone = [width({**arms, arm: np.zeros((FISH, SEEDS))}) for arm in WITHOUT_MEASUREMENTS]
+    assert min(alone) > 0.0
+    assert width(arms) == pytest.approx(np.hypot(*alone))

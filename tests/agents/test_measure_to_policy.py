@@ -110,7 +110,7 @@ def test_another_extended_model_is_trained_anew(finished, tiny, tmp_path):
     other.write_text(known.extended.read_text() + "\n# found again\n")
     again = scored(declared, replace(known, extended=other), "extended", 0, folder / "work")
     policies = folder / "work" / "policies"
-    assert len(list(policies.glob("0-*"))) == 1 + 3 * len(declared.fish) + 1
+    assert len(list(policies.glob("0-*"))) == 2 + 3 * len(declared.fish) + 1
     assert again.means == first.means
 
 

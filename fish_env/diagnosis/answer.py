@@ -22,6 +22,7 @@ from fish_env.diagnosis.entries import (
     precondition_entry,
 )
 from fish_env.diagnosis.regimes import as_plain
+from fish_env.diagnosis.screening import coefficient_sizes
 from fish_env.diagnosis.suitability import doubts
 from fish_env.identification.estimator import Fit
 
@@ -37,6 +38,7 @@ def as_dict(diagnosis: Diagnosis) -> Plain:
         for rival in diagnosis.attribution.rivals
         if rival.causes in verdict.alternatives
     ]
+    sizes = coefficient_sizes(diagnosis.attribution.screens[0])
     answer = {
         "format": FORMAT,
         "dataset": diagnosis.dataset.name,
@@ -48,7 +50,7 @@ def as_dict(diagnosis: Diagnosis) -> Plain:
         "verdict": verdict.name,
         "causes": [cause_entry(diagnosis.accepted, name) for name in verdict.causes],
         "alternatives": alternatives,
-        "parameters": coefficient_entries(diagnosis.accepted),
+        "parameters": coefficient_entries(diagnosis.accepted, sizes),
         "noise": _noise(diagnosis.accepted),
         "noise_floor": [noise_floor.as_dict(floor) for floor in diagnosis.floors],
         "consistency": consistency.as_dict(diagnosis.consistency),

@@ -69,8 +69,14 @@ def _estimate(fit: Identified, path: str, unit: str) -> Plain:
     return {"estimate": value, "ci95": list(fit.interval(path)), "unit": unit}
 
 
-def coefficient_entries(fit: Identified) -> list[Plain]:
-    """Every baseline coefficient: nominal, estimated, and how surprising under its prior."""
+def coefficient_entries(fit: Identified, detectable: Mapping[str, float]) -> list[Plain]:
+    """Every baseline coefficient: nominal, estimated, and how surprising under its prior.
+
+    Args:
+        fit: estimates.
+        detectable: path -> how far off it would be found, in prior standard deviations; a path
+            that is missing cannot be found.
+    """
     baseline = fit.problem.baseline
     return [
         {
@@ -80,10 +86,15 @@ def coefficient_entries(fit: Identified) -> list[Plain]:
             "ci95": list(fit.interval(path)),
             "prior_sd": float(baseline.sd[i]),
             "prior_sds_off": float((fit.estimates[i] - baseline.mean[i]) / baseline.sd[i]),
+            "smallest_detectable": _in_units(detectable.get(path), float(baseline.sd[i])),
             "unit": fit.problem.fish.info(path).unit,
         }
         for i, path in enumerate(baseline.paths)
     ]
+
+
+def _in_units(size: float | None, unit: float) -> float | None:
+    return None if size is None else size * unit
 
 
 def misfit_entry(misfit: Mapping[str, Pair]) -> Plain:

@@ -51,7 +51,6 @@ class RunData:
         condition: repeats share it.
         clock: (T,) sample times from the first (s).
         substeps: (T,) RK4 steps up to each sample.
-        corner_substeps: (T,) the same for motion with corners.
         command_times: (m,) switch times on the same clock (s); the first may be long before it.
         command_values: (m, 5).
         measured: (T, C), NaN where missing.
@@ -66,7 +65,6 @@ class RunData:
     condition: str | None
     clock: FloatArray
     substeps: npt.NDArray[np.int64]
-    corner_substeps: npt.NDArray[np.int64]
     command_times: FloatArray
     command_values: FloatArray
     measured: FloatArray
@@ -74,6 +72,14 @@ class RunData:
     covariance0: FloatArray
     phase_known: bool
     as_measured: bool = True
+
+    @property
+    def corner_substeps(self) -> npt.NDArray[np.int64]:
+        """(T,) steps for motion with corners: finer everywhere, and most where they are fine."""
+        spans = np.diff(self.clock, prepend=0.0)
+        fresh = spans <= self.substeps * FINE_STEP_S * (1.0 + 1e-6)
+        corner = _steps(self.clock, np.where(fresh, CORNER_FINE_STEP_S, CORNER_STEP_S))
+        return np.maximum(self.substeps, corner)
 
     @property
     def commands(self) -> tuple[FloatArray, FloatArray]:
@@ -112,7 +118,7 @@ def prepare_run(
         run.time_s - run.time_s[0], np.column_stack([run.channels[name] for name in channels])
     )
     switches = run.commands.times_s - run.time_s[0]
-    fresh = _after(switches, clock)
+    substeps = _steps(clock, np.where(_after(switches, clock), min(dt, FINE_STEP_S), dt))
     state0, covariance0 = _initial(run, channels, measured, clock, noise_sd)
     if run.start == "rest":
         measured[clock < UNTOLD_S] = np.nan
@@ -120,8 +126,7 @@ def prepare_run(
         run.id,
         run.condition,
         clock,
-        _steps(clock, np.where(fresh, min(dt, FINE_STEP_S), dt)),
-        _steps(clock, np.where(fresh, min(dt, CORNER_FINE_STEP_S), min(dt, CORNER_STEP_S))),
+        substeps,
         *_commands(run, switches),
         np.ascontiguousarray(measured),
         state0,

@@ -9,6 +9,9 @@ from scipy.stats import kstest
 from fish_env.diagnosis.causes import Cause, best_of_each
 from fish_env.diagnosis.screening import (
     Projector,
+    Screen,
+    Signal,
+    coefficient_sizes,
     confusability,
     null_threshold,
     smallest_detectable,
@@ -114,6 +117,24 @@ def test_the_smallest_detectable_size_is_found_four_times_in_five():
     half = alarms(problem, threshold, 400, corrected=False, added=0.5 * shift)
     assert power == pytest.approx(0.8, abs=0.06)
     assert half < 0.5
+
+
+@pytest.mark.parametrize("left", [0.3, 0.99])
+def test_a_coefficient_that_far_off_is_found_four_times_in_five(left):
+    """The posterior mean of what is off by z has mean z * left and variance left."""
+    path, rng = "tail.lift.c1", np.random.default_rng(0)
+
+    def found(score):
+        cause = Cause(f"parameter:{path}", path=path)
+        column = np.zeros((1, 1))
+        return Signal(cause, -1, column, 1.0, np.array([[left]]), np.array([score]), 1.0)
+
+    threshold = np.log(1e-3)
+    size = coefficient_sizes(Screen((found(0.0),), threshold, 0.05))[path]
+    means = size * left + np.sqrt(left) * rng.standard_normal(2000)
+    power = np.mean([found(mean).log_p < threshold for mean in means])
+    assert power == pytest.approx(0.8, abs=0.03)
+    assert size > 3.0  # what one of a thousand priors allows is no finding
 
 
 def test_confusability_of_equal_and_of_unlike_signals():

@@ -137,7 +137,7 @@ def admits(truth: Truth, verdict: str, diagnosis: Mapping[str, Any]) -> bool:
 
 
 def detectable_ratio(truth: Truth, diagnosis: Mapping[str, Any]) -> float | None:
-    """Largest ratio of a hidden departure to its smallest detectable one; the least of effects."""
+    """Largest ratio of a hidden departure to its smallest detectable one; the least of causes."""
     said = {entry["name"]: entry for entry in diagnosis.get("preconditions", ())}
     ratios = []
     for name, values in truth.effects.items():
@@ -150,6 +150,12 @@ def detectable_ratio(truth: Truth, diagnosis: Mapping[str, Any]) -> float | None
         if not known:
             return None
         ratios.append(max(known))
+    coefficients = {entry["name"]: entry for entry in diagnosis.get("parameters", ())}
+    for path, value in truth.moved.items():
+        said_of = coefficients.get(f"parameter:{path}", {})
+        if not said_of.get("smallest_detectable"):
+            return None
+        ratios.append(abs(value - said_of["nominal"]) / said_of["smallest_detectable"])
     return min(ratios) if ratios else None
 
 

@@ -260,6 +260,17 @@ def test_sizes_are_compared_with_the_published_smallest():
     assert score(truth, perfect(truth) | {"preconditions": [entry]}).above_detectable == 2.0
 
 
+def test_moved_coefficients_are_compared_too():
+    """The least of all counts; one that could not be found at any size leaves no ratio."""
+    truth = drawn("coefficients")
+    sizes = {"smallest_detectable": 0.25, "nominal": 0.0}
+    entries = [{"name": f"parameter:{path}", **sizes} for path in truth.moved]
+    least = min(abs(value) for value in truth.moved.values())
+    assert score(truth, silent("") | {"parameters": entries}).above_detectable == 4.0 * least
+    entries[0]["smallest_detectable"] = None
+    assert score(truth, silent("") | {"parameters": entries}).above_detectable is None
+
+
 def test_rates_carry_exact_intervals():
     """Clopper-Pearson: of none in 30, the upper end is 1 - 0.025^(1/30)."""
     none = rate([False] * 30)

@@ -306,9 +306,18 @@ def coefficients(answer: Answer, series: Series, folder: Path) -> str:
                 text(p["name"].removeprefix(PARAMETER)), number(p["nominal"]),
                 number(p["estimate"]), f"{number(low)} to {number(high)}", text(p.get("unit", "")),
                 "–" if moved is None else f"{moved:+.1f}",
+                number(p["smallest_detectable"]) if p.get("smallest_detectable") else "–",
             )
         )  # fmt: skip
-    heads = ("coefficient", "before", "found", "95 % interval", "unit", "moved (prior sd)")
+    heads = (
+        "coefficient",
+        "before",
+        "found",
+        "95 % interval",
+        "unit",
+        "moved (prior sd)",
+        "smallest change found",
+    )
     return section(
         "Coefficients",
         folded(f"All {len(rows)}, most moved first", table(heads, rows)) if rows else "",

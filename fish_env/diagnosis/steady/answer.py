@@ -17,6 +17,7 @@ from fish_env.diagnosis.entries import (
 )
 from fish_env.diagnosis.steady.attribution import Explanation
 from fish_env.diagnosis.steady.fitting import SteadyFit
+from fish_env.diagnosis.steady.screening import coefficient_sizes
 from fish_env.diagnosis.steady.table import UNITS
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ def as_dict(diagnosis: SteadyDiagnosis) -> Plain:
     """Everything that ``diagnosis.json`` holds."""
     verdict, accepted = diagnosis.verdict, diagnosis.accepted
     rivals = [r for r in diagnosis.attribution.rivals if r.causes in verdict.alternatives]
+    sizes = coefficient_sizes(diagnosis.attribution.screens[0])
     return {
         "format": FORMAT,
         "kind": "steady",
@@ -39,7 +41,7 @@ def as_dict(diagnosis: SteadyDiagnosis) -> Plain:
         "verdict": verdict.name,
         "causes": [cause_entry(accepted, name) for name in verdict.causes],
         "alternatives": [_explanation(rival) for rival in rivals],
-        "parameters": coefficient_entries(accepted),
+        "parameters": coefficient_entries(accepted, sizes),
         "noise": _noise(accepted),
         "misfit": misfit_entry(diagnosis.misfit),
         "gain": gain_entry(diagnosis.gain, UNITS),

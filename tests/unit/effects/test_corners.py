@@ -12,7 +12,7 @@ from fish_env.model.records import Tail
 
 
 def gain_of_the_rate(effect, setting, step, seconds=6.0):
-    """Error (rad, in the middle) of a rate summed with Runge-Kutta's weights, against its angle's gain."""
+    """Median error (rad) of a rate summed with Runge-Kutta's weights, against the angle's gain."""
     settings = SimpleNamespace(**setting)
 
     def stage(time, since, memory):

@@ -1,9 +1,10 @@
 """From measurement to policy: is a policy that learns on the diagnosed model better on the fish?
 
 Fish with undisclosed effects are measured and diagnosed; policies are trained on the printed fish,
-on the extended model that the diagnosis wrote, on draws from its posterior and, for comparison, on
-the hidden fish itself; all are judged on the hidden fish. What is compared was declared beforehand
-in scripts/loop/measure-to-policy.yaml; docs/measure-to-policy.md says what came of it.
+on fish around it, on the extended model that the diagnosis wrote, on draws from its posterior and,
+for comparison, on the hidden fish itself; all are judged on the hidden fish. What is compared was
+declared beforehand in scripts/loop/measure-to-policy.yaml; docs/measure-to-policy.md says what came
+of it.
 
     python -m scripts.measure_to_policy
 
@@ -32,6 +33,8 @@ from tests.hidden.suite import PIPELINE
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "measure-to-policy.md"
 NAME = "measure-to-policy"
+RESULT = f"{NAME}-from-teacher"
+"""The results under the bare name are of a first recipe, whose policies began from nothing."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -112,12 +115,12 @@ def write(
     """Writes the dated result, as numbers and as a page."""
     record = record_of(declared, known, rows)
     text = f"# From measurement to policy, {today()}\n\n{markdown(record, declared, rows)}\n"
-    return write_dated(folder, NAME, record, text)
+    return write_dated(folder, RESULT, record, text)
 
 
 def latest(folder: Path = ROOT / "results") -> str:
     """The tables of the latest result."""
-    *_, newest = sorted(folder.glob(f"{NAME}-[0-9]*.md"))
+    *_, newest = sorted(folder.glob(f"{RESULT}-[0-9]*.md"))
     return newest.read_text(encoding="utf-8").partition("\n")[2].strip()
 
 

@@ -98,8 +98,8 @@ def markdown(record: dict[str, Any], declared: Declaration, rows: Sequence[Score
         "intervals over the seeds. No gap: its interval reaches zero.",
         _each_fish(primary, _beside(record["beside"], declared.tasks[0], declared.metrics[0])),
         "### Means over fish and seeds",
-        f"Beside them the PID controller, tuned on the printed fish, and the policies shipped for "
-        f"`{declared.tasks[0]}`, trained on many fish around it.",
+        "Beside them the PID controller and the policies shipped for "
+        f"`{declared.tasks[0]}`, both made on the printed fish and many around it.",
         _means_table(record["summary"], record["beside"]),
         "### Differences",
         "With 95 % intervals over the fish; in brackets, on how many of them it is better.",

@@ -81,8 +81,8 @@ def strains(fit: Fit) -> tuple[str, ...]:
 def implausible(fit: Fit) -> tuple[str, ...]:
     """Numbers of the causes that nobody would believe: their nearest relative is what acts.
 
-    A coefficient more than :data:`FAR_OFF` prior deviations off, an effect of a sign that it
-    cannot have, or :data:`FAR_OFF` times as strong as the strongest that is plausible, or of a
+    A coefficient more than :data:`FAR_OFF` prior deviations off, or as far as physics lets it go (a
+    hull without lift); an effect of a sign that it cannot have, or :data:`FAR_OFF` times as strong as the strongest that is plausible, or of a
     shape far from the plausible ones. A coefficient that does what an effect does may go as far
     as the effect.
     """
@@ -91,7 +91,7 @@ def implausible(fit: Fit) -> tuple[str, ...]:
     found = [
         f"{path} {abs(z):.0f} prior standard deviations from where it is known to be"
         for path, z in zip(paths, fit.point.z, strict=True)
-        if path in set(fit.released) - effects_too and abs(z) > FAR_OFF
+        if path in set(fit.released) - effects_too and (abs(z) > FAR_OFF or path in fit.at_bounds)
     ]
     for name in fit.effects:
         for parameter in fit.problem.known[name].parameters:

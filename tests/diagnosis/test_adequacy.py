@@ -104,13 +104,13 @@ def test_a_wrench_below_the_noise_is_left_alone():
     assert adequacy(fit_with([("depth", 2, 0.02)]), np.random.default_rng(0)).reached
 
 
-def named(effects=(), released=(), z=0.0, interval=(0.0, 0.0)):
+def named(effects=(), released=(), z=0.0, interval=(0.0, 0.0), at_bounds=()):
     """What is read of a fit that names causes."""
     problem = SimpleNamespace(known=catalogue(), baseline=Sized(("tail.area", "mass.total")))
     value = sum(interval) / 2
     paths = {f"effects.{e}.{p.name}": value for e in effects for p in catalogue()[e].parameters}
     return SimpleNamespace(
-        problem=problem, effects=effects, released=released,
+        problem=problem, effects=effects, released=released, at_bounds=at_bounds,
         point=SimpleNamespace(z=np.array([z, 0.0]), effects=paths), interval=lambda path: interval,
     )  # fmt: skip
 
@@ -123,6 +123,14 @@ def test_a_coefficient_far_outside_its_prior_is_no_explanation():
     trimmed = named(released=("mass.buoyancy",), z=19.0)
     trimmed.problem.baseline = Sized(("mass.buoyancy", "mass.total"))
     assert implausible(trimmed) == ()  # a buoyancy_offset may be as large
+
+
+def test_a_coefficient_at_the_end_of_what_physics_allows_is_no_explanation():
+    """A hull without lift makes up for something else."""
+    stuck = named(released=("tail.area",), z=-6.0, at_bounds=("tail.area",))
+    (said,) = implausible(stuck)
+    assert "tail.area" in said
+    assert implausible(named(z=-4.9, at_bounds=("tail.area",))) == ()  # nothing claims it
 
 
 @pytest.mark.parametrize(

@@ -82,9 +82,9 @@ def implausible(fit: Fit) -> tuple[str, ...]:
     """Numbers of the causes that nobody would believe: their nearest relative is what acts.
 
     A coefficient more than :data:`FAR_OFF` prior deviations off, or as far as physics lets it go (a
-    hull without lift); an effect of a sign that it cannot have, or :data:`FAR_OFF` times as strong as the strongest that is plausible, or of a
-    shape far from the plausible ones. A coefficient that does what an effect does may go as far
-    as the effect.
+    hull without lift). An effect of a sign that it cannot have, or :data:`FAR_OFF` times as strong
+    as the strongest that is plausible, or of a shape far from the plausible ones. A coefficient
+    that does what an effect does may go as far as the effect.
     """
     paths = fit.problem.baseline.paths
     effects_too = {path for effect in fit.problem.known.values() for path in effect.equals}

@@ -94,7 +94,7 @@ def fit(
     names = problem.effects if effects is None else tuple(effects)
     free = Free(problem, names, released)
     given = start or problem.start
-    values = {**problem.neutral(names), **given.effects}
+    values = {**problem.beginning(names), **given.effects}
     vector = free.clip(free.pack(Point(given.z, values)))
     noise = noise or default_noise(problem)
     for round_ in range(rounds if refit_noise else 1):

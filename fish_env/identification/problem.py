@@ -70,6 +70,19 @@ def neutral_values(
     return values
 
 
+def finite_values(known: Mapping[str, Effect], values: Mapping[str, float]) -> dict[str, float]:
+    """Values of effects, with the mildest plausible one where they are infinite.
+
+    No derivative leads away from an infinite rate limit.
+    """
+    mildest = {
+        f"{PREFIX}{name}.{p.name}": p.plausible[1]
+        for name in effects_of(values)
+        for p in known[name].parameters
+    }
+    return {path: v if np.isfinite(v) else mildest[path] for path, v in values.items()}
+
+
 class Problem:
     """Measured runs of a fish, the model that should explain them, and its freedom.
 
@@ -166,8 +179,12 @@ class Problem:
 
     @property
     def start(self) -> Point:
-        """Nominal coefficients, effects at what the fish's file says."""
-        return Point(np.zeros(len(self.baseline)), self.neutral(self.effects))
+        """Nominal coefficients, effects where their estimates begin."""
+        return Point(np.zeros(len(self.baseline)), self.beginning(self.effects))
+
+    def beginning(self, names: Iterable[str]) -> dict[str, float]:
+        """Values of effects that estimates can begin from."""
+        return finite_values(self.known, self.neutral(names))
 
     def neutral(self, names: Iterable[str]) -> dict[str, float]:
         """Values of effects as the fish's file has them, neutral where it says nothing."""

@@ -94,6 +94,17 @@ def test_unknown_effects_are_refused():
         Problem(simulate(Setup(runs=1, duration=1.0)), effects=["tail_wobble"])
 
 
+def test_an_effect_that_is_off_at_infinity_begins_at_a_mild_size():
+    """No rate limit at all has no slope to follow; a tail that it does not hold back has none."""
+    problem = Problem(
+        simulate(Setup(runs=1, duration=4.0)), paths=PATHS, effects=["servo_rate_limit"]
+    )
+    assert problem.start.effects == {"effects.servo_rate_limit.rate": 8.0}
+    found = fit(problem, rounds=1, iterations=2)
+    assert np.isfinite(found.objective)
+    assert found.point.effects["effects.servo_rate_limit.rate"] > 3.0
+
+
 def test_default_noise_keeps_what_the_dataset_says():
     problem = Problem(simulate(Setup(runs=1, duration=1.0)), paths=PATHS)
     np.testing.assert_array_equal(default_noise(problem).sensor_sd, Setup().noise.sensor_sd)

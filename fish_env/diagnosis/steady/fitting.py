@@ -23,7 +23,7 @@ from fish_env.diagnosis.steady.scatter import (
 )
 from fish_env.effects.extended import PREFIX
 from fish_env.errors import DatasetError
-from fish_env.identification.problem import Point
+from fish_env.identification.problem import Point, finite_values
 
 FloatArray = npt.NDArray[np.float64]
 RELEASED = 0.1
@@ -186,7 +186,9 @@ def fit(
         DatasetError: the fish does not reach steady motion at the start.
     """
     point = start or problem.start
-    point = Point(point.z, {**problem.neutral(effects), **point.effects})
+    point = Point(
+        point.z, {**finite_values(problem.known, problem.neutral(effects)), **point.effects}
+    )
     orbits = problem.orbits([point], near)
     if not orbits.found.all():
         lost = problem.table.conditions[int(np.argmin(orbits.found))]

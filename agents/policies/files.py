@@ -30,6 +30,10 @@ FORMAT = "robofish-policy-1"
 ACTIONS = 5
 MOST_BYTES = 20_000_000
 """A policy file is some tens of kilobytes; a larger archive is not unpacked."""
+UNREADABLE = (
+    zipfile.BadZipFile, zlib.error, EOFError, OSError, ValueError, KeyError, RuntimeError,
+)  # fmt: skip
+"""What a damaged archive raises; RuntimeError where it seems encrypted or of a later ZIP."""
 Arrays = Mapping[str, npt.NDArray[Any]]
 
 
@@ -126,7 +130,7 @@ def _unpack(file: Path) -> dict[str, npt.NDArray[Any]]:
             raise ConfigError(f"{file}: {size} bytes unpacked; no policy is larger than 20 MB")
         with np.load(file, allow_pickle=False) as members:
             return {name: members[name] for name in members.files}
-    except (zipfile.BadZipFile, zlib.error, EOFError, OSError, ValueError, KeyError) as error:
+    except UNREADABLE as error:
         raise ConfigError(
             f"{file}: not a readable policy file ({error}); it is truncated, damaged or foreign"
         ) from None

@@ -134,6 +134,18 @@ def test_every_flipped_byte_is_harmless_or_refused(policy_file, tmp_path):
     assert refused > 100
 
 
+@pytest.mark.parametrize(("offset", "value"), [(6, 210), (8, 1)])
+def test_an_archive_that_seems_encrypted_or_of_a_later_zip_is_refused(
+    policy_file, tmp_path, offset, value
+):
+    content = bytearray(policy_file.read_bytes())
+    content[content.index(b"PK\x01\x02") + offset] = value
+    broken = tmp_path / "broken.npz"
+    broken.write_bytes(content)
+    with pytest.raises(ConfigError, match="damaged"):
+        read_policy(broken)
+
+
 class Trap:
     """Runs code when unpickled."""
 

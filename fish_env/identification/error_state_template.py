@@ -14,9 +14,11 @@ from fish_env.identification.filter_algebra import N_ERROR, angle, innovation
 
 # --- completed by compose ---
 from fish_env.model.composed import (
+    DX,
     N_PARAMETERS,
     N_STATES,
     PAR,
+    TAIL_ROWS,
     TIME,
     U_RATE,
     X0,
@@ -31,6 +33,12 @@ from fish_env.model.composed import (
 
 WRENCH = PAR + N_PARAMETERS - 6
 DIVERGED = 1e4
+PHASE = 13  # row of the tail's phase
+BASE = 18  # rows of the fish itself, before those of effects
+STEP_S = 0.01
+SETTLING_STEPS = 100
+SETTLING_S = STEP_S * SETTLING_STEPS
+"""A tail that was beating before its run has done so for this long: what rings has died away."""
 
 
 @kernel
@@ -112,6 +120,24 @@ def innovations_of(work, width, measured, codes, gain, bias, e):
 
 
 @kernel
+def turn_tail(work, width, error):
+    """Apply the error of the phase, to the phase and to what follows it.
+
+    A tail that bends or lags has been out of phase all along, so its states are where they would
+    be that much later in the beat. Else the phase would seem to act only once they have followed.
+    """
+    for j in range(TAIL_ROWS.shape[0]):
+        row = TAIL_ROWS[j]
+        for k in range(width):
+            turning = work[(DX + PHASE) * width + k]
+            if (turning > 0.0) & (error[18, k] != 0.0):
+                per_phase = work[(DX + row) * width + k] / turning
+                work[(X0 + row) * width + k] += per_phase * error[18, k]
+    for k in range(width):
+        work[(X0 + PHASE) * width + k] += error[18, k]
+
+
+@kernel
 def move(work, width, error):
     """Apply error states (19, width) to all lanes."""
     for j in range(3):
@@ -136,8 +162,7 @@ def move(work, width, error):
         for k in range(width):
             work[(X0 + 7 + j) * width + k] += error[6 + j, k]
             work[(WRENCH + j) * width + k] += error[12 + j, k]
-    for k in range(width):
-        work[(X0 + 13) * width + k] += error[18, k]
+    turn_tail(work, width, error)
 
 
 @kernel
@@ -208,11 +233,30 @@ def load_lane(work, width, k, state, par, row, first_command):
 
 
 @kernel
-def start_effects(work, width):
-    """Effect states where the start of a run leaves them (they live in the X rows)."""
+def initialise_effects(work, width):
+    """Effect states at rest (they live in the X rows)."""
     for n in range(N_STATES * width):
         work[X * width + n] = work[X0 * width + n]
     for k in range(width):
         lane_initialise(k, width, work)
     for n in range(N_STATES * width):
         work[X0 * width + n] = work[X * width + n]
+
+
+@kernel
+def start_effects(work, width, begin, swimming, pace, late, history, tables):
+    """Effect states where the start of a run leaves them, or where beating before it has."""
+    initialise_effects(work, width)
+    if swimming & (TAIL_ROWS.shape[0] > 0):
+        base = work[X0 * width : (X0 + BASE) * width].copy()
+        step_lanes_once(work, width, begin, STEP_S, pace, late, history, tables)
+        for n in range(BASE * width):
+            work[X0 * width + n] = base[n]
+        for k in range(width):  # as much earlier as the beat is going to last
+            work[(X0 + PHASE) * width + k] -= SETTLING_S * work[(DX + PHASE) * width + k]
+        initialise_effects(work, width)
+        for i in range(SETTLING_STEPS):
+            earlier = begin - SETTLING_S + i * STEP_S
+            step_lanes_once(work, width, earlier, STEP_S, pace, late, history, tables)
+        for n in range(BASE * width):
+            work[X0 * width + n] = base[n]

@@ -21,6 +21,7 @@ from fish_env.identification.filter_algebra import (
 
 # --- completed by compose ---
 from fish_env.model.composed import (
+    DX,
     LATE_TAIL,
     N_STATES,
     WORK_ROWS,
@@ -54,6 +55,7 @@ def slopes_of_interval(
     for j in range(N_STATES):
         for k in range(1, width):
             work[(X0 + j) * width + k] = work[(X0 + j) * width]
+            work[(DX + j) * width + k] = work[(DX + j) * width]
     for j in range(6):
         for k in range(1, width):
             work[(WRENCH + j) * width + k] = work[(WRENCH + j) * width]
@@ -73,14 +75,15 @@ def slopes_of_interval(
 
 @entry_point
 def ekf_run(
-    state0, par, pace_one, delay_one, gain, bias, clock, substeps, times, values, measured, codes,
-    noise_variance, covariance0, wrench_variance, wrench_decay_s, wander, history_rows, tables,
-    k_out, w_out, e_out, x_out, d_out, f_out, h_out, raw_out,
+    state0, swimming, par, pace_one, delay_one, gain, bias, clock, substeps, times, values,
+    measured, codes, noise_variance, covariance0, wrench_variance, wrench_decay_s, wander,
+    history_rows, tables, k_out, w_out, e_out, x_out, d_out, f_out, h_out, raw_out,
 ):  # fmt: skip
     """Extended Kalman filter over one run, relinearised at every sample.
 
     Args:
         state0: (states,) at the first sample.
+        swimming: whether the tail was beating before it.
         par: (parameters, 1) record, the wrench last.
         pace_one: true seconds per recorded second.
         delay_one: age of the measurements (s).
@@ -118,9 +121,9 @@ def ekf_run(
     at = np.zeros(width, np.int64)
     for k in range(width):
         load_lane(work, width, k, state0, par, 0, values[0])
-    start_effects(work, width)
     late = LATE_TAIL & (history_rows > 0)
     history = np.zeros((history_rows, width))
+    start_effects(work, width, clock[0], swimming, pace, late, history, tables)
     channels = codes.shape[0]
     p = covariance0.copy()
     f = np.zeros((N_MOVING, N_ERROR))
@@ -214,9 +217,9 @@ def take_sample(work, width, measured, codes, gain, bias, k_in, w_in, e, error, 
 
 @kernel
 def filter_block(
-    states0, par, pace_all, delay_all, gain_all, bias_all, clock, substeps, times, values, measured,
-    codes, k_in, w_in, wrench_decay_s, history_rows, push_basis, push_column, push_size, tables,
-    out, first, count,
+    states0, swimming, par, pace_all, delay_all, gain_all, bias_all, clock, substeps, times, values,
+    measured, codes, k_in, w_in, wrench_decay_s, history_rows, push_basis, push_column, push_size,
+    tables, out, first, count,
 ):  # fmt: skip
     """Lanes first..first+count through a run with given gains (see :func:`filter_lanes`)."""
     width = FILTER_LANES
@@ -233,9 +236,9 @@ def filter_block(
         shared &= (pace[k] == pace[0]) & (delay[k] == delay[0])
         for i in range(channels):
             gain[i, k], bias[i, k] = gain_all[i, lane], bias_all[i, lane]
-    start_effects(work, width)
     late = LATE_TAIL & (history_rows > 0)
     history = np.zeros((history_rows, width))
+    start_effects(work, width, clock[0], swimming, pace, late, history, tables)
     pushed = push_basis.shape[0] > 0
     e = np.zeros((channels, width))
     white = np.zeros((channels, width))
@@ -268,14 +271,15 @@ def filter_block(
 
 @entry_point
 def filter_lanes(
-    states0, par, pace, delay, gain, bias, clock, substeps, times, values, measured, codes, k_in,
-    w_in, wrench_decay_s, history_rows, push_basis, push_column, push_size, tables, out, first,
-    last,
+    states0, swimming, par, pace, delay, gain, bias, clock, substeps, times, values, measured,
+    codes, k_in, w_in, wrench_decay_s, history_rows, push_basis, push_column, push_size, tables,
+    out, first, last,
 ):  # fmt: skip
     """Whitened innovations of many parameter sets on one run, with the gains of one of them.
 
     Args:
         states0: (states, N) initial states.
+        swimming: whether the tail was beating before the run.
         par: (parameters, N) records, the wrench last (zero).
         pace: (N,) true seconds per recorded second.
         delay: (N,) age of the measurements (s).
@@ -301,8 +305,8 @@ def filter_lanes(
     """
     for block in range(first, last, FILTER_LANES):
         filter_block(
-            states0, par, pace, delay, gain, bias, clock, substeps, times, values, measured, codes,
-            k_in, w_in, wrench_decay_s, history_rows, push_basis, push_column, push_size, tables,
-            out, block, min(FILTER_LANES, last - block),
+            states0, swimming, par, pace, delay, gain, bias, clock, substeps, times, values,
+            measured, codes, k_in, w_in, wrench_decay_s, history_rows, push_basis, push_column,
+            push_size, tables, out, block, min(FILTER_LANES, last - block),
         )  # fmt: skip
     return 0

@@ -185,9 +185,10 @@ class RunFilter:
             )
             state0 = self._starts(data, measurement)[:, 0].copy()
             value = entry(
-                state0, record, measurement.pace[0], measurement.delay[0], measurement.gain[:, 0],
-                measurement.bias[:, 0], data.clock, steps_of(data, corners), data.command_times,
-                data.command_values, data.measured, self.codes, noise.sensor_sd**2,
+                state0, data.swimming, record, measurement.pace[0], measurement.delay[0],
+                measurement.gain[:, 0], measurement.bias[:, 0], data.clock,
+                steps_of(data, corners), data.command_times, data.command_values,
+                data.measured, self.codes, noise.sensor_sd**2,
                 data.covariance0, noise.wrench_variance, noise.correlation_s, noise.phase_sd**2,
                 self._history_rows(record, data), self.model.tables, k, w, e, x, d,
                 slopes.motion, slopes.channels, slopes.raw,
@@ -253,9 +254,10 @@ class RunFilter:
         ) -> None:
             data, gains, out, basis, state0, first, last = job
             entry(
-                state0, records, measurement.pace, measurement.delay, measurement.gain,
-                measurement.bias, data.clock, steps_of(data, gains.corners), data.command_times,
-                data.command_values, data.measured, self.codes, gains.gains, gains.whitening,
+                state0, data.swimming, records, measurement.pace, measurement.delay,
+                measurement.gain, measurement.bias, data.clock,
+                steps_of(data, gains.corners), data.command_times, data.command_values,
+                data.measured, self.codes, gains.gains, gains.whitening,
                 noise.correlation_s, self._history_rows(records, data), basis, column, size,
                 self.model.tables, out, first, last,
             )  # fmt: skip

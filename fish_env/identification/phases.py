@@ -1,22 +1,30 @@
-"""The tail's phase at the start of a run, where the record does not say: the likeliest of twelve.
+"""The tail's phase at the start of a run, where the record does not say: the likeliest of many.
 
-The filter follows a phase that is roughly right by itself; one that is half a beat off it never
-puts right. So each run's beginning is filtered from twelve phases, and the likeliest is kept.
+The filter follows a phase that is nearly right by itself; one that is half a beat off it never
+puts right. So each run's beginning is filtered from phases all round and then around the best.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 
 from fish_env.identification.filtering import NoiseModel, RunFilter
 from fish_env.identification.problem import Point, Problem
 from fish_env.identification.runs import FREQUENCY, RunData
 
-PHASES = 12
+FloatArray = npt.NDArray[np.float64]
+COARSE = np.arange(24, dtype=np.float64) * (np.pi / 12.0)
+FINE = np.arange(-2, 3, dtype=np.float64) * 0.065
+"""Phases tried: all round, then around the best (rad)."""
+COARSE_SD, FINE_SD = 0.15, 0.08
+"""How far the filter may take the phase to be off (rad). Where that is much, the first samples turn
+it by what else they do not fit, and it has been settled wrongly before they are understood."""
 WINDOW_S = 3.0
-AMPLITUDE, PHASE = 1, 13
+AMPLITUDE, PHASE, PHASE_ERROR = 1, 13, 18
 
 
 def settle_phases(problem: Problem, point: Point, noise: NoiseModel) -> Problem:
@@ -30,33 +38,48 @@ def settle_phases(problem: Problem, point: Point, noise: NoiseModel) -> Problem:
     unknown = [i for i, run in enumerate(problem.runs) if not run.phase_known]
     if not unknown:
         return problem
-    trials = [trial for i in unknown for trial in _trials(problem.runs[i])]
+    runs = list(problem.runs)
+    rough = [(run, COARSE) for run in (runs[i] for i in unknown)]
+    found = _likeliest(problem, point, noise, rough, COARSE_SD)
+    close = [(runs[i], phase + FINE) for i, phase in zip(unknown, found, strict=True)]
+    for i, phase in zip(unknown, _likeliest(problem, point, noise, close, FINE_SD), strict=True):
+        runs[i] = _starting(runs[i], phase, FINE_SD)
+    return problem.with_runs(runs)
+
+
+def _likeliest(
+    problem: Problem,
+    point: Point,
+    noise: NoiseModel,
+    tried: Sequence[tuple[RunData, FloatArray]],
+    spread: float,
+) -> list[float]:
+    """The likeliest of the phases tried for each run."""
+    trials = [_starting(_beginning(run), phase, spread) for run, own in tried for phase in own]
     judge = RunFilter(problem.filter_for(point.effects).model, trials, problem.channels)
     record, measurement = problem.lane(point)
     corners = problem.has_corners(point.effects)
     values = [r.log_likelihood for r in judge.run(record, measurement, noise, corners=corners)]
-    best = np.argmax(np.reshape(values, (-1, PHASES)), axis=1)
-    runs = list(problem.runs)
-    for n, i in enumerate(unknown):
-        runs[i] = replace(runs[i], state0=trials[n * PHASES + int(best[n])].state0)
-    return problem.with_runs(runs)
+    best = np.argmax(np.reshape(values, (len(tried), -1)), axis=1)
+    return [float(own[i]) for (_, own), i in zip(tried, best, strict=True)]
 
 
-def _trials(run: RunData) -> list[RunData]:
-    """The beginning of a run, up to some seconds after its tail starts to beat, in all phases."""
+def _starting(run: RunData, phase: float, spread: float) -> RunData:
+    """The run with a starting phase (rad), known to within a spread (rad)."""
+    state, covariance = run.state0.copy(), run.covariance0.copy()
+    state[PHASE] = phase
+    covariance[PHASE_ERROR, PHASE_ERROR] = spread**2
+    return replace(run, state0=state, covariance0=covariance)
+
+
+def _beginning(run: RunData) -> RunData:
+    """The beginning of a run, up to some seconds after its tail starts to beat."""
     beats = run.command_values[:, AMPLITUDE] * run.command_values[:, FREQUENCY] > 0
     first = max(0.0, float(run.command_times[np.argmax(beats)])) if beats.any() else 0.0
     count = max(2, int(np.searchsorted(run.clock, first + WINDOW_S, side="right")))
-    trials = []
-    for phase in np.arange(PHASES) * 2.0 * np.pi / PHASES:
-        state = run.state0.copy()
-        state[PHASE] = phase
-        short = replace(
-            run,
-            clock=run.clock[:count],
-            substeps=run.substeps[:count],
-            measured=np.ascontiguousarray(run.measured[:count]),
-            state0=state,
-        )
-        trials.append(short)
-    return trials
+    return replace(
+        run,
+        clock=run.clock[:count],
+        substeps=run.substeps[:count],
+        measured=np.ascontiguousarray(run.measured[:count]),
+    )

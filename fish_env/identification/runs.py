@@ -57,6 +57,7 @@ class RunData:
         state0: (18,) initial base state.
         covariance0: (19, 19) of its error state.
         phase_known: whether the tail phase at the start is known.
+        swimming: whether the tail was beating before the run began.
         as_measured: whether position and heading of the initial state are as the samples show them,
             with whatever distorts those; otherwise they are true.
     """
@@ -71,6 +72,7 @@ class RunData:
     state0: FloatArray
     covariance0: FloatArray
     phase_known: bool
+    swimming: bool = False
     as_measured: bool = True
 
     @property
@@ -132,6 +134,7 @@ def prepare_run(
         state0,
         covariance0,
         run.tail_phase is not None,
+        run.start != "rest",
     )
 
 

@@ -143,7 +143,7 @@ def detectable_ratio(truth: Truth, diagnosis: Mapping[str, Any]) -> float | None
     for name, values in truth.effects.items():
         smallest = said.get(name, {}).get("smallest_detectable") or {}
         known = [
-            departure(name, key, values[key]) / size
+            multiple(name, key, values[key], size)
             for key, size in smallest.items()
             if key in values and size and math.isfinite(size)
         ]
@@ -157,6 +157,18 @@ def detectable_ratio(truth: Truth, diagnosis: Mapping[str, Any]) -> float | None
             return None
         ratios.append(abs(value - said_of["nominal"]) / said_of["smallest_detectable"])
     return min(ratios) if ratios else None
+
+
+def multiple(effect: str, key: str, value: float, size: float) -> float:
+    """How many times the size a parameter is; what is off at infinity acts the more the less it is.
+
+    A rate limit of 3 rad/s is twice what can just be found if that is one of 6 rad/s.
+    """
+    return (
+        departure(effect, key, value) / size
+        if math.isfinite(LIBRARY[effect][key])
+        else size / value
+    )
 
 
 def departure(effect: str, key: str, value: float) -> float:

@@ -260,6 +260,14 @@ def test_sizes_are_compared_with_the_published_smallest():
     assert score(truth, perfect(truth) | {"preconditions": [entry]}).above_detectable == 2.0
 
 
+def test_what_is_off_at_infinity_is_larger_where_it_is_less():
+    truth = drawn("small", list(SIZES).index("servo_rate_limit"))
+    rate = truth.effects["servo_rate_limit"]["rate"]
+    entry = {"name": "servo_rate_limit", "smallest_detectable": {"rate": 3.0 * rate}}
+    found = score(truth, perfect(truth) | {"preconditions": [entry]}).above_detectable
+    assert found == pytest.approx(3.0)
+
+
 def test_moved_coefficients_are_compared_too():
     """The least of all counts; one that could not be found at any size leaves no ratio."""
     truth = drawn("coefficients")

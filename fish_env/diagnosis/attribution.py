@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.stats import chi2
 from scipy.stats import t as student
 
 from fish_env.diagnosis.adequacy import implausible, strains
-from fish_env.diagnosis.causes import Cause, same
+from fish_env.diagnosis.causes import PARAMETER, Cause, same
 from fish_env.diagnosis.effort import FULL, Effort
 from fish_env.diagnosis.left_out import left_out_scores
 from fish_env.diagnosis.screening import Projector, Screen, Signal, screen
@@ -22,6 +23,7 @@ from fish_env.diagnosis.search import (
     second_look,
     without,
 )
+from fish_env.effects.extended import PREFIX
 from fish_env.identification.estimator import Fit
 from fish_env.identification.problem import Problem
 
@@ -246,12 +248,36 @@ def _like(winner: str, before: Screen, chosen: Sequence[Signal], problem: Proble
 
 
 def pruned(current: Explanation) -> Explanation:
-    """The explanation without causes that others made needless, which may have come later."""
+    """The explanation without causes that others made needless, which may have come later.
+
+    Nor with one that, beside the others, may as well not act: the evidence counts what is left as
+    white, the interval does not.
+    """
     for name in current.causes if len(current.causes) > 1 else ():
         smaller = without(current, name)
-        if smaller and smaller.score < current.score + DOUBT:
+        if smaller and (smaller.score < current.score + DOUBT or may_not_act(current.fit, name)):
             return pruned(smaller)
     return current
+
+
+def may_not_act(fit: Fit, name: str) -> bool:
+    """Whether the 95 % region of what switches a cause on holds the values at which it is off.
+
+    The region is as wide as the colour of what is left makes it. What is off at infinity acts at
+    any finite value.
+    """
+    if name in fit.effects:
+        switches = [p for p in fit.problem.known[name].parameters if not p.shapes]
+        off = {f"{PREFIX}{name}.{p.name}": p.neutral for p in switches}
+    else:
+        path = name.removeprefix(PARAMETER)
+        off = {path: float(fit.problem.baseline.mean[fit.problem.baseline.paths.index(path)])}
+    if not np.isfinite(list(off.values())).all():
+        return False
+    at = [fit.names.index(path) for path in off]
+    gap = fit.estimates[at] - np.array(list(off.values()))
+    distance = gap @ np.linalg.solve(fit.covariance[np.ix_(at, at)], gap)
+    return bool(distance < chi2.isf(0.05, len(at)))
 
 
 def shortlisted(

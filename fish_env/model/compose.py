@@ -57,6 +57,12 @@ class Composition:
         return tuple(f"{e.name}.{m}" for e in self.effects for m in e.memory_names)
 
     @property
+    def tail_rows(self) -> list[int]:
+        """Rows of states that follow the tail's phase."""
+        names = [f"{e.name}.{state}" for e in self.effects for state in e.states.get("tail", ())]
+        return [self.state_names.index(name) for name in names]
+
+    @property
     def delays(self) -> tuple[str, ...]:
         """Parameters by which the tail's command is late (s)."""
         return tuple(f"{e.name}.{e.command_delay}" for e in self.effects if e.command_delay)

@@ -89,7 +89,7 @@ class Emitter:
             f"N_PARAMETERS = {len(self.parameters)}\n"
             f"N_TERMS = {len(self.composition.term_names)}\n"
             f"LATE_TAIL = {bool(self.composition.delays)}\n"
-            f"TAIL_ROWS = np.array({self.tail_rows()}, np.int64)\n"
+            f"TAIL_ROWS = np.array({self.composition.tail_rows}, np.int64)\n"
         )
         parts = (self.derivative, self.terms, self.initialise, self.command, self.memory)
         return "\n".join([sizes, *(part() for part in parts)])
@@ -185,11 +185,6 @@ class Emitter:
             f"tail_inputs, tail_phase = {recalled}",
             "tail = commanded_tail(tail_inputs, tail_phase)",
         ]
-
-    def tail_rows(self) -> list[int]:
-        """Rows of states that follow the tail's phase."""
-        names = [f"{e.name}.{state}" for e in self.effects for state in e.states.get("tail", ())]
-        return [self.states.index(name) for name in names]
 
     def rows_of(self, effect: Effect) -> list[int]:
         """Rows of an effect's states, then of its memory."""

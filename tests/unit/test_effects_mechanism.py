@@ -1,6 +1,7 @@
 """What an effect may declare: states, memory, a late command; and that it stays fast."""
 
 import re
+from dataclasses import replace
 
 import numba
 import numpy as np
@@ -201,8 +202,15 @@ def share_in_vector_registers(model):
 
 
 def test_the_whole_catalogue_still_runs_in_vector_registers():
-    """A hook that does not vectorise takes all others out of the vector registers with it."""
-    assert share_in_vector_registers(build_model(swimmer(), whole_catalogue=True)) > 0.85
+    """A hook that does not vectorise takes all others out of the vector registers with it.
+
+    What effects remember of a step is computed once for each fish by itself: a sixth of the code,
+    most of it of the two effects that make the tail's rate jump.
+    """
+    whole = build_model(swimmer(), whole_catalogue=True)
+    assert share_in_vector_registers(whole) > 0.8
+    without_memory = tuple(effect for effect in whole.declared if not effect.memory)
+    assert share_in_vector_registers(replace(whole, declared=without_memory)) > 0.95
 
 
 @kernel

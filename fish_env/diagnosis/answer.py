@@ -9,7 +9,7 @@ from fish_env.data.schema import Dataset
 from fish_env.diagnosis import consistency, noise_floor
 from fish_env.diagnosis.attribution import Ranked
 from fish_env.diagnosis.beats import beats_of, by_run, uneven
-from fish_env.diagnosis.causes import PARAMETER
+from fish_env.diagnosis.causes import PARAMETER, coefficient_sizes
 from fish_env.diagnosis.effort import QUICK
 from fish_env.diagnosis.entries import (
     FORMAT,
@@ -22,7 +22,7 @@ from fish_env.diagnosis.entries import (
     precondition_entry,
 )
 from fish_env.diagnosis.regimes import as_plain
-from fish_env.diagnosis.screening import coefficient_sizes
+from fish_env.diagnosis.screening import smallest_detectable
 from fish_env.diagnosis.suitability import doubts
 from fish_env.identification.estimator import Fit
 
@@ -38,7 +38,8 @@ def as_dict(diagnosis: Diagnosis) -> Plain:
         for rival in diagnosis.attribution.rivals
         if rival.causes in verdict.alternatives
     ]
-    sizes = coefficient_sizes(diagnosis.attribution.screens[0])
+    screen = diagnosis.attribution.screens[0]
+    sizes = coefficient_sizes(screen.signals, lambda s: smallest_detectable(s, 0, screen.threshold))
     answer = {
         "format": FORMAT,
         "dataset": diagnosis.dataset.name,

@@ -338,18 +338,6 @@ def smallest_detectable(
     return float(np.sqrt(target / max(information, 1e-12)))
 
 
-def coefficient_sizes(screen: Screen) -> dict[str, float]:
-    """How far a coefficient must be off to be found with power 0.8, in prior standard deviations.
-
-    One that the data know little of would have to be further off than any prior allows.
-    """
-    return {
-        str(s.cause.path): smallest_detectable(s, 0, screen.threshold)
-        for s in screen.signals
-        if s.probe < 0
-    }
-
-
 def confusability(a: Signal, b: Signal) -> float:
     """Largest cosine between what two causes leave after a refit of the baseline (0 to 1)."""
     cosines = np.linalg.svd(a.span.T @ b.span, compute_uv=False)

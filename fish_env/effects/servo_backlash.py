@@ -12,10 +12,11 @@ from __future__ import annotations
 
 from math import inf
 
+from fish_env.model.corners import MEMORY, angle_at, follow, handed_on, starting
 from fish_env.model.effect import Effect, EffectParameter
 from fish_env.model.jit import kernel
 from fish_env.model.records import Tail
-from fish_env.model.tail import SETTLING_TIME, UNTOLD_STEP, angle_at, bend, spread_jumps, window
+from fish_env.model.tail import SETTLING_TIME, spread_jumps
 
 ROUNDING = 1e-9  # rad; teeth this close touch
 STANDSTILL = 1e-3  # rad/s; a tail this slow rests
@@ -49,23 +50,13 @@ def ahead_of_servo(angle, tail, bent, since, at, half):
 
 @kernel
 def take_up_play(tail, inputs, phase, time, fish, e, states, memory, since):
-    """The tail rests within the play, and moves with the servo where that takes it along.
-
-    It is remembered where tail and servo were, what the tail gained in the step's second half, and
-    how long the step was.
-    """
-    (settled_rate,), (angle, told, told_rate, gained, step) = states, memory
-    on = e.gap > 0.0
+    """The tail rests within the play, and moves with the servo where that takes it along."""
+    (settled_rate,) = states
     half = 0.5 * e.gap
-    bent = bend(tail, since, told)
-    early, late, before = window(tail, since, step, told, told_rate)
-    ahead = ahead_of_servo(angle, tail, bent, since, since, half)
-    gain = ahead_of_servo(angle, tail, bent, since, late, half)
-    gain -= ahead_of_servo(angle, tail, bent, since, early, half)
-    rate = tail.rate + (gain + before * gained) / (late - early + 0.5 * before * step)
+    ahead, rate, gained = follow(ahead_of_servo, half, tail, since, memory)
     pushed = (ahead - ROUNDING < -half) & (tail.rate > 0.0)
     pulled = (ahead + ROUNDING > half) & (tail.rate < 0.0)
-    driven, slope = spread_jumps(
+    driven, _ = spread_jumps(
         Tail(
             tail.angle + ahead,
             rate if abs(rate) > STANDSTILL else 0.0,
@@ -73,17 +64,7 @@ def take_up_play(tail, inputs, phase, time, fish, e, states, memory, since):
         ),
         settled_rate,
     )
-    seen = Tail(
-        driven.angle if on else tail.angle,
-        driven.rate if on else tail.rate,
-        driven.acceleration if on else tail.acceleration,
-    )
-    second_half = ahead - ahead_of_servo(angle, tail, bent, since, 0.5 * since, half)
-    return (
-        seen,
-        (slope if on else 0.0,),
-        (seen.angle, tail.angle, tail.rate, second_half if on else 0.0, since),
-    )
+    return handed_on(e.gap > 0.0, tail, driven, gained, since)
 
 
 @kernel
@@ -91,7 +72,7 @@ def start_in_contact(inputs, tail, fish, e):
     """The run starts with the play taken up in the sense in which the servo turns."""
     half = 0.5 * e.gap
     behind = half if tail.rate > 0.0 else (-half if tail.rate < 0.0 else 0.0)
-    return tail.rate, tail.angle - behind, tail.angle, tail.rate, 0.0, UNTOLD_STEP
+    return tail.rate, *starting(tail.angle - behind, tail)
 
 
 def fastest(values):
@@ -110,7 +91,7 @@ EFFECT = Effect(
     ),
     hooks={"tail": take_up_play},
     states={"tail": ("settled_rate",)},
-    memory={"tail": ("angle", "told", "told_rate", "gained", "step")},
+    memory={"tail": MEMORY},
     initial_states=start_in_contact,
     time_scale=fastest,
     order=6,

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from math import inf
 
+from fish_env.model.corners import MEMORY, angle_at, follow, handed_on, starting
 from fish_env.model.effect import Effect, EffectParameter
 from fish_env.model.jit import kernel
 from fish_env.model.records import Tail
-from fish_env.model.tail import SETTLING_TIME, UNTOLD_STEP, angle_at, bend, spread_jumps, window
+from fish_env.model.tail import SETTLING_TIME, spread_jumps
 
 ROUNDING = 1e-9  # rad; a tail this close to its command is on it
 
@@ -43,22 +44,13 @@ def ahead_of_command(angle, tail, bent, since, at, limit):
 
 @kernel
 def limit_rate(tail, inputs, phase, time, fish, e, states, memory, since):
-    """The tail moves towards its command, by at most rate times the time since the last step.
-
-    It is remembered where tail and command were, what the tail gained in the step's second half,
-    and how long the step was.
-    """
-    (settled_rate,), (angle, told, told_rate, gained, step) = states, memory
+    """The tail moves towards its command, by at most rate times the time since the last step."""
+    (settled_rate,) = states
     on = e.rate < inf
     limit = e.rate if on else 1.0
-    bent = bend(tail, since, told)
-    early, late, before = window(tail, since, step, told, told_rate)
-    ahead = ahead_of_command(angle, tail, bent, since, since, limit)
-    gain = ahead_of_command(angle, tail, bent, since, late, limit)
-    gain -= ahead_of_command(angle, tail, bent, since, early, limit)
-    rate = tail.rate + (gain + before * gained) / (late - early + 0.5 * before * step)
+    ahead, rate, gained = follow(ahead_of_command, limit, tail, since, memory)
     behind = (abs(ahead) > ROUNDING) | (abs(tail.rate) > limit)
-    limited, slope = spread_jumps(
+    limited, _ = spread_jumps(
         Tail(
             tail.angle + ahead,
             min(max(rate, -limit), limit),
@@ -66,23 +58,13 @@ def limit_rate(tail, inputs, phase, time, fish, e, states, memory, since):
         ),
         settled_rate,
     )
-    seen = Tail(
-        limited.angle if on else tail.angle,
-        limited.rate if on else tail.rate,
-        limited.acceleration if on else tail.acceleration,
-    )
-    second_half = ahead - ahead_of_command(angle, tail, bent, since, 0.5 * since, limit)
-    return (
-        seen,
-        (slope if on else 0.0,),
-        (seen.angle, tail.angle, tail.rate, second_half if on else 0.0, since),
-    )
+    return handed_on(on, tail, limited, gained, since)
 
 
 @kernel
 def start_at_command(inputs, tail, fish, e):
     """The run starts with the tail where it is commanded, moving as fast as it can follow."""
-    return min(max(tail.rate, -e.rate), e.rate), tail.angle, tail.angle, tail.rate, 0.0, UNTOLD_STEP
+    return min(max(tail.rate, -e.rate), e.rate), *starting(tail.angle, tail)
 
 
 def fastest(values):
@@ -101,7 +83,7 @@ EFFECT = Effect(
     ),
     hooks={"tail": limit_rate},
     states={"tail": ("settled_rate",)},
-    memory={"tail": ("angle", "told", "told_rate", "gained", "step")},
+    memory={"tail": MEMORY},
     initial_states=start_at_command,
     time_scale=fastest,
     order=4,

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fish_env.identification.filter_algebra import N_ERROR, angle, innovation
+from fish_env.identification.filter_algebra import BASE, N_ERROR, PHASE, angle, innovation
 
 # --- completed by compose ---
 from fish_env.model.composed import (
@@ -33,8 +33,6 @@ from fish_env.model.composed import (
 
 WRENCH = PAR + N_PARAMETERS - 6
 DIVERGED = 1e4
-PHASE = 13  # row of the tail's phase
-BASE = 18  # rows of the fish itself, before those of effects
 STEP_S = 0.01
 SETTLING_STEPS = 100
 SETTLING_S = STEP_S * SETTLING_STEPS

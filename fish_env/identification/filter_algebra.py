@@ -5,7 +5,10 @@ from __future__ import annotations
 import math
 
 from fish_env.model.jit import kernel
+from fish_env.model.state import BASE_STATES
 
+PHASE = BASE_STATES.index("tail_phase")
+BASE = len(BASE_STATES)  # rows of the fish itself, before those of effects
 N_ERROR = 19
 """Error state: position 3, rotation 3, velocity 3, rates 3, wrench 6, tail phase."""
 N_MOVING = 12

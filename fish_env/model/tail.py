@@ -9,11 +9,6 @@ from fish_env.model.trigonometry import sincos
 TWO_PI = 6.283185307179586
 SETTLING_TIME = 0.02
 """s. A jump of the tail's rate reaches the water's inertia over about this time."""
-UNTOLD_STEP = 1e-3
-"""s. Taken for the length of the step before a run."""
-SWITCH = 1e-4
-SWITCH_RATE = 0.05
-"""rad, rad/s. What a command or its rate jumps by where it switches; else it is known better."""
 
 
 @kernel
@@ -104,39 +99,3 @@ def spread_jumps(tail, settled_rate):
     """
     slope = tail.acceleration + (tail.rate - settled_rate) * (1.0 / SETTLING_TIME)
     return Tail(tail.angle, tail.rate, slope), slope
-
-
-@kernel
-def angle_at(tail, bent, ahead):
-    """The tail's angle some time ahead of its record, or before it (rad)."""
-    return tail.angle + ahead * (tail.rate + ahead * (0.5 * tail.acceleration + ahead * bent))
-
-
-@kernel
-def bend(tail, since, told):
-    """A sixth of the jerk (rad/s^3) by which the tail came from what it was at the step's start.
-
-    None where its command has switched since it was ``told`` (rad).
-    """
-    gap = angle_at(tail, 0.0, -since) - told
-    within = (since > 0.0) & (abs(gap) < SWITCH)
-    return gap / (since * since * since if within else 1.0) if within else 0.0
-
-
-@kernel
-def window(tail, since, step, told, told_rate):
-    """Half a step before and half a step after the present, as times in this step (s).
-
-    The mean of a rate over such a window adds up, with the weights of a Runge-Kutta step, to
-    exactly what the angle gains, wherever in a step the rate jumps. It does not reach back over a
-    switch of the command from what was ``told`` at the end of the step before (rad, rad/s).
-
-    Returns:
-        Begin and end (s), and what the window takes of the step before, as a share of half a step.
-    """
-    half = 0.5 * step
-    early = max(since - half, 0.0)
-    jump = abs(angle_at(tail, 0.0, -since) - told)
-    kink = abs(tail.rate - since * tail.acceleration - told_rate)
-    switched = (jump > SWITCH) | (kink > SWITCH_RATE)
-    return early, since + half, 0.0 if switched else 1.0 - (since - early) / half

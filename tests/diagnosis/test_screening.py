@@ -6,12 +6,10 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from fish_env.diagnosis.causes import Cause, best_of_each
+from fish_env.diagnosis.causes import Cause, best_of_each, coefficient_sizes
 from fish_env.diagnosis.screening import (
     Projector,
-    Screen,
     Signal,
-    coefficient_sizes,
     confusability,
     null_threshold,
     smallest_detectable,
@@ -130,7 +128,8 @@ def test_a_coefficient_that_far_off_is_found_four_times_in_five(left):
         return Signal(cause, -1, column, 1.0, np.array([[left]]), np.array([score]), 1.0)
 
     threshold = np.log(1e-3)
-    size = coefficient_sizes(Screen((found(0.0),), threshold, 0.05))[path]
+    sizes = coefficient_sizes([found(0.0)], lambda s: smallest_detectable(s, 0, threshold))
+    size = sizes[path]
     means = size * left + np.sqrt(left) * rng.standard_normal(2000)
     power = np.mean([found(mean).log_p < threshold for mean in means])
     assert power == pytest.approx(0.8, abs=0.03)

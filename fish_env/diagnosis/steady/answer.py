@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from fish_env.diagnosis.causes import coefficient_sizes
 from fish_env.diagnosis.effort import STEADY_LEFT_OUT
 from fish_env.diagnosis.entries import (
     FORMAT,
@@ -17,7 +18,7 @@ from fish_env.diagnosis.entries import (
 )
 from fish_env.diagnosis.steady.attribution import Explanation
 from fish_env.diagnosis.steady.fitting import SteadyFit
-from fish_env.diagnosis.steady.screening import coefficient_sizes
+from fish_env.diagnosis.steady.screening import smallest_detectable
 from fish_env.diagnosis.steady.table import UNITS
 
 if TYPE_CHECKING:
@@ -28,7 +29,8 @@ def as_dict(diagnosis: SteadyDiagnosis) -> Plain:
     """Everything that ``diagnosis.json`` holds."""
     verdict, accepted = diagnosis.verdict, diagnosis.accepted
     rivals = [r for r in diagnosis.attribution.rivals if r.causes in verdict.alternatives]
-    sizes = coefficient_sizes(diagnosis.attribution.screens[0])
+    screen = diagnosis.attribution.screens[0]
+    sizes = coefficient_sizes(screen.signals, lambda s: smallest_detectable(s, 0, screen.threshold))
     return {
         "format": FORMAT,
         "kind": "steady",

@@ -283,15 +283,6 @@ def smallest_detectable(signal: Signal, setting: int, threshold: float) -> float
     return float(np.sqrt(target / information))
 
 
-def coefficient_sizes(screen: Screen) -> dict[str, float]:
-    """How far off a coefficient is found with power 0.8, in prior standard deviations."""
-    return {
-        str(s.cause.path): smallest_detectable(s, 0, screen.threshold)
-        for s in screen.signals
-        if not s.cause.is_effect
-    }
-
-
 def confusability(a: Signal, b: Signal) -> float:
     """Largest cosine between what two causes leave after a refit (0 to 1)."""
     cosines = np.linalg.svd(np.linalg.qr(a.left)[0].T @ np.linalg.qr(b.left)[0], compute_uv=False)

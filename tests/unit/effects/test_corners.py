@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from fish_env.effects import get_effect
+from fish_env.model import corners
 from fish_env.model.jit import py_function
 from fish_env.model.records import Tail
 
@@ -45,5 +46,6 @@ def test_the_rate_adds_up_to_the_angle_wherever_it_jumps(name, setting, monkeypa
     right = gain_of_the_rate(effect, setting, 0.0025)
     assert right < 5e-5
     module = import_module(f"fish_env.effects.{name}")
-    monkeypatch.setattr(module, "window", lambda tail, since, *_: (since, since + 1e-6, 0.0))
+    monkeypatch.setattr(module, "follow", py_function(corners.follow))
+    monkeypatch.setattr(corners, "window", lambda tail, since, *_: (since, since + 1e-6, 0.0))
     assert gain_of_the_rate(effect, setting, 0.0025) > 10 * right

@@ -26,6 +26,8 @@ from fish_env.sensing.channels import channels_from_states
 FloatArray = npt.NDArray[np.float64]
 DIRECTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 FAR_OFF = 10.0
+ASTONISHING = 4.9
+"""Prior standard deviations that one coefficient in a million passes."""
 LEVEL = 0.003
 """For white residuals. A false alarm here spoils a right answer of any kind, and 97 % are to be
 right, so it gets a tenth of that. How far disturbances of other colours go is measured by
@@ -82,16 +84,19 @@ def implausible(fit: Fit) -> tuple[str, ...]:
     """Numbers of the causes that nobody would believe: their nearest relative is what acts.
 
     A coefficient more than :data:`FAR_OFF` prior deviations off, or as far as physics lets it go (a
-    hull without lift). An effect of a sign that it cannot have, or :data:`FAR_OFF` times as strong
-    as the strongest that is plausible, or of a shape far from the plausible ones. A coefficient
-    that does what an effect does may go as far as the effect.
+    hull without lift). Alone it may be a slip in the fish's file; beside an effect, one that is
+    :data:`ASTONISHING` makes up for what the effect does not do. An effect of a sign that it cannot
+    have, or :data:`FAR_OFF` times as strong as the strongest that is plausible, or of a shape far
+    from the plausible ones. A coefficient that does what an effect does may go as far as the
+    effect.
     """
     paths = fit.problem.baseline.paths
     effects_too = {path for effect in fit.problem.known.values() for path in effect.equals}
+    farthest = ASTONISHING if fit.effects else FAR_OFF
     found = [
         f"{path} {abs(z):.0f} prior standard deviations from where it is known to be"
         for path, z in zip(paths, fit.point.z, strict=True)
-        if path in set(fit.released) - effects_too and (abs(z) > FAR_OFF or path in fit.at_bounds)
+        if path in set(fit.released) - effects_too and (abs(z) > farthest or path in fit.at_bounds)
     ]
     for name in fit.effects:
         for parameter in fit.problem.known[name].parameters:

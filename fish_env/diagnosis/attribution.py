@@ -11,7 +11,7 @@ from scipy.stats import chi2
 from scipy.stats import t as student
 
 from fish_env.diagnosis.adequacy import implausible, strains
-from fish_env.diagnosis.causes import PARAMETER, Cause, same
+from fish_env.diagnosis.causes import PARAMETER, Cause, same_causes
 from fish_env.diagnosis.effort import FULL, Effort
 from fish_env.diagnosis.left_out import left_out_scores
 from fish_env.diagnosis.screening import Projector, Screen, Signal, screen
@@ -166,13 +166,10 @@ def rivals_of(best: Explanation, others: Iterable[Explanation]) -> tuple[Explana
     return tuple(
         e
         for e in others
-        if alike(best, e) and not _says_the_same(best, e) and not implausible(e.fit)
+        if alike(best, e)
+        and not same_causes(best.fit.problem.known, best.causes, e.causes)
+        and not implausible(e.fit)
     )
-
-
-def _says_the_same(best: Explanation, other: Explanation) -> bool:
-    pairs = zip(best.causes, other.causes, strict=True)
-    return all(a == b or same(best.fit.problem.known, a, b) for a, b in pairs)
 
 
 def tied(best: Explanation, other: Explanation) -> bool:

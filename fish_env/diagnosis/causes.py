@@ -271,6 +271,11 @@ def effect_values(problem: Problem, name: str, probe: Probe) -> dict[str, float]
     return {f"{PREFIX}{name}.{key}": probe.get(key, value) for key, value in neutral.items()}
 
 
+def same_causes(known: Mapping[str, Effect], causes: Sequence[str], others: Sequence[str]) -> bool:
+    """Whether two explanations of as many causes say the same, one cause after the other."""
+    return all(a == b or same(known, a, b) for a, b in zip(causes, others, strict=True))
+
+
 def same(known: Mapping[str, Effect], cause: str, other: str) -> bool:
     """Whether two causes say the same in other words.
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from fish_env.data import load_dataset
 from fish_env.data.schema import Dataset, Run, identical_runs
+from fish_env.diagnosis.adequacy import ASTONISHING
 from fish_env.diagnosis.conventions import check_conventions
 from fish_env.diagnosis.records import check_clock_jumps, check_stuck
 from fish_env.errors import DatasetError
@@ -111,10 +112,6 @@ def _check_amount(dataset: Dataset) -> None:
                 f"{dataset.name}: {present} samples of {channel} in all, too few to judge anything "
                 f"by; measure at least {FEWEST_SAMPLES}"
             )
-
-
-ASTONISHING = 4.9
-"""Prior standard deviations beyond which a refitted coefficient asks for another explanation."""
 
 
 def doubts(answer: Mapping[str, Any]) -> list[str]:

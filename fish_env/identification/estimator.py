@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
+from fish_env.identification.descent import descend
 from fish_env.identification.filtering import Filtered, NoiseModel
 from fish_env.identification.free import Free, Linearised, linearise, objective
 from fish_env.identification.information import block_sums, information
@@ -87,7 +88,8 @@ def fit(
         released: baseline coefficients whose prior is lifted.
         refit_noise: estimate the disturbance again after the first step and at the end.
         iterations: most Gauss-Newton steps in a round.
-        tolerance: stop when no parameter moves by more of its standard deviation.
+        tolerance: stop when no combination of parameters would move by more of its standard
+            deviation.
         rounds: most alternations between parameters and disturbance.
         report: told what is being done.
     """
@@ -129,7 +131,8 @@ def gauss_newton(
         vector: (n,) where to begin.
         noise: noise model.
         iterations: most steps.
-        tolerance: stop when no parameter moves by more of its standard deviation.
+        tolerance: stop when no combination of parameters would move by more of its standard
+            deviation.
 
     Returns:
         The vector reached, the objective there, and the filter results.
@@ -137,25 +140,18 @@ def gauss_newton(
     Raises:
         LinAlgError: the simulation diverges where the steps begin.
     """
-    value, filtered = objective(problem, free, vector, noise)
-    if not np.isfinite(value):
-        raise np.linalg.LinAlgError("the simulation diverges at the start of the fit")
-    for _ in range(iterations):
-        lin = linearise(problem, free, vector, noise, filtered)
+
+    def linearised(at: FloatArray, filtered: list[Filtered]) -> tuple[FloatArray, FloatArray]:
+        lin = linearise(problem, free, at, noise, filtered)
         hessian = information(lin.slopes, free.prior)
-        gradient = inner(lin.slopes, lin.residuals[:, None])[:, 0] + free.prior * vector
         free.suit_steps(hessian)
-        before, settled = vector, True
-        for trial, whole in free.trials(hessian, gradient, vector):
-            trial_value, trial_filtered = objective(problem, free, trial, noise)
-            if trial_value < value:
-                vector, value, filtered = trial, trial_value, trial_filtered
-                moved = np.abs(vector - before) * np.sqrt(np.diag(hessian))
-                settled = whole and moved.max() < tolerance
-                break
-        if settled:
-            break
-    return vector, value, filtered
+        gradient = inner(lin.slopes, lin.residuals[:, None])[:, 0] + free.prior * at
+        return hessian, gradient
+
+    return descend(
+        vector, partial(objective, problem, free, noise=noise), linearised, free.within,
+        iterations, tolerance,
+    )  # fmt: skip
 
 
 def _settled(before: NoiseModel, after: NoiseModel, share: float = 0.1) -> bool:

@@ -5,14 +5,14 @@ With what estimates are made of: the objective at a vector, residuals and their 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
-from fish_env.identification.bounded import bounded_step
+from fish_env.identification.descent import Within
 from fish_env.identification.filtering import Filtered, NoiseModel
 from fish_env.identification.information import prior_precision
 from fish_env.identification.problem import Point, Problem
@@ -23,8 +23,6 @@ SHORTEST = 0.02
 """Shortest step for differences, as a share of the longest."""
 REACH = 5.0
 """Prior standard deviations that a coefficient may move, unless its prior is lifted."""
-SHARES = (0.5, 0.2)
-DAMPINGS = (0.1, 10.0)
 LARGEST_SLOPE = 1e9
 """In standard deviations of the noise per unit; what exceeds it has diverged."""
 
@@ -107,27 +105,6 @@ class Free:
         inside = np.clip(values, low + 1e-3 * baseline.sd, high - 1e-3 * baseline.sd)
         return np.asarray(np.linalg.solve(baseline.factor, inside - baseline.mean))
 
-    def trials(
-        self, hessian: FloatArray, gradient: FloatArray, vector: FloatArray
-    ) -> Iterator[tuple[FloatArray, bool]]:
-        """Where to look for a lower objective: a Gauss-Newton step within bounds, then less of it.
-
-        Shorter steps come before damped ones: damping would hold back directions that only the
-        prior decides, such as the difference of two coefficients that act alike.
-
-        Yields:
-            A vector (n,), and whether it is the whole step.
-        """
-        low, high = self._bounds
-        rows = self.scale()
-        whole = bounded_step(hessian, gradient, vector, rows, low, high)
-        yield self.clip(whole), True
-        for share in SHARES:
-            yield self.clip(vector + share * (whole - vector)), False
-        for damping in DAMPINGS:
-            damped = hessian + damping * np.diag(np.diag(hessian))
-            yield self.clip(bounded_step(damped, gradient, vector, rows, low, high)), False
-
     @cached_property
     def _range(self) -> tuple[FloatArray, FloatArray]:
         """Coefficients stay within physical bounds, and within reach of their prior.
@@ -141,13 +118,16 @@ class Free:
         return np.maximum(low, baseline.mean - reach), np.minimum(high, baseline.mean + reach)
 
     @cached_property
-    def _bounds(self) -> tuple[FloatArray, FloatArray]:
+    def within(self) -> Within:
+        """Bounds of the vector: of coefficients in physical units, of effects' parameters."""
         baseline = self.problem.baseline
         low, high = self._range
         margin = 1e-3 * baseline.sd
-        return (
+        return Within(
+            self.scale(),
             np.r_[low + margin - baseline.mean, [f.lower for f in self.freedoms]],
             np.r_[high - margin - baseline.mean, [f.upper for f in self.freedoms]],
+            self.clip,
         )
 
     def coefficients_at_bounds(self, estimates: FloatArray) -> list[str]:

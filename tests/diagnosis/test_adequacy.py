@@ -125,6 +125,15 @@ def test_a_coefficient_far_outside_its_prior_is_no_explanation():
     assert implausible(trimmed) == ()  # a buoyancy_offset may be as large
 
 
+def test_beside_an_effect_a_coefficient_has_to_be_nearer():
+    """A slip in the fish's file is no stranger; what helps an effect out is."""
+    wave = {"effects": ("wave",), "interval": (0.1, 0.2)}
+    assert implausible(named(released=("tail.area",), z=7.1)) == ()
+    (said,) = implausible(named(released=("tail.area",), z=7.1, **wave))
+    assert "tail.area 7" in said
+    assert implausible(named(released=("tail.area",), z=4.5, **wave)) == ()
+
+
 def test_a_coefficient_at_the_end_of_what_physics_allows_is_no_explanation():
     """A hull without lift makes up for something else."""
     stuck = named(released=("tail.area",), z=-6.0, at_bounds=("tail.area",))

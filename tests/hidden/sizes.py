@@ -89,10 +89,12 @@ SIZES: dict[str, Size] = {
     "depth_bias": Size({"offset": 0.08}, signed=True),
     "position_scale": Size({"scale": 1.04}, signed=True),
 }
+# A tail stalls within the incidences that it meets (median 1 rad); one that is always beyond its
+# onset has a smaller lift coefficient, and that would be the right answer.
 FOREIGN_SIZES: dict[str, Size] = {
     "floor_suction": Size({"gain": 5.0}, shape={"depth": (0.9, 1.3), "range": (0.15, 0.3)}),
     "sloshing": Size({"mass": 0.03}, shape={"frequency": (1.4, 1.9), "damping": (0.05, 0.12)}),
-    "tail_stall": Size({"loss": 0.6}, shape={"onset": (0.4, 0.6), "width": (0.05, 0.08)}),
+    "tail_stall": Size({"loss": 0.6}, shape={"onset": (0.9, 1.2), "width": (0.05, 0.08)}),
     "thrust_loss": Size({"per_speed": 3.5}),
     "pump": Size({"force": 0.04, "moment": 0.001}, shape={"period": (4.0, 8.0)}),
     "thermocline": Size({"mass": 0.004}, shape={"depth": (0.5, 0.8), "width": (0.04, 0.08)}),

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import chi2
 
-from fish_env.diagnosis.causes import Cause
+from fish_env.diagnosis.causes import Cause, same_causes
 from fish_env.diagnosis.steady.fitting import (
     SteadyFit,
     fit,
@@ -139,6 +139,7 @@ def attribute(
             for e in tried[1:]
             if worth_it(before, e, screens[-2].threshold)
             and alike(best, e)
+            and not same_causes(best.fit.problem.known, best.causes, e.causes)
             and explained_away(e.causes[-1], screens[-2], screens[-1])
         )
         current = best

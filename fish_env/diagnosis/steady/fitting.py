@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property, partial
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import least_squares
 
 from fish_env.diagnosis.steady.orbit import Orbits
 from fish_env.diagnosis.steady.problem import SteadyProblem
@@ -23,12 +23,19 @@ from fish_env.diagnosis.steady.scatter import (
 )
 from fish_env.effects.extended import PREFIX
 from fish_env.errors import DatasetError
+from fish_env.identification.descent import Within, descend
 from fish_env.identification.problem import Point, finite_values
 
 FloatArray = npt.NDArray[np.float64]
 RELEASED = 0.1
 """Weight of the prior of a coefficient that was set free: its standard deviation, ten times."""
 Z_STEP = 0.05
+TOLERANCE, ROUGH = 0.05, 0.3
+"""Fits stop when nothing would move by more of its standard deviation; the second where only the
+objective is asked for."""
+UNSEEN = 1e-9
+"""Information of a number that the averages do not depend on."""
+STEPS = 12
 REACH = 3.0
 """How many times its plausible departure an effect may be off."""
 
@@ -63,6 +70,7 @@ class SteadyFit:
         scatter: noise of single averages.
         slopes: derivative of the whitened averages, then of the priors, shape (N, n).
         residuals: measured less simulated, whitened, then what the priors hold, shape (N,).
+        profiles: 95 % intervals by likelihood, of the paths for which they were worked out.
     """
 
     problem: SteadyProblem
@@ -74,6 +82,7 @@ class SteadyFit:
     scatter: Scatter
     slopes: FloatArray
     residuals: FloatArray
+    profiles: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def objective(self) -> float:
@@ -98,7 +107,7 @@ class SteadyFit:
         The noise behind it is that of the residuals, so what the model misses from one condition
         to the next widens it.
         """
-        inverse = np.linalg.inv(self.slopes.T @ self.slopes + 1e-9 * np.eye(self.slopes.shape[1]))
+        inverse = np.linalg.inv(self.slopes.T @ self.slopes + UNSEEN * np.eye(self.slopes.shape[1]))
         count = len(self.problem.baseline)
         turn = np.eye(len(inverse))
         turn[:count, :count] = self.problem.baseline.factor
@@ -107,7 +116,9 @@ class SteadyFit:
         return np.asarray(turn @ inverse @ turn.T)
 
     def interval(self, path: str) -> tuple[float, float]:
-        """95 % interval within the bounds."""
+        """95 % interval within the bounds, by likelihood where that was worked out."""
+        if path in self.profiles:
+            return self.profiles[path]
         i = self.names.index(path)
         middle, half = self.estimates[i], 1.96 * float(np.sqrt(self.covariance[i, i]))
         lower, upper = self.bounds(path)
@@ -168,7 +179,7 @@ def fit(
     scatter: Scatter | None = None,
     released: Sequence[str] = (),
     rounds: int = 2,
-    steps: int = 12,
+    steps: int = STEPS,
 ) -> SteadyFit:
     """Gauss-Newton within bounds; the noise is estimated along with the rest.
 
@@ -191,12 +202,7 @@ def fit(
     )
     orbits = problem.orbits([point], near)
     if not orbits.found.all():
-        lost = problem.table.conditions[int(np.argmin(orbits.found))]
-        raise DatasetError(
-            f"{problem.table.name}: {problem.fish.name} does not come to steady motion under the "
-            f"commands of condition '{lost}'; check that fish, units and frame are those of the "
-            "data, or leave the condition out"
-        )
+        raise _not_steady(problem, orbits)
     if scatter is not None:
         return _fit_once(problem, effects, point, orbits, scatter, released, steps)
     pushes = push_variances(response(problem, point, orbits))
@@ -207,6 +213,15 @@ def fit(
         known = noise_of(current, pushes)
         current = _fit_once(problem, effects, current.point, current.orbits, known, released, steps)
     return with_scatter(current, noise_of(current, pushes))
+
+
+def _not_steady(problem: SteadyProblem, orbits: Orbits) -> DatasetError:
+    lost = problem.table.conditions[int(np.argmin(orbits.found))]
+    return DatasetError(
+        f"{problem.table.name}: {problem.fish.name} does not come to steady motion under the "
+        f"commands of condition '{lost}'; check that fish, units and frame are those of the "
+        "data, or leave the condition out"
+    )
 
 
 def noise_of(current: SteadyFit, pushes: FloatArray) -> Scatter:
@@ -245,7 +260,7 @@ def with_scatter(current: SteadyFit, scatter: Scatter) -> SteadyFit:
 
 
 class _Work:
-    """Residuals and their slopes as functions of the free numbers, steady motion kept warm."""
+    """Residuals and their slopes as functions of the free numbers, steady motion kept near."""
 
     def __init__(
         self,
@@ -255,15 +270,15 @@ class _Work:
         orbits: Orbits,
         scatter: Scatter,
         released: Sequence[str],
+        held: Sequence[str] = (),
     ) -> None:
         self.problem, self.scatter = problem, scatter
-        self.free = freedoms_of(problem, effects)
+        self.free = [f for f in freedoms_of(problem, effects) if f.path not in held]
         self.kept = {p: v for p, v in point.effects.items() if p not in {f.path for f in self.free}}
-        self.orbits, self.size = orbits, len(problem.baseline)
+        self.near, self.size = orbits, len(problem.baseline)
         self.prior = prior_weights(problem, released)
         self.measured = measured(problem, scatter)
         self.start = np.r_[point.z, [point.effects[f.path] / f.unit for f in self.free]]
-        self.at, self.means = self.start, problem.means(orbits)[0]
 
     def point(self, x: FloatArray) -> Point:
         own = {f.path: float(v * f.unit) for f, v in zip(self.free, x[self.size :], strict=True)}
@@ -277,33 +292,91 @@ class _Work:
         upper = np.r_[high, [f.upper / f.unit for f in self.free]]
         return lower, upper
 
-    def residuals(self, x: FloatArray) -> FloatArray:
-        if not np.array_equal(x, self.at):
-            orbits = self.problem.orbits([self.point(x)], self.orbits)
-            means = self.problem.means(orbits)[0]
-            if not np.isfinite(means).all():
-                return np.full(len(self.measured) + self.size, np.inf)
-            self.at, self.orbits, self.means = x.copy(), orbits, means
-        seen = self.measured - lines(self.problem, self.means, self.scatter)
-        return np.asarray(np.r_[seen, -self.prior * x[: self.size]])
+    def evaluate(self, x: FloatArray) -> tuple[float, _Seen]:
+        """The objective, infinite where motion is not steady, and what it comes from."""
+        orbits = self.problem.orbits([self.point(x)], self.near)
+        means = self.problem.means(orbits)[0]
+        seen = self.measured - lines(self.problem, means, self.scatter)
+        residuals = np.r_[seen, -self.prior * x[: self.size]]
+        value = float(residuals @ residuals)
+        return value if np.isfinite(value) else np.inf, _Seen(residuals, orbits, means)
 
-    def jacobian(self, x: FloatArray) -> FloatArray:
-        """Derivative of the residuals."""
-        self.residuals(x)
+    def jacobian(self, x: FloatArray, seen: _Seen) -> FloatArray:
+        """Derivative of the residuals; what comes next is looked for near this motion."""
+        self.near = seen.orbits
         _, upper = self.bounds()
         step = np.full(len(x), Z_STEP)
         step[x + step > upper] *= -1.0
         nudged = [self.point(x + step[i] * np.eye(len(x))[i]) for i in range(len(x))]
         coefficients, effects = nudged[: self.size], nudged[self.size :]
-        change = linear_changes(self.problem, self.point(x), self.orbits, coefficients)
+        change = linear_changes(self.problem, self.point(x), seen.orbits, coefficients)
         if effects:
-            means = self.problem.means(self.problem.orbits(effects, self.orbits))
-            change = np.concatenate([change, means - self.means])
+            means = self.problem.means(self.problem.orbits(effects, seen.orbits))
+            change = np.concatenate([change, means - seen.means])
         whitened = lines(self.problem, change, self.scatter).T / step
         whitened = np.where(np.isfinite(whitened), whitened, 0.0)
         prior = np.zeros((self.size, len(x)))
         prior[:, : self.size] = np.diag(self.prior)
         return -np.concatenate([whitened, prior])
+
+    def descended(self, steps: int, tolerance: float = TOLERANCE) -> tuple[FloatArray, _Seen]:
+        """The free numbers at the minimum, and what was seen there."""
+        lower, upper = self.bounds()
+        clip = partial(np.clip, a_min=lower, a_max=upper)
+        within = Within(np.eye(len(lower)), lower, upper, clip)
+
+        def linearised(x: FloatArray, seen: _Seen) -> tuple[FloatArray, FloatArray]:
+            jacobian = self.jacobian(x, seen)
+            # What no average depends on stays where it is.
+            known = jacobian.T @ jacobian + UNSEEN * np.eye(len(x))
+            return known, jacobian.T @ seen.residuals
+
+        start = clip(self.start)
+        found, _, seen = descend(start, self.evaluate, linearised, within, steps, tolerance)
+        return found, seen
+
+
+class _Seen(NamedTuple):
+    """What the free numbers make of the table."""
+
+    residuals: FloatArray
+    orbits: Orbits
+    means: FloatArray
+
+
+def fit_near(current: SteadyFit, point: Point, orbits: Orbits) -> SteadyFit:
+    """The fit from other estimates, under the same noise."""
+    return _fit_once(
+        current.problem, current.effects, point, orbits, current.scatter, current.released, STEPS
+    )
+
+
+def objective_at(
+    current: SteadyFit, path: str, value: float, near: tuple[Point, Orbits]
+) -> tuple[float, Point, Orbits]:
+    """The objective with one effect's parameter held and all else fitted again.
+
+    Args:
+        current: the fit; its noise is used.
+        path: ``effects.<name>.<parameter>``.
+        value: where to hold it.
+        near: estimates with the parameter held close by, and their steady motion.
+
+    Returns:
+        The objective, infinite where the fish loses steady motion, with the estimates and motion.
+    """
+    problem, (point, orbits) = current.problem, near
+    point = Point(point.z, {**point.effects, path: value})
+    orbits = problem.orbits([point], orbits)
+    if not orbits.found.all():
+        return np.inf, *near
+    own = (current.effects, point, orbits, current.scatter, current.released, (path,))
+    work = _Work(problem, *own)
+    try:
+        found, seen = work.descended(STEPS, ROUGH)
+    except np.linalg.LinAlgError:
+        return np.inf, *near
+    return float(seen.residuals @ seen.residuals), work.point(found), seen.orbits
 
 
 def _fit_once(
@@ -316,14 +389,12 @@ def _fit_once(
     steps: int,
 ) -> SteadyFit:
     work = _Work(problem, effects, point, orbits, scatter, released)
-    lower, upper = work.bounds()
-    start = np.clip(work.start, lower + 1e-6, upper - 1e-6)
-    found = least_squares(
-        work.residuals, start, work.jacobian, (lower, upper), ftol=1e-4, xtol=1e-5, max_nfev=steps
-    )
-    slopes = -work.jacobian(found.x)
-    residuals = work.residuals(found.x)
+    try:
+        found, seen = work.descended(steps)
+    except np.linalg.LinAlgError:  # where bounds put the start, motion is not steady
+        raise _not_steady(problem, orbits) from None
+    slopes = -work.jacobian(found, seen)
     return SteadyFit(
-        problem, tuple(effects), tuple(released), work.point(found.x), work.orbits, work.means,
-        scatter, slopes, residuals,
+        problem, tuple(effects), tuple(released), work.point(found), seen.orbits, seen.means,
+        scatter, slopes, seen.residuals,
     )  # fmt: skip

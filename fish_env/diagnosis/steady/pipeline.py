@@ -19,12 +19,13 @@ from fish_env.diagnosis.report import write_report
 from fish_env.diagnosis.report.steady import steady_series_from
 from fish_env.diagnosis.steady.adequacy import Adequacy, adequacy
 from fish_env.diagnosis.steady.answer import as_dict
-from fish_env.diagnosis.steady.attribution import Attribution, attribute
+from fish_env.diagnosis.steady.attribution import Attribution, attribute, explained
 from fish_env.diagnosis.steady.experiment import propose
 from fish_env.diagnosis.steady.extended import identified_fish
 from fish_env.diagnosis.steady.fitting import SteadyFit, fit
 from fish_env.diagnosis.steady.judging import measure_gain, misfit_of
 from fish_env.diagnosis.steady.problem import SteadyProblem
+from fish_env.diagnosis.steady.profile import profiled
 from fish_env.diagnosis.steady.screening import causes_of, needs_place_or_time
 from fish_env.diagnosis.steady.showing import preconditions
 from fish_env.diagnosis.steady.table import IntArray, Table, table_of
@@ -145,6 +146,8 @@ def diagnose_table(
     causes = [c for c in causes_of(whole) if c.name not in absent]
     progress("screening causes")
     attribution = attribute(baseline, causes, rng, 3 if quick else 6, progress)
+    progress("how far the causes may go")
+    attribution = with_intervals(attribution)
     names = [c.name for c in every]
     shown = preconditions(whole, attribution.screens[0], names)
     progress("testing what is left")
@@ -161,6 +164,14 @@ def diagnose_table(
         misfit_of(attribution.baseline.fit, accepted), gain, propose(attribution, verdict, shown),
         _notes(dataset, left, accepted, absent), seed, quick, time.perf_counter() - begin,
     )  # fmt: skip
+
+
+def with_intervals(attribution: Attribution) -> Attribution:
+    """The attribution with likelihood intervals of the accepted effects, and their best fit."""
+    accepted = attribution.accepted
+    if not accepted.fit.effects:
+        return attribution
+    return replace(attribution, accepted=explained(accepted.causes, profiled(accepted.fit)))
 
 
 def decide(attribution: Attribution, left: Adequacy, shown: tuple[Precondition, ...]) -> Verdict:

@@ -1,0 +1,111 @@
+"""Gauss-Newton within bounds: whole steps, then less of them, until none promises a gain."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from fish_env.identification.bounded import bounded_step
+
+FloatArray = npt.NDArray[np.float64]
+T = TypeVar("T")
+SHARES = (1.0, 0.5, 0.2)
+DAMPINGS = (0.1, 10.0)
+
+
+class Within(NamedTuple):
+    """Where a vector may go: ``low <= rows @ vector <= high``.
+
+    Attributes:
+        rows: (m, n) what is bounded, independent.
+        low: (m,) lower bounds.
+        high: (m,) upper bounds.
+        clip: the nearest vector (n,) that is allowed, whatever rounding makes of the bounds.
+    """
+
+    rows: FloatArray
+    low: FloatArray
+    high: FloatArray
+    clip: Callable[[FloatArray], FloatArray]
+
+    def step(self, hessian: FloatArray, gradient: FloatArray, vector: FloatArray) -> FloatArray:
+        """The step (n,) to the minimum of the quadratic model."""
+        bounds = (self.rows, self.low, self.high)
+        return bounded_step(hessian, gradient, vector, *bounds) - vector
+
+
+def descend(
+    start: FloatArray,
+    evaluate: Callable[[FloatArray], tuple[float, T]],
+    linearise: Callable[[FloatArray, T], tuple[FloatArray, FloatArray]],
+    within: Within,
+    iterations: int,
+    tolerance: float,
+) -> tuple[FloatArray, float, T]:
+    """Minimise a sum of squares, or what is nearly one.
+
+    Args:
+        start: (n,) where to begin.
+        evaluate: the objective at a vector, and what else was computed there.
+        linearise: half of the objective's Hessian (n, n), positive definite, and half of its
+            gradient (n,) at a vector.
+        within: bounds.
+        iterations: most steps.
+        tolerance: stop when no combination of parameters would move by more of its standard
+            deviation, the objective being -2 log likelihood.
+
+    Returns:
+        The vector reached, the objective there, and what else was computed.
+
+    Raises:
+        LinAlgError: the objective is not finite at the start.
+    """
+    vector = start
+    value, known = evaluate(vector)
+    if not np.isfinite(value):
+        raise np.linalg.LinAlgError("the simulation diverges at the start of the fit")
+    for _ in range(iterations):
+        hessian, gradient = linearise(vector, known)
+        whole = within.step(hessian, gradient, vector)
+        if promised(hessian, gradient, whole) < tolerance**2:
+            break
+        for trial in _trials(hessian, gradient, vector, whole, within):
+            trial_value, trial_known = evaluate(trial)
+            if trial_value < value:
+                vector, value, known = trial, trial_value, trial_known
+                break
+        else:
+            break
+    return vector, value, known
+
+
+def promised(hessian: FloatArray, gradient: FloatArray, step: FloatArray) -> float:
+    """By how much the quadratic model falls with a step.
+
+    It bounds the square of how far any combination of the parameters moves, in its own standard
+    deviations. The parameters one by one would not do: where two act alike both may go far for
+    nothing.
+    """
+    return float(-2.0 * gradient @ step - step @ hessian @ step)
+
+
+def _trials(
+    hessian: FloatArray,
+    gradient: FloatArray,
+    vector: FloatArray,
+    whole: FloatArray,
+    within: Within,
+) -> Iterator[FloatArray]:
+    """Where to look for a lower objective: a whole step further, then less far.
+
+    Shorter steps come before damped ones: damping would hold back directions that only the prior
+    decides, such as the difference of two coefficients that act alike.
+    """
+    for share in SHARES:
+        yield within.clip(vector + share * whole)
+    for damping in DAMPINGS:
+        damped = hessian + damping * np.diag(np.diag(hessian))
+        yield within.clip(vector + within.step(damped, gradient, vector))

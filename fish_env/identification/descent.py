@@ -14,6 +14,8 @@ FloatArray = npt.NDArray[np.float64]
 T = TypeVar("T")
 SHARES = (1.0, 0.5, 0.2)
 DAMPINGS = (0.1, 10.0)
+SLIGHT = 0.1
+"""A shortened step that gains less (in -2 log likelihood) follows the objective's roughness."""
 
 
 class Within(NamedTuple):
@@ -72,12 +74,14 @@ def descend(
         whole = within.step(hessian, gradient, vector)
         if promised(hessian, gradient, whole) < tolerance**2:
             break
+        before, tried = value, 0
         for trial in _trials(hessian, gradient, vector, whole, within):
+            tried += 1
             trial_value, trial_known = evaluate(trial)
             if trial_value < value:
                 vector, value, known = trial, trial_value, trial_known
                 break
-        else:
+        if tried > 1 and before - value < SLIGHT:
             break
     return vector, value, known
 

@@ -19,12 +19,12 @@ import numpy.typing as npt
 from fish_env.data.vocabulary import COMMANDS
 from fish_env.effects.extended import PREFIX, build_model
 from fish_env.effects.registry import catalogue
-from fish_env.identification.bounded import bounded_step
 from fish_env.identification.parameters import Baseline, measurement_of
 from fish_env.model.frames import euler_from_quaternion, quaternion_from_euler
 from fish_env.model.runtime import Grid
 from fish_env.model.state import BASE_STATES
 from fish_env.params.schema import FishParams
+from fish_env.studies.least_squares import bounded_step, without
 from fish_env.studies.tracks import CHANNELS, FREQUENCY, Track, Weights
 
 FloatArray = npt.NDArray[np.float64]
@@ -322,7 +322,7 @@ class _Sum:
                 left = left + own + damping * np.diag(np.diag(own))
                 right = right - slopes.T @ kept[:, -1]
             lower, upper = self.model.bounds()
-            move = bounded_step(left, -right, self.x, np.eye(size), lower, upper) - self.x
+            move = bounded_step(left, right, lower - self.x, upper - self.x)
         starts = self.starts.copy()
         for i, (residual, slopes, mine) in enumerate(self.parts):
             rest = residual + slopes @ move
@@ -381,10 +381,3 @@ def predict(
         found.append((reached.objective, starts))
     best = min(found, key=lambda pair: pair[0])[1]
     return np.asarray(model.roll(track, x[:, None], best.T)[0])
-
-
-def without(mine: FloatArray, columns: FloatArray) -> FloatArray:
-    """Columns (N, m) less what a run's own numbers, with slopes (N, k), can follow."""
-    basis, triangle = np.linalg.qr(mine)
-    basis = basis[:, np.abs(np.diag(triangle)) > 1e-10]
-    return np.asarray(columns - basis @ (basis.T @ columns))

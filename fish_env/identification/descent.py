@@ -14,8 +14,9 @@ FloatArray = npt.NDArray[np.float64]
 T = TypeVar("T")
 SHARES = (1.0, 0.5, 0.2)
 DAMPINGS = (0.1, 10.0)
-SLIGHT = 0.1
-"""A shortened step that gains less (in -2 log likelihood) follows the objective's roughness."""
+NEAR, SLIGHT = 1.0, 0.1
+"""Where the quadratic model promises less than the first (in -2 log likelihood), a shortened step
+that gains less than the second follows the objective's roughness."""
 
 
 class Within(NamedTuple):
@@ -72,7 +73,8 @@ def descend(
     for _ in range(iterations):
         hessian, gradient = linearise(vector, known)
         whole = within.step(hessian, gradient, vector)
-        if promised(hessian, gradient, whole) < tolerance**2:
+        promise = promised(hessian, gradient, whole)
+        if promise < tolerance**2:
             break
         before, tried = value, 0
         for trial in _trials(hessian, gradient, vector, whole, within):
@@ -81,7 +83,8 @@ def descend(
             if trial_value < value:
                 vector, value, known = trial, trial_value, trial_known
                 break
-        if tried > 1 and before - value < SLIGHT:
+        rough = tried > 1 and promise < NEAR and before - value < SLIGHT
+        if rough or value == before:
             break
     return vector, value, known
 

@@ -1,0 +1,90 @@
+"""The descent that fits of runs and of tables share, on problems whose answer is known."""
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from fish_env.identification.descent import SLIGHT, Within, descend
+
+
+def box(low, high):
+    low, high = np.asarray(low, float), np.asarray(high, float)
+    return Within(np.eye(len(low)), low, high, lambda x: np.clip(x, low, high))
+
+
+class Counted:
+    """A sum of squares that counts how often it is asked for."""
+
+    def __init__(self, residuals, slopes):
+        self.residuals, self.slopes, self.count = residuals, slopes, 0
+
+    def evaluate(self, x):
+        self.count += 1
+        r = self.residuals(x)
+        return float(r @ r), r
+
+    def linearise(self, x, r):
+        jacobian = self.slopes(x)
+        return jacobian.T @ jacobian + 1e-9 * np.eye(len(x)), jacobian.T @ r
+
+
+VALLEY = (
+    lambda x: np.array([10.0 * (x[1] - x[0] ** 2), 1.0 - x[0]]),
+    lambda x: np.array([[-20.0 * x[0], 10.0], [-1.0, 0.0]]),
+)
+"""Rosenbrock's function."""
+
+
+@pytest.mark.parametrize("high", [3.0, 0.7])
+def test_it_finds_the_minimum_within_bounds(high):
+    problem = Counted(*VALLEY)
+    within = box([-2.0, -2.0], [high, 3.0])
+    found, value, _ = descend(
+        np.array([-1.2, 1.0]), problem.evaluate, problem.linearise, within, 60, 1e-4
+    )
+    best = least_squares(VALLEY[0], [-1.2, 0.4], bounds=([-2.0, -2.0], [high, 3.0]), xtol=1e-12)
+    assert value <= 2.0 * best.cost + 1e-6
+    np.testing.assert_allclose(found, best.x, atol=1e-3)
+
+
+def test_it_leaves_a_bound_in_one_step():
+    """Most effects begin absent, at a bound, from which methods that reflect creep away."""
+    target = np.array([2.0, 3.0])
+    problem = Counted(lambda x: x - target, lambda x: np.eye(2))
+    found, _, _ = descend(
+        np.zeros(2), problem.evaluate, problem.linearise, box([0.0, 0.0], [9.0, 9.0]), 1, 0.1
+    )
+    np.testing.assert_allclose(found, target, atol=1e-6)
+
+
+@pytest.mark.parametrize("likeness", [0.0, 0.999999])
+def test_two_that_act_alike_do_not_keep_it_going(likeness):
+    """Each may go far for nothing; only what a combination gains counts."""
+    root = np.array([[1.0, likeness], [0.0, np.sqrt(1.0 - likeness**2)]]) * 100.0
+    start = np.linalg.solve(root, np.array([0.05, 0.05]))
+    problem = Counted(lambda x: root @ x, lambda x: root)
+    descend(start, problem.evaluate, problem.linearise, box([-9, -9], [9, 9]), 9, 0.1)
+    assert problem.count == 1
+
+
+@pytest.mark.parametrize(("promise", "counted"), [(0.7, 6), (7.0, 101)])
+def test_it_does_not_follow_roughness(promise, counted):
+    """Slopes across corners are a little wrong: only the shortest step gains, and hardly."""
+    values = iter(np.repeat(np.arange(0.0, -3.0, -0.2 * SLIGHT), 5)[4:])
+    asked = []
+
+    def evaluate(x):
+        asked.append(x)
+        return next(values), None
+
+    def linearise(x, known):
+        return np.eye(1), np.array([np.sqrt(promise)])
+
+    descend(np.zeros(1), evaluate, linearise, box([-99], [99]), 20, 0.01)
+    assert len(asked) == counted
+
+
+def test_a_start_without_an_objective_is_an_error():
+    within = box([-1.0], [1.0])
+    with pytest.raises(np.linalg.LinAlgError, match="diverges"):
+        descend(np.zeros(1), lambda x: (np.inf, None), lambda x, known: None, within, 3, 0.1)

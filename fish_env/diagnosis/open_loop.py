@@ -47,8 +47,8 @@ def errors(problem: Problem, point: Point, noise: NoiseModel) -> list[FloatArray
 def windows(run: RunData, filtered: Filtered, length_s: float) -> list[RunData]:
     """A run cut into windows that start from its filtered states.
 
-    Effects with states of their own start as at the start of a run. Time goes on counting from the
-    run's start, for effects that grow with it.
+    Effects with states of their own start where beating as commanded has left them. Time goes on
+    counting from the run's start, for effects that grow with it.
     """
     edges = np.arange(0.0, run.duration - 0.5 * length_s, length_s)
     starts = np.searchsorted(run.clock, edges)
@@ -70,5 +70,6 @@ def _cut(run: RunData, state: FloatArray, first: int, last: int) -> RunData:
         command_values=np.ascontiguousarray(run.command_values[max(held, 0) :]),
         measured=np.ascontiguousarray(run.measured[first:last]),
         state0=np.ascontiguousarray(state),
+        swimming=run.swimming or first > 0,
         as_measured=False,
     )

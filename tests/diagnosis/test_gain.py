@@ -1,11 +1,19 @@
 """Gain on final runs: share of the reachable gap, and predictions without feedback."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from fish_env.data import CommandSteps, Dataset, Run
 from fish_env.diagnosis import open_loop
 from fish_env.diagnosis.gain import reachable_share
+from fish_env.identification import Problem
+from fish_env.identification.filtering import NoiseModel
+from fish_env.identification.problem import Point
 from fish_env.identification.runs import RunData
+from fish_env.simulator import Simulator
+from tests.identification.synthetic import ALL, FISH
 
 
 def squares(level, runs=3, windows=10, seed=0):
@@ -66,3 +74,25 @@ def test_windows_know_the_command_that_holds_when_they_begin():
     filtered = open_loop.without_feedback(run, states=20)
     begun = [piece.command_values[0, 0] for piece in open_loop.windows(run, filtered, 3.0)]
     assert begun == [0.0, 0.0, 5.0]
+
+
+def test_a_window_does_not_begin_with_a_soft_tail_unbent():
+    """It would take a good part of the window to bend as it has for long."""
+    soft = {"natural_frequency": 3.0, "damping_ratio": 0.1}
+    beat = np.array([[0.1, 0.3, 1.7, 0.0, 0.0]])
+    command = {"t": 0.0, "tail_offset": 0.1, "tail_amplitude": 0.3, "tail_frequency": 1.7}
+    swum = Simulator(FISH, 0.0025, {"tail_flexibility": soft}).run([command], 9.0, rate_hz=25.0)
+    shown = {name: np.asarray(swum[name]) for name in ALL}
+    run = Run("r", swum.time_s, shown, CommandSteps(np.zeros(1), beat), "rest", 0.0)
+    sd = dict.fromkeys(ALL, 1e-3)
+    problem = Problem(Dataset("soft", FISH, (run,), sd), paths=(), effects=["tail_flexibility"])
+    truth = Point(np.zeros(0), {f"effects.tail_flexibility.{n}": v for n, v in soft.items()})
+    noise = NoiseModel(np.full(len(problem.channels), 1e-3), 1e-4, 1e-6, 1.0)
+
+    pieces = open_loop.windows(problem.runs[0], problem.filtered(truth, noise)[0], 3.0)[1:]
+    unbent = [replace(piece, swimming=False) for piece in pieces]
+    left, before = (
+        np.sqrt(np.mean(np.concatenate(open_loop.errors(problem.with_runs(w), truth, noise)) ** 2))
+        for w in (pieces, unbent)
+    )
+    assert left < 0.3 * before

@@ -130,14 +130,17 @@ class Imitation:
         epochs: passes through what was collected, after each round.
         gains: gains of the teacher that differ from those of the PID controller, see
             :class:`agents.training.teacher_gains.TeacherGains`.
+        stretch: what the fitted block displacement is multiplied by in the end.
     """
 
     rounds: int = 0
     epochs: int = 8
+    stretch: float = 1.0
     gains: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         _check(self.rounds >= 0 and self.epochs > 0, "imitate: rounds >= 0 and epochs > 0")
+        _check(self.stretch > 0.0, "imitate: stretch > 0")
         for name, value in self.gains.items():
             known = ", ".join(TEACHER_GAIN_NAMES)
             _check(

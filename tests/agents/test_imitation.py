@@ -4,13 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import torch
 
 from agents.controllers import PIDController
 from agents.evaluation.suites import load_suite
 from agents.policies import PretrainedPolicy
 from agents.policies.export import export_policy
 from agents.training.config import Evaluation, Imitation, TrainConfig
-from agents.training.imitation import Swim, _returns, imitate
+from agents.training.imitation import BLOCK, Swim, _policy, _returns, _stretch, imitate
 from agents.training.model import make_model
 from agents.training.stack import make_stack, seed_episodes
 from agents.training.teacher import ForesightPID, beyond, true_observations
@@ -49,6 +50,16 @@ def test_a_teacher_that_says_nothing_is_noticed(monkeypatch):
 def test_it_is_for_ppo_alone():
     with pytest.raises(ConfigError, match="needs ppo"):
         replace(CONFIG, algorithm="sac")
+
+
+def test_the_block_alone_is_stretched():
+    model = make_model(CONFIG, make_stack(CONFIG))
+    seen = torch.as_tensor(np.random.default_rng(0).standard_normal((7, 33)), dtype=torch.float32)
+    before = _policy(model.policy, seen)
+    _stretch(model, 1.5)
+    factors = torch.ones(5)
+    factors[BLOCK] = 1.5
+    torch.testing.assert_close(_policy(model.policy, seen), before * factors)
 
 
 def test_values_are_fitted_to_discounted_returns():

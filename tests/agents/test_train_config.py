@@ -54,6 +54,7 @@ def test_a_shipped_configuration_reads_and_writes(name, tmp_path):
         ({"network": {"first_action": [0.5]}}, "first_action"),
         ({"imitate": {"gains": {"depht": 1.0}}}, "unknown gain .depht."),
         ({"imitate": {"gains": {"hurry": "much"}}}, "finite number"),
+        ({"imitate": {"stretch": 0.0}}, "stretch > 0"),
         ({"history": {"frames": 0}}, "frames"),
         ({"history": {"low_pass_s": [0.01]}}, "low_pass_s"),
         ({"environment": {"curent": [0, 0, 0]}}, "unknown key 'curent'"),

@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
+import cma
 import numpy as np
 import numpy.typing as npt
 import yaml
@@ -185,43 +186,18 @@ def evolve(
     merits: Callable[[FloatArray], FloatArray], start: FloatArray, sigma: float, generations: int,
     candidates: int, seed: int,
 ) -> Iterator[tuple[FloatArray, float]]:  # fmt: skip
-    """CMA-ES as in Hansen's tutorial (arXiv:1604.00772): the mean and its merit, each generation.
+    """CMA-ES in the unit cube: what it takes for the best, and its candidates' best merit.
 
-    Points lie in the unit cube; those outside are judged at its surface, with a penalty.
+    By pycma, the reference implementation of the method's author, which knows how to keep to
+    bounds.
     """
-    n, parents = len(start), candidates // 2
-    rng = np.random.default_rng(seed)
-    weights = np.log(parents + 0.5) - np.log(np.arange(1, parents + 1))
-    weights /= weights.sum()
-    mass = 1.0 / (weights**2).sum()
-    c_path = (4 + mass / n) / (n + 4 + 2 * mass / n)
-    c_sigma = (mass + 2) / (n + mass + 5)
-    c_one = 2 / ((n + 1.3) ** 2 + mass)
-    c_rank = min(1 - c_one, 2 * (mass - 2 + 1 / mass) / ((n + 2) ** 2 + mass))
-    damping = 1 + 2 * max(0.0, np.sqrt((mass - 1) / (n + 1)) - 1) + c_sigma
-    length = np.sqrt(n) * (1 - 1 / (4 * n) + 1 / (21 * n * n))
-    mean, covariance = start.copy(), np.eye(n)
-    path, path_sigma = np.zeros((2, n))
-    for generation in range(generations):
-        squares, axes = np.linalg.eigh(covariance)
-        spread = np.sqrt(np.maximum(squares, 1e-12))
-        steps = (rng.standard_normal((candidates, n)) * spread) @ axes.T
-        steps[0] = 0.0
-        points = mean + sigma * steps
-        inside = np.clip(points, 0.0, 1.0)
-        found = merits(inside) - ((points - inside) ** 2).sum(axis=1)
-        best = steps[np.argsort(-found)[:parents]]
-        move = weights @ best
-        mean = mean + sigma * move
-        yield np.clip(mean, 0.0, 1.0), float(found[0])
-        path_sigma = (1 - c_sigma) * path_sigma
-        path_sigma += np.sqrt(c_sigma * (2 - c_sigma) * mass) * axes @ ((axes.T @ move) / spread)
-        ratio = np.linalg.norm(path_sigma) / length
-        settled = ratio / np.sqrt(1 - (1 - c_sigma) ** (2 * generation + 2)) < 1.4 + 2 / (n + 1)
-        path = (1 - c_path) * path + settled * np.sqrt(c_path * (2 - c_path) * mass) * move
-        covariance = (1 - c_one - c_rank) * covariance + c_one * np.outer(path, path)
-        covariance += c_rank * (best.T * weights) @ best
-        sigma *= np.exp(c_sigma / damping * (ratio - 1))
+    options = {"popsize": candidates, "bounds": [0.0, 1.0], "seed": seed + 1, "verbose": -9}
+    search = cma.CMAEvolutionStrategy(start, sigma, options)
+    for _ in range(generations):
+        points = search.ask()
+        found = merits(np.array(points))
+        search.tell(points, (-found).tolist())
+        yield np.clip(search.result.xfavorite, 0.0, 1.0), float(found.max())
 
 
 def tune(aim: Aim, start: FloatArray, options: argparse.Namespace) -> FloatArray:

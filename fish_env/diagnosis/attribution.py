@@ -158,6 +158,8 @@ def extended(
         others_like = [e for e in tried[1:] if explained_away(e.causes[-1], screens[-2], after)]
         rivals = rivals_of(current, [*others_like, *exchanges[1:]])
     current = pruned(current)
+    # With a cause dropped, an explanation that has what is left and more is none of its own.
+    rivals = tuple(e for e in rivals if not set(current.causes) <= set(e.causes))
     return Attribution(begun.baseline, tuple(screens), current, rivals, ranking, total)
 
 

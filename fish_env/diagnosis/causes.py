@@ -44,6 +44,12 @@ class Cause:
         return self.path is None
 
 
+class Knowing(Protocol):
+    """A problem that knows effects by name."""
+
+    known: dict[str, Effect]
+
+
 class Tested(Protocol):
     """A test of a cause."""
 
@@ -187,6 +193,21 @@ def combined(
     return values
 
 
+def mirrored(effect: Effect, probe: Probe) -> Probe:
+    """The setting as far on the other side of neutral, within what physics allows."""
+    limits = {p.name: p for p in effect.parameters if not p.shapes and np.isfinite(p.neutral)}
+    return {
+        name: float(np.clip(2.0 * limits[name].neutral - value, *_bounds(limits[name])))
+        if name in limits
+        else value
+        for name, value in probe.items()
+    }
+
+
+def _bounds(parameter: EffectParameter) -> tuple[float, float]:
+    return parameter.lower, parameter.upper
+
+
 def finer(effect: Effect, probe: Probe, length: float) -> tuple[tuple[Probe, ...], ...]:
     """Sine and cosine at frequencies and other shapes around those of a probe.
 
@@ -265,7 +286,7 @@ def _small(p: EffectParameter) -> float:
     return low if abs(low - p.neutral) < abs(high - p.neutral) else high
 
 
-def effect_values(problem: Problem, name: str, probe: Probe) -> dict[str, float]:
+def effect_values(problem: Knowing, name: str, probe: Probe) -> dict[str, float]:
     """A probe as paths of the problem."""
     neutral = problem.known[name].neutral
     return {f"{PREFIX}{name}.{key}": probe.get(key, value) for key, value in neutral.items()}

@@ -9,16 +9,25 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import chi2
 
-from fish_env.diagnosis.causes import Cause, same_causes
+from fish_env.diagnosis.causes import (
+    Cause,
+    Probe,
+    combined,
+    effect_values,
+    mirrored,
+    same_causes,
+)
 from fish_env.diagnosis.steady.fitting import (
     SteadyFit,
     fit,
-    freedoms_of,
+    lines,
+    measured,
     noise_of,
     with_scatter,
 )
+from fish_env.diagnosis.steady.freedoms import freedoms_of
 from fish_env.diagnosis.steady.scatter import Scatter, push_variances, response
-from fish_env.diagnosis.steady.screening import Screen, Signal, effect_values, screen
+from fish_env.diagnosis.steady.screening import Screen, Signal, screen
 from fish_env.errors import DatasetError
 from fish_env.identification.problem import Point
 
@@ -207,24 +216,34 @@ def _refit(current: Explanation, signal: Signal) -> Explanation | None:
 
 
 def starts(base: SteadyFit, signal: Signal) -> list[Point]:
-    """Where to begin: the linear estimate, and the probe, both within bounds."""
+    """Where to begin: the linear estimate, and what meets the averages best of every probe.
+
+    Probes of either sign, once with the refitted coefficients and once with the nominal ones: the
+    refitted may have gone far to make up for the cause, and meet the averages best without it.
+    """
     problem, cause = base.problem, signal.cause
-    size = np.linalg.solve(signal.projected, signal.score)
-    neutral = problem.neutral([cause.name])
-    probes = [effect_values(problem, cause.name, p) for p in cause.probes[signal.probe]]
-    linear, together = dict(neutral), dict(neutral)
-    for factor, probe in zip(size, probes, strict=True):
-        for path, value in probe.items():
-            if np.isinf(neutral[path]):
-                linear[path] = together[path] = value
-            elif value != neutral[path]:
-                linear[path] += factor * (value - neutral[path])
-                together[path] = value
+    effect = problem.known[cause.name]
+    size = np.linalg.solve(signal.projected, signal.score).tolist()
+    linear = combined(effect, cause.probes[signal.probe], size, effect.neutral)
+    probes = [probe for alternative in cause.probes for probe in alternative]
     bounds = {f.path: (f.lower, f.upper) for f in freedoms_of(problem, [cause.name])}
-    return [
-        Point(base.point.z, {**base.point.effects, **_within(values, bounds)})
-        for values in (linear, together)
-    ]
+
+    def points(z: FloatArray, settings: Sequence[Probe]) -> list[Point]:
+        values = [_within(effect_values(problem, cause.name, s), bounds) for s in settings]
+        return [Point(z, {**base.point.effects, **own}) for own in values]
+
+    either = [*probes, *(mirrored(effect, probe) for probe in probes)]
+    chosen = [_closest(base, points(z, either)) for z in (base.point.z, 0.0 * base.point.z)]
+    return [*points(base.point.z, [linear]), *(point for point in chosen if point)]
+
+
+def _closest(base: SteadyFit, points: Sequence[Point]) -> Point | None:
+    """The point at which the averages are met best; None where none swims steadily."""
+    problem = base.problem
+    means = problem.means(problem.orbits(points, base.orbits))
+    missed = measured(problem, base.scatter) - lines(problem, means, base.scatter)
+    values = (missed**2).sum(axis=1)
+    return points[int(np.nanargmin(values))] if np.isfinite(values).any() else None
 
 
 def _within(values: dict[str, float], bounds: dict[str, tuple[float, float]]) -> dict[str, float]:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from fish_env.diagnosis.steady.freedoms import freedoms_of
 from fish_env.diagnosis.steady.orbit import Orbits
 from fish_env.diagnosis.steady.problem import SteadyProblem
 from fish_env.diagnosis.steady.scatter import (
@@ -21,7 +22,6 @@ from fish_env.diagnosis.steady.scatter import (
     response,
     scatter_of,
 )
-from fish_env.effects.extended import PREFIX
 from fish_env.errors import DatasetError
 from fish_env.identification.descent import Within, descend
 from fish_env.identification.problem import Point, finite_values
@@ -36,24 +36,6 @@ objective is asked for."""
 UNSEEN = 1e-9
 """Information of a number that the averages do not depend on."""
 STEPS = 12
-REACH = 3.0
-"""How many times its plausible departure an effect may be off."""
-
-
-@dataclass(frozen=True)
-class Freedom:
-    """A free number of a fit, in units of its own.
-
-    Attributes:
-        path: of a coefficient, or ``effects.<name>.<parameter>``.
-        lower, upper: bounds.
-        unit: natural size of a change.
-    """
-
-    path: str
-    lower: float
-    upper: float
-    unit: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,24 +115,6 @@ class SteadyFit:
         return info.lower, info.upper
 
 
-def freedoms_of(problem: SteadyProblem, effects: Sequence[str]) -> list[Freedom]:
-    """Free numbers of effects: within physical bounds and some times what is plausible."""
-    found = []
-    for name in effects:
-        effect = problem.known[name]
-        for p in effect.parameters:
-            low, high = p.plausible
-            if np.isfinite(p.neutral):
-                away = REACH * max(abs(low - p.neutral), abs(high - p.neutral))
-                lower, upper = max(p.lower, p.neutral - away), min(p.upper, p.neutral + away)
-            else:
-                lower, upper = max(p.lower, low / REACH), min(p.upper, high * REACH)
-            if effect.time_scale is not None and p.unit == "s":
-                lower = max(lower, 0.9 * problem.dt)
-            found.append(Freedom(f"{PREFIX}{name}.{p.name}", lower, upper, 0.25 * (high - low)))
-    return found
-
-
 def lines(problem: SteadyProblem, values: FloatArray, scatter: Scatter) -> FloatArray:
     """Averages (..., C, K) as whitened rows of the table, (..., D)."""
     table = problem.table
@@ -211,7 +175,10 @@ def fit(
     for _ in range(rounds - 1):
         pushes = push_variances(response(problem, current.point, current.orbits))
         known = noise_of(current, pushes)
-        current = _fit_once(problem, effects, current.point, current.orbits, known, released, steps)
+        # The first noise is a guess, under which the fit may have gone to a minimum far away.
+        begun = ((current.point, current.orbits), (point, orbits))
+        found = [_fit_once(problem, effects, *own, known, released, steps) for own in begun]
+        current = min(found, key=lambda f: f.objective)
     return with_scatter(current, noise_of(current, pushes))
 
 

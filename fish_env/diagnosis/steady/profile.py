@@ -15,9 +15,9 @@ from scipy.stats import chi2
 from fish_env.diagnosis.steady.fitting import (
     SteadyFit,
     fit_near,
-    freedoms_of,
     objective_at,
 )
+from fish_env.diagnosis.steady.freedoms import freedoms_of
 from fish_env.diagnosis.steady.orbit import Orbits
 from fish_env.identification.problem import Point
 

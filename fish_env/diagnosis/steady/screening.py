@@ -16,7 +16,7 @@ import numpy.typing as npt
 from scipy.optimize import brentq
 from scipy.stats import chi2, ncx2, norm
 
-from fish_env.diagnosis.causes import Cause, Probe, best_of_each, probes_of
+from fish_env.diagnosis.causes import Cause, Probe, best_of_each, effect_values, probes_of
 from fish_env.diagnosis.steady.fitting import SteadyFit, lines
 from fish_env.diagnosis.steady.orbit import coordinates
 from fish_env.diagnosis.steady.problem import SteadyProblem
@@ -216,12 +216,6 @@ def _effect_signals(fit: SteadyFit, projector: Projector, causes: Sequence[Cause
             sided = len(chosen) == 1 and one_sided(problem.known[name])
             found.append(projector.signal(cause, index, columns[:, chosen], sided))
     return [signal for signal in found if signal is not None]
-
-
-def effect_values(problem: SteadyProblem, name: str, probe: Probe) -> dict[str, float]:
-    """A probe as paths of effect parameters."""
-    neutral = problem.known[name].neutral
-    return {f"{PREFIX}{name}.{key}": probe.get(key, value) for key, value in neutral.items()}
 
 
 def one_sided(effect: Effect) -> bool:

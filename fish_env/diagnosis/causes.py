@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Protocol, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from fish_env.effects.extended import PREFIX
 from fish_env.identification.problem import Problem
 from fish_env.model.effect import Effect, EffectParameter
 
+FloatArray = npt.NDArray[np.float64]
 Probe = Mapping[str, float]
 PARAMETER = "parameter:"
 ALIKE = ({"body.plane_xz.drag.c0", "body.plane_xy.drag.c0"},)
@@ -60,6 +62,7 @@ class Tested(Protocol):
 
 
 T = TypeVar("T", bound=Tested)
+S = TypeVar("S")
 
 
 def coefficient_sizes(tests: Iterable[T], smallest: Callable[[T], float]) -> dict[str, float]:
@@ -76,6 +79,35 @@ def best_of_each(tests: Iterable[T], log_p: Callable[[T], float]) -> list[T]:
     for test in sorted(tests, key=log_p):
         chosen.setdefault(test.cause.name, test)
     return list(chosen.values())
+
+
+def of_visible(
+    test: Callable[[Cause, int, FloatArray], S | None],
+    cause: Cause,
+    probe: int,
+    columns: FloatArray,
+) -> S | None:
+    """The test of those settings of an alternative that change something in what is measured.
+
+    A camera overhead sees a compass that is mounted askew, and nothing of its roll and pitch.
+
+    Args:
+        test: of a cause at an alternative by what its settings change; None where one of them
+            leaves nothing.
+        cause: the cause.
+        probe: index of the alternative.
+        columns: (D, m) what its m settings change.
+    """
+    settings = range(columns.shape[1])
+    whole = test(cause, probe, columns)
+    if whole is not None:
+        return whole
+    live = [i for i in settings if test(cause, probe, columns[:, [i]]) is not None]
+    if not live or len(live) == len(settings):
+        return None
+    probes = list(cause.probes)
+    probes[probe] = tuple(cause.probes[probe][i] for i in live)
+    return test(replace(cause, probes=tuple(probes)), probe, columns[:, live])
 
 
 def causes_of(problem: Problem) -> tuple[Cause, ...]:

@@ -127,7 +127,12 @@ def _settings(problem: Problem, screen: Screen, signal: Signal) -> list[Setting]
         for other in _alternatives(screen)[effect.name]
         if all(_probe(other)[name] == _probe(signal)[name] for name in shapes)
     )
-    return [Setting(mildest, i, p.name, p.neutral) for i, p in enumerate(switches)]
+    settings = mildest.cause.probes[mildest.probe]  # of those that the channels show
+    return [
+        Setting(mildest, i, p.name, p.neutral)
+        for p in switches
+        for i in [i for i, s in enumerate(settings) if s.get(p.name, p.neutral) != p.neutral][:1]
+    ]
 
 
 def _probe(signal: Signal) -> Probe:

@@ -17,7 +17,7 @@ from scipy.optimize import brentq
 from scipy.special import chdtrc
 from scipy.stats import chi2, ncx2
 
-from fish_env.diagnosis.causes import Cause, Probe, best_of_each, effect_values, finer
+from fish_env.diagnosis.causes import Cause, Probe, best_of_each, effect_values, finer, of_visible
 from fish_env.effects.extended import PREFIX
 from fish_env.identification.estimator import Fit
 from fish_env.identification.information import (
@@ -221,7 +221,7 @@ def _effect_signals(fit: Fit, projector: Projector, causes: Sequence[Cause]) -> 
     names = [(cause.name, index) for cause, index, _ in jobs]
     for key in dict.fromkeys(names):
         chosen = [i for i, name in enumerate(names) if name == key]
-        signal = projector.signal(jobs[chosen[0]][0], key[1], columns[:, chosen])
+        signal = of_visible(projector.signal, jobs[chosen[0]][0], key[1], columns[:, chosen])
         if signal is not None:
             signals.append(signal)
     return signals

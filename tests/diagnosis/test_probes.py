@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fish_env.diagnosis.causes import combined, finer, probes_of
+from fish_env.diagnosis.causes import Cause, combined, finer, of_visible, probes_of
 from fish_env.effects import catalogue
 from fish_env.model.effect import Effect, EffectParameter
 
@@ -104,3 +104,28 @@ def test_probes_are_slow_enough_for_the_step():
     assert len(probes_of(catalogue()["servo_lag"], step)) == 2
     fastest = min(p["time_constant"] for a in probes_of(catalogue()["servo_lag"]) for p in a)
     assert fastest < 0.9 * step  # without the rule one of them would be too quick
+
+
+class Told:
+    """Stands for a projector: columns of zeros leave nothing."""
+
+    def signal(self, cause, probe, columns):
+        return (cause, columns.shape[1]) if np.abs(columns).sum(axis=0).all() else None
+
+
+@pytest.mark.parametrize(
+    ("seen", "left"), [([1, 1, 1], 3), ([0, 0, 1], 1), ([1, 0, 1], 2), ([0, 0, 0], None)]
+)
+def test_what_the_channels_do_not_show_does_not_hide_the_rest(seen, left):
+    """A camera sees the yaw of a compass mounted askew, and nothing of its roll and pitch."""
+    cause = Cause("attitude_misalignment", probes_of(catalogue()["attitude_misalignment"]))
+    columns = np.array([seen, seen], float)
+    found = of_visible(Told().signal, cause, 0, columns)
+    if left is None:
+        assert found is None
+        return
+    trimmed, count = found
+    kept = [probe for probe, shown in zip(cause.probes[0], seen, strict=True) if shown]
+    assert count == left
+    assert list(trimmed.probes[0]) == kept
+    assert trimmed.probes[1:] == cause.probes[1:]

@@ -10,13 +10,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import brentq
 from scipy.stats import chi2, ncx2, norm
 
-from fish_env.diagnosis.causes import Cause, Probe, best_of_each, effect_values, probes_of
+from fish_env.diagnosis.causes import (
+    Cause,
+    Probe,
+    best_of_each,
+    effect_values,
+    of_visible,
+    probes_of,
+)
 from fish_env.diagnosis.steady.fitting import SteadyFit, lines
 from fish_env.diagnosis.steady.orbit import coordinates
 from fish_env.diagnosis.steady.problem import SteadyProblem
@@ -212,9 +220,9 @@ def _effect_signals(fit: SteadyFit, projector: Projector, causes: Sequence[Cause
     found = []
     for (name, index), chosen in groups.items():
         if np.isfinite(columns[:, chosen]).all():
-            cause = jobs[chosen[0]][0]
             sided = len(chosen) == 1 and one_sided(problem.known[name])
-            found.append(projector.signal(cause, index, columns[:, chosen], sided))
+            test = partial(projector.signal, one_sided=sided)
+            found.append(of_visible(test, jobs[chosen[0]][0], index, columns[:, chosen]))
     return [signal for signal in found if signal is not None]
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fish_env.diagnosis.causes import Cause, combined, finer, of_visible, probes_of
+from fish_env.diagnosis.causes import Cause, combined, finer, mirrored, of_visible, probes_of
 from fish_env.effects import catalogue
 from fish_env.model.effect import Effect, EffectParameter
 
@@ -129,3 +129,17 @@ def test_what_the_channels_do_not_show_does_not_hide_the_rest(seen, left):
     assert count == left
     assert list(trimmed.probes[0]) == kept
     assert trimmed.probes[1:] == cause.probes[1:]
+
+
+@pytest.mark.parametrize("name", EFFECTS)
+def test_a_mirrored_probe_is_as_far_on_the_other_side_or_at_its_bound(name):
+    effect = catalogue()[name]
+    for probe in (p for alternative in probes_of(effect) for p in alternative):
+        other = mirrored(effect, probe)
+        for parameter in effect.parameters:
+            value, neutral = probe[parameter.name], parameter.neutral
+            if parameter.shapes or np.isinf(neutral):
+                assert other[parameter.name] == value
+            else:
+                wanted = np.clip(2.0 * neutral - value, parameter.lower, parameter.upper)
+                assert other[parameter.name] == pytest.approx(wanted)

@@ -5,14 +5,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from fish_env.data import load_dataset
 from fish_env.diagnosis.steady import profile
 from fish_env.diagnosis.steady.fitting import SteadyFit, fit, fit_near
+from fish_env.diagnosis.steady.pipeline import split_conditions
 from fish_env.diagnosis.steady.problem import SteadyProblem
 from fish_env.diagnosis.steady.profile import profiled
 from fish_env.diagnosis.steady.table import table_of
 from fish_env.identification.problem import Point
 from fish_env.params import load_fish
 from tests.diagnosis.test_steady import table
+from tests.hidden.cases import make_case
 
 PATH = "effects.tail_reactive.scale"
 
@@ -98,3 +101,15 @@ def test_the_interval_holds_the_truth(reactive):
     own, scale = reactive
     low, high = profiled(own).interval(PATH)
     assert low < scale < high
+
+
+def test_a_refit_is_not_stuck_where_its_first_noise_led(tmp_path):
+    """Under the first guess of the noise another minimum is nearer."""
+    make_case("steady", 5002, tmp_path / "case")
+    data = load_dataset(tmp_path / "case")
+    whole = SteadyProblem(table_of(data), load_fish(data.fish))
+    problem = whole.on(split_conditions(data, whole.table, 5002)[0])
+    own = fit(problem)
+    polished = fit_near(own, own.point, own.orbits)
+    from_nominal = fit_near(own, problem.start, problem.orbits([problem.start]))
+    assert polished.objective < from_nominal.objective + 0.5

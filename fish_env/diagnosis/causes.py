@@ -227,17 +227,11 @@ def combined(
 
 def mirrored(effect: Effect, probe: Probe) -> Probe:
     """The setting as far on the other side of neutral, within what physics allows."""
-    limits = {p.name: p for p in effect.parameters if not p.shapes and np.isfinite(p.neutral)}
-    return {
-        name: float(np.clip(2.0 * limits[name].neutral - value, *_bounds(limits[name])))
-        if name in limits
-        else value
-        for name, value in probe.items()
-    }
-
-
-def _bounds(parameter: EffectParameter) -> tuple[float, float]:
-    return parameter.lower, parameter.upper
+    other = dict(probe)
+    for p in effect.parameters:
+        if not p.shapes and np.isfinite(p.neutral):
+            other[p.name] = float(np.clip(2.0 * p.neutral - probe[p.name], p.lower, p.upper))
+    return other
 
 
 def finer(effect: Effect, probe: Probe, length: float) -> tuple[tuple[Probe, ...], ...]:

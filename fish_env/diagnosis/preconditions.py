@@ -127,12 +127,12 @@ def _settings(problem: Problem, screen: Screen, signal: Signal) -> list[Setting]
         for other in _alternatives(screen)[effect.name]
         if all(_probe(other)[name] == _probe(signal)[name] for name in shapes)
     )
-    settings = mildest.cause.probes[mildest.probe]  # of those that the channels show
-    return [
-        Setting(mildest, i, p.name, p.neutral)
-        for p in switches
-        for i in [i for i, s in enumerate(settings) if s.get(p.name, p.neutral) != p.neutral][:1]
-    ]
+    first: dict[str, int] = {}  # no setting of what the channels do not show
+    for i, setting in enumerate(mildest.cause.probes[mildest.probe]):
+        for p in switches:
+            if setting[p.name] != p.neutral:
+                first.setdefault(p.name, i)
+    return [Setting(mildest, first[p.name], p.name, p.neutral) for p in switches if p.name in first]
 
 
 def _probe(signal: Signal) -> Probe:

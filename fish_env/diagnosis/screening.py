@@ -109,7 +109,11 @@ class Screen:
 
 
 class Projector:
-    """Removes from signals what a refit of the free parameters of a fit would follow."""
+    """Removes from signals what a refit of the free parameters of a fit would follow.
+
+    A refit follows nothing across a bound that holds it back already: the tangent space is that
+    of the bounds the fit is pressed against.
+    """
 
     def __init__(self, fit: Fit) -> None:
         self.lin = fit.linearised
@@ -119,14 +123,36 @@ class Projector:
         self.vector = np.concatenate([fit.point.z, np.zeros(slopes.shape[1] - len(baseline))])
         self.hessian = information(slopes, self.prior)
         self.factor = np.linalg.cholesky(self.hessian)
+        self.held = fit.held
         self.blocks = [
             block_index(self.lin.run_of, self.lin.time_of, s) for s in (BLOCK_S, LONG_BLOCK_S)
         ]
 
     def coefficients(self, columns: FloatArray) -> FloatArray:
         """How a refit follows the columns: (n, m)."""
-        right = inner(self.lin.slopes, columns)
-        return np.asarray(np.linalg.solve(self.factor.T, np.linalg.solve(self.factor, right)))
+        return self.moved(inner(self.lin.slopes, columns), self.held)
+
+    def moved(self, pull: FloatArray, held: FloatArray) -> FloatArray:
+        """How far a pull (n, m) takes the free parameters, along bounds (k, n) that hold."""
+        free = self._free(pull)
+        if not len(held):
+            return free
+        across = self._free(held.T)
+        return np.asarray(free - across @ np.linalg.solve(held @ across, held @ free))
+
+    def let_go(self, i: int) -> tuple[float, float]:
+        """Where one coefficient settles when no bound of its own holds it, and its variance."""
+        own = np.array([np.flatnonzero(row)[-1] == i for row in self.held], bool)
+        others = self.held[~own]
+        variance = float(self.moved(np.eye(len(self.vector))[:, [i]], others)[i, 0])
+        at = float(self.vector[i])
+        if own.any():
+            pull = inner(self.lin.slopes, self.lin.residuals[:, None])
+            at -= float(self.moved(pull + (self.prior * self.vector)[:, None], others)[i, 0])
+        return at, variance
+
+    def _free(self, pull: FloatArray) -> FloatArray:
+        return np.asarray(np.linalg.solve(self.factor.T, np.linalg.solve(self.factor, pull)))
 
     def signal(
         self, cause: Cause, probe: int, columns: FloatArray, strain: bool = True
@@ -270,19 +296,20 @@ def _coefficient_signals(projector: Projector, causes: Sequence[Cause], fit: Fit
     """Lifting the prior of one baseline coefficient.
 
     Under the prior the posterior mean of z has variance 1 - s^2 (s^2: its posterior variance), so
-    z^2 / (1 - s^2) is chi-squared with one degree of freedom when the prior holds.
+    z^2 / (1 - s^2) is chi-squared with one degree of freedom when the prior holds. A coefficient
+    that a bound holds counts with where it would go.
     """
-    inverse = np.linalg.inv(projector.hessian)
     signals = []
     for cause in causes:
         if cause.is_effect:
             continue
         i = fit.problem.baseline.paths.index(cause.path or "")
-        left = 1.0 - inverse[i, i]
+        at, variance = projector.let_go(i)
+        left = 1.0 - variance
         if left < 0.05:
             continue
         column = projector.lin.slopes[:, [i]]
-        score = np.array([fit.point.z[i]])
+        score = np.array([at])
         energy = float((column**2).sum())
         signals.append(Signal(cause, -1, column, energy, np.array([[left]]), score, 1.0))
     return signals

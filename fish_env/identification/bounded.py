@@ -14,14 +14,14 @@ ROUNDS = 40
 ROUNDING = 1e-10
 
 
-def bounded_step(
+def bounded_minimum(
     hessian: FloatArray,
     gradient: FloatArray,
     vector: FloatArray,
     rows: FloatArray,
     low: FloatArray,
     high: FloatArray,
-) -> FloatArray:
+) -> tuple[FloatArray, dict[int, bool]]:
     """The vector that minimises the quadratic model with ``low <= rows @ vector <= high``.
 
     Args:
@@ -33,12 +33,13 @@ def bounded_step(
         high: (m,) upper bounds.
 
     Returns:
-        (n,). Should the set of active bounds not settle, the last set's answer.
+        The vector (n,), and the rows it is pressed against, each with whether that is its upper
+        bound. Should the set of active bounds not settle, the last set's answer.
     """
     inverse = np.asarray(np.linalg.inv(hessian), float)
     free = vector - inverse @ gradient
     spread: FloatArray = np.sqrt(np.einsum("ij,jk,ik->i", rows, inverse, rows))
-    active: dict[int, bool] = {}  # row -> whether at its upper bound
+    active: dict[int, bool] = {}
     result = free
     for _ in range(ROUNDS):
         held = list(active)
@@ -55,7 +56,7 @@ def bounded_step(
         if over[worst] <= ROUNDING:
             break
         active[worst] = bool(values[worst] > high[worst])
-    return result
+    return result, active
 
 
 def _held(

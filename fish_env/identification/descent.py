@@ -8,7 +8,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from fish_env.identification.bounded import bounded_step
+from fish_env.identification.bounded import bounded_minimum
 
 FloatArray = npt.NDArray[np.float64]
 T = TypeVar("T")
@@ -17,6 +17,10 @@ DAMPINGS = (0.1, 10.0)
 NEAR, SLIGHT = 1.0, 0.1
 """Where the quadratic model promises less than the first (in -2 log likelihood), a shortened step
 that gains less than the second follows the objective's roughness."""
+
+
+AT = 0.01
+"""A vector is at a bound when it is as near to it, in standard deviations."""
 
 
 class Within(NamedTuple):
@@ -37,7 +41,16 @@ class Within(NamedTuple):
     def step(self, hessian: FloatArray, gradient: FloatArray, vector: FloatArray) -> FloatArray:
         """The step (n,) to the minimum of the quadratic model."""
         bounds = (self.rows, self.low, self.high)
-        return bounded_step(hessian, gradient, vector, *bounds) - vector
+        return bounded_minimum(hessian, gradient, vector, *bounds)[0] - vector
+
+    def held(self, hessian: FloatArray, gradient: FloatArray, vector: FloatArray) -> FloatArray:
+        """The rows (k, n) whose bounds hold a vector back where it is, as walls do."""
+        bounds = (self.rows, self.low, self.high)
+        pressed = bounded_minimum(hessian, gradient, vector, *bounds)[1]
+        values, sd = self.rows @ vector, _spread(self.rows, hessian)
+        ends = {i: self.high[i] if upper else self.low[i] for i, upper in pressed.items()}
+        there = [i for i, end in ends.items() if abs(values[i] - end) < AT * sd[i]]
+        return self.rows[sorted(there)]
 
 
 def descend(
@@ -87,6 +100,11 @@ def descend(
         if rough or value == before:
             break
     return vector, value, known
+
+
+def _spread(rows: FloatArray, hessian: FloatArray) -> FloatArray:
+    """Standard deviation (m,) of what rows (m, n) make of a vector."""
+    return np.asarray(np.sqrt(np.einsum("ij,ji->i", rows, np.linalg.solve(hessian, rows.T))))
 
 
 def promised(hessian: FloatArray, gradient: FloatArray, step: FloatArray) -> float:

@@ -37,6 +37,8 @@ class Fit:
         log_likelihood: at the estimates, noise included.
         objective: -2 log likelihood + prior, smaller is better.
         at_bounds: names that ended at a bound.
+        held: (k, n) gradients of the bounds that keep the free parameters (baseline in prior
+            units) from where the data want them.
         condition: condition number of the information in prior units.
         filtered: filter results at the estimates.
         linearised: residuals and slopes at the estimates.
@@ -53,6 +55,7 @@ class Fit:
     log_likelihood: float
     objective: float
     at_bounds: tuple[str, ...]
+    held: FloatArray
     condition: float
     filtered: Sequence[Filtered] = field(repr=False)
     linearised: Linearised = field(repr=False)
@@ -145,13 +148,17 @@ def gauss_newton(
         lin = linearise(problem, free, at, noise, filtered)
         hessian = information(lin.slopes, free.prior)
         free.suit_steps(hessian)
-        gradient = inner(lin.slopes, lin.residuals[:, None])[:, 0] + free.prior * at
-        return hessian, gradient
+        return hessian, _gradient(lin, free.prior, at)
 
     return descend(
         vector, partial(objective, problem, free, noise=noise), linearised, free.within,
         iterations, tolerance,
     )  # fmt: skip
+
+
+def _gradient(lin: Linearised, prior: FloatArray, vector: FloatArray) -> FloatArray:
+    """Half the gradient (n,) of the objective at a vector."""
+    return np.asarray(inner(lin.slopes, lin.residuals[:, None])[:, 0] + prior * vector)
 
 
 def _settled(before: NoiseModel, after: NoiseModel, share: float = 0.1) -> bool:
@@ -217,6 +224,7 @@ def _finish(
 ) -> Fit:
     lin = linearise(problem, free, vector, noise, filtered)
     hessian = information(lin.slopes, free.prior)
+    gradient = _gradient(lin, free.prior, vector)
     inverse = np.asarray(np.linalg.inv(hessian), float)
     covariance = sandwich(lin, inverse, free.prior)
     scale = free.scale()
@@ -228,7 +236,8 @@ def _finish(
     condition = float(np.linalg.cond(hessian / np.outer(diagonal, diagonal)))
     return Fit(
         problem, effects, released, point, noise, free.names, estimates, physical,
-        float(sum(r.log_likelihood for r in filtered)), value, bounds, condition, filtered, lin,
+        float(sum(r.log_likelihood for r in filtered)), value, bounds,
+        free.within.held(hessian, gradient, vector), condition, filtered, lin,
     )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from fish_env.diagnosis.causes import Cause
+from fish_env.identification.descent import Within
 from fish_env.identification.free import Linearised
 
 BLOCKS, PER_BLOCK, COEFFICIENTS = 60, 20, 4
@@ -26,14 +27,26 @@ class LinearProblem:
         ]
         self.causes = [Cause(f"cause_{i}", (({"a": 1.0},),)) for i in range(signals)]
 
-    def fit(self, rng: np.random.Generator, added: np.ndarray | float = 0.0, memory: float = 0.0):
-        """A refitted baseline on new data, with a signal and coloured residuals if wanted."""
+    def fit(
+        self,
+        rng: np.random.Generator,
+        added: np.ndarray | float = 0.0,
+        memory: float = 0.0,
+        reach: float = np.inf,
+    ):
+        """A refitted baseline on new data, with a signal and coloured residuals if wanted.
+
+        No coefficient goes further than ``reach``.
+        """
         noise = rng.standard_normal(self.size)
         for i in range(1, self.size) if memory else ():
             noise[i] = memory * noise[i - 1] + np.sqrt(1 - memory**2) * noise[i]
         data = noise - self.slopes @ rng.standard_normal(COEFFICIENTS) + added
         hessian = self.slopes.T @ self.slopes + np.eye(COEFFICIENTS)
-        z = -np.linalg.solve(hessian, self.slopes.T @ data)
+        gradient = self.slopes.T @ data
+        bounds = np.full(COEFFICIENTS, reach)
+        within = Within(np.eye(COEFFICIENTS), -bounds, bounds, lambda z: z)
+        z = within.step(hessian, gradient, np.zeros(COEFFICIENTS))
         times = np.repeat(3.0 * np.arange(BLOCKS) + 1.0, PER_BLOCK)
         linearised = Linearised(
             data + self.slopes @ z, self.slopes, np.zeros(self.size, np.int64), times
@@ -43,6 +56,7 @@ class LinearProblem:
             linearised=linearised,
             problem=SimpleNamespace(baseline=Sized(paths)),
             released=(),
+            held=within.held(hessian, gradient + hessian @ z, z),
             point=SimpleNamespace(z=z),
         )
 

@@ -64,6 +64,7 @@ def fit_with(missing, seed=0, noise=QUIET):
     problem = Answering(run, flat)
     return SimpleNamespace(
         problem=problem, filtered=[filtered], linearised=lin, released=(), effects=(), noise=noise,
+        held=np.zeros((0, 0)),
         point=SimpleNamespace(z=np.zeros(0), effects={}),
     )  # fmt: skip
 

@@ -77,6 +77,7 @@ def prepared(change: Callable, probe: float = 1.0, fastest: Callable | None = No
         problem=problem,
         linearised=lines,
         released=(),
+        held=np.zeros((0, 2)),
         point=SimpleNamespace(z=np.zeros(2), effects={}),
         noise=None,
         filtered=None,

@@ -38,6 +38,7 @@ def explanation(data, effects=(), released=()):
     fit = SimpleNamespace(
         effects=effects,
         released=released,
+        held=np.zeros((0, slopes.shape[1])),
         objective=residuals @ residuals + prior @ best**2,
         point=SimpleNamespace(z=best[:COEFFICIENTS]),
         linearised=Linearised(

@@ -64,6 +64,38 @@ def test_a_signal_that_the_coefficients_can_follow_is_absorbed():
     assert Projector(fit).signal(PROBLEM.causes[0], 0, np.zeros((PROBLEM.size, 1))) is None
 
 
+def test_what_a_bound_holds_back_hides_no_cause():
+    """A cause like a coefficient that has gone as far as it may is all that can still explain."""
+    column = PROBLEM.slopes[:, [1]] + 0.01 * PROBLEM.columns[0]
+    data = np.random.default_rng(3)
+    fit = PROBLEM.fit(data, added=6.0 * column[:, 0], reach=2.0)
+    assert fit.point.z[1] == pytest.approx(-2.0)
+    np.testing.assert_array_equal(fit.held, np.eye(COEFFICIENTS)[[1]])
+    signal = Projector(fit).signal(PROBLEM.causes[0], 0, column)
+    # Without the coefficient that is held, the cause in its place.
+    free = np.column_stack([np.delete(PROBLEM.slopes, 1, axis=1), column])
+    prior = np.diag(np.r_[np.ones(COEFFICIENTS - 1), 0.0])
+    pull = free.T @ fit.linearised.residuals + prior @ np.r_[np.delete(fit.point.z, 1), 0.0]
+    gain = pull @ np.linalg.solve(free.T @ free + prior, pull)
+    assert signal.unwidened == pytest.approx(gain, rel=1e-5)
+    fit.held = fit.held[:0]
+    assert Projector(fit).signal(PROBLEM.causes[0], 0, column).unwidened < 0.01 * gain
+
+
+def test_a_coefficient_at_its_bound_counts_with_where_it_would_go():
+    """Far off, the one that is wrong stands out; at the same bound, all look alike."""
+    added, rng = 6.0 * PROBLEM.slopes[:, 1], np.random.default_rng(3)
+    bounded = PROBLEM.fit(rng, added=added, reach=2.0)
+    unbounded = PROBLEM.fit(np.random.default_rng(3), added=added)
+    for i in range(COEFFICIENTS):
+        at, variance = Projector(bounded).let_go(i)
+        free_at, free_variance = Projector(unbounded).let_go(i)
+        if i == 1:
+            assert (at, variance) == pytest.approx((free_at, free_variance))
+        else:
+            assert at == bounded.point.z[i]
+
+
 @pytest.mark.parametrize("settings", [1, 3])
 def test_p_values_are_uniform_where_nothing_is_wrong(settings):
     """With prior draws of the coefficients and white noise; too narrow a spread would be seen."""

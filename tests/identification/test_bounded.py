@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import LinearConstraint, minimize
 
 from fish_env.identification import Problem
-from fish_env.identification.bounded import bounded_step
+from fish_env.identification.bounded import bounded_minimum
 from fish_env.identification.estimator import default_noise, gauss_newton
 from fish_env.identification.free import Free, objective
 from tests.identification.synthetic import Setup, simulate
@@ -26,7 +26,7 @@ def test_step_is_the_minimum_within_bounds(seed):
     def model(x):
         return 0.5 * (x - vector) @ hessian @ (x - vector) + gradient @ (x - vector)
 
-    found = bounded_step(hessian, gradient, vector, rows, low, high)
+    found, pressed = bounded_minimum(hessian, gradient, vector, rows, low, high)
     assert np.all(rows @ found <= high + 1e-9)
     assert np.all(rows @ found >= low - 1e-9)
     best = minimize(
@@ -34,13 +34,17 @@ def test_step_is_the_minimum_within_bounds(seed):
         options={"gtol": 1e-9, "xtol": 1e-12, "maxiter": 3000},
     )  # fmt: skip
     assert model(found) <= best.fun + 1e-5
+    at = {i: bool(x > m) for i, (x, m) in enumerate(zip(rows @ found, middle, strict=True))
+          if min(high[i] - x, x - low[i]) < 1e-9}  # fmt: skip
+    assert pressed == at
 
 
 def test_without_bounds_it_is_newtons_step():
     hessian, gradient = np.diag([1.0, 4.0]), np.array([1.0, 2.0])
     none = np.full(2, np.inf)
-    found = bounded_step(hessian, gradient, np.zeros(2), np.eye(2), -none, none)
+    found, pressed = bounded_minimum(hessian, gradient, np.zeros(2), np.eye(2), -none, none)
     np.testing.assert_allclose(found, [-1.0, -0.5])
+    assert not pressed
 
 
 def test_no_fit_goes_where_no_fish_can_be():

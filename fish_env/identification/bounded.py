@@ -38,7 +38,7 @@ def bounded_minimum(
     """
     inverse = np.asarray(np.linalg.inv(hessian), float)
     free = vector - inverse @ gradient
-    spread: FloatArray = np.sqrt(np.einsum("ij,jk,ik->i", rows, inverse, rows))
+    deviation = spread(rows, inverse)
     active: dict[int, bool] = {}
     result = free
     for _ in range(ROUNDS):
@@ -50,13 +50,18 @@ def bounded_minimum(
             del active[held[int(np.argmin(inward))]]
             continue
         values = rows @ result
-        over = np.maximum(low - values, values - high) / np.maximum(spread, 1e-300)
+        over = np.maximum(low - values, values - high) / np.maximum(deviation, 1e-300)
         over[held] = 0.0
         worst = int(np.argmax(over))
         if over[worst] <= ROUNDING:
             break
         active[worst] = bool(values[worst] > high[worst])
     return result, active
+
+
+def spread(rows: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Standard deviation (m,) of what rows (m, n) make of a vector with a covariance (n, n)."""
+    return np.asarray(np.sqrt(np.einsum("ij,jk,ik->i", rows, covariance, rows)))
 
 
 def _held(

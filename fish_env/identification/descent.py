@@ -8,7 +8,7 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from fish_env.identification.bounded import bounded_minimum
+from fish_env.identification.bounded import bounded_minimum, spread
 
 FloatArray = npt.NDArray[np.float64]
 T = TypeVar("T")
@@ -47,10 +47,10 @@ class Within(NamedTuple):
         """The rows (k, n) whose bounds hold a vector back where it is, as walls do."""
         bounds = (self.rows, self.low, self.high)
         pressed = bounded_minimum(hessian, gradient, vector, *bounds)[1]
-        values, sd = self.rows @ vector, _spread(self.rows, hessian)
-        ends = {i: self.high[i] if upper else self.low[i] for i, upper in pressed.items()}
-        there = [i for i, end in ends.items() if abs(values[i] - end) < AT * sd[i]]
-        return self.rows[sorted(there)]
+        ends = [self.high[i] if upper else self.low[i] for i, upper in pressed.items()]
+        rows = self.rows[list(pressed)]
+        near = AT * spread(rows, np.asarray(np.linalg.inv(hessian), float))
+        return np.asarray(rows[np.abs(rows @ vector - ends) < near])
 
 
 def descend(
@@ -100,11 +100,6 @@ def descend(
         if rough or value == before:
             break
     return vector, value, known
-
-
-def _spread(rows: FloatArray, hessian: FloatArray) -> FloatArray:
-    """Standard deviation (m,) of what rows (m, n) make of a vector."""
-    return np.asarray(np.sqrt(np.einsum("ij,ji->i", rows, np.linalg.solve(hessian, rows.T))))
 
 
 def promised(hessian: FloatArray, gradient: FloatArray, step: FloatArray) -> float:

@@ -1,20 +1,24 @@
 """Screening on a linear problem, where the right answers are known."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from fish_env.diagnosis.causes import Cause, best_of_each, coefficient_sizes
+from fish_env.diagnosis.causes import Cause, best_of_each, causes_of, coefficient_sizes
 from fish_env.diagnosis.screening import (
     Projector,
     Signal,
     confusability,
     null_threshold,
+    screen,
     smallest_detectable,
 )
+from fish_env.identification import Problem, fit
+from fish_env.params import load_fish
 from tests.diagnosis.linear import COEFFICIENTS, LinearProblem
+from tests.identification.synthetic import FISH, PATHS, Setup, simulate
 
 PROBLEM = LinearProblem()
 
@@ -188,3 +192,21 @@ def test_the_best_alternative_speaks_for_a_cause_and_the_strongest_cause_comes_f
     drag, lag = Cause("drag"), Cause("lag")
     found = [Found(drag, -3.0), Found(lag, -5.0), Found(drag, -9.0), Found(lag, -1.0)]
     assert best_of_each(found, lambda f: f.log_p) == [found[2], found[1]]
+
+
+def test_a_cause_like_a_coefficient_is_found_where_that_has_gone_as_far_as_it_may():
+    """Nine prior deviations of inertia are what an added mass in yaw alone looks like."""
+    fish = load_fish(FISH)
+    path = "inertia.rest[2]"
+    far = fish.get(path) + 9.0 * fish.prior_sd(path)
+    data = simulate(Setup(seed=4, runs=3, duration=10.0, changes={path: far}))
+    problem = Problem(data, paths=PATHS)
+    refitted = fit(problem, rounds=1)
+    assert path in refitted.at_bounds
+    causes = [cause for cause in causes_of(problem) if cause.name == "added_mass"]
+    found, hidden = (
+        screen(baseline, causes, np.random.default_rng(0)).best()[0]
+        for baseline in (refitted, replace(refitted, held=refitted.held[:0]))
+    )
+    assert found.statistic > 100.0
+    assert hidden.statistic < 0.25 * found.statistic

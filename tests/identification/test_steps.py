@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fish_env.data import CommandSteps
 from fish_env.diagnosis.open_loop import errors
 from fish_env.identification.problem import Point, Problem
 from fish_env.identification.runs import FINE_STEP_S, SWITCH_S
@@ -59,6 +60,28 @@ def test_the_steps_get_less_wrong_than_the_sensors(dataset, effects):
 @pytest.mark.parametrize("effects", [LAG, LIMIT], ids=["lag", "rate limit"])
 def test_plain_steps_would_not_do(dataset, effects):
     assert off(dataset, effects, without_fine_steps) > 2.0 * off(dataset, effects)
+
+
+def gliding(dataset):
+    """Commands that move without a jump, told with every sample as a logger does."""
+    (run,) = dataset.runs
+    t = run.time_s
+    swing = np.sin(2.0 * np.pi * 0.2 * t)
+    commands = CommandSteps(t, np.column_stack([
+        0.3 * swing, 0.35 + 0.1 * swing, 1.5 + 0.4 * swing, 0.02 * swing, 0.5 * swing
+    ]))  # fmt: skip
+    return replace(dataset, runs=(replace(run, commands=commands),))
+
+
+@pytest.mark.parametrize(
+    "effects", [LAG, {}, {"effects.block_reaction.scale": 1.0}], ids=["lag", "nothing", "block"]
+)
+def test_commands_that_glide_need_no_fine_steps(dataset, effects):
+    data = gliding(dataset)
+    steps = Problem(data).runs[0].substeps
+    first = Problem(data).runs[0].clock <= 0.04
+    assert steps[~first].max() == 4
+    assert off(data, effects) < 0.2
 
 
 def test_only_corners_ask_for_fine_steps(dataset):

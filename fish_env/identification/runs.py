@@ -171,7 +171,8 @@ def _steps(clock: FloatArray, longest: float | FloatArray) -> npt.NDArray[np.int
 def _jumped(commands: FloatArray) -> npt.NDArray[np.bool_]:
     """Which switches (m,) of commands (m, 5) are jumps; the first one comes out of the unknown."""
     least = np.array([JUMPS[name] for name in COMMANDS])
-    return np.r_[True, np.any(np.abs(np.diff(commands, axis=0)) > least, axis=1)]
+    large = np.abs(np.diff(commands, axis=0)) > least
+    return np.concatenate([[True], large.any(axis=1)])
 
 
 def _after(switches: FloatArray, clock: FloatArray) -> npt.NDArray[np.bool_]:

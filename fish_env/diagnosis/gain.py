@@ -17,6 +17,7 @@ import numpy.typing as npt
 from fish_env.diagnosis import open_loop
 from fish_env.identification.estimator import Fit
 from fish_env.identification.filtering import Filtered
+from fish_env.identification.phases import in_step
 from fish_env.identification.problem import Problem
 from fish_env.identification.runs import RunData
 
@@ -85,7 +86,7 @@ def misfit_of(problem: Problem, baseline: Fit, extended: Fit) -> dict[str, Pair]
 
 
 def _one_step(problem: Problem, baseline: Fit, extended: Fit) -> list[list[Filtered]]:
-    return [problem.filtered(fit.point, extended.noise) for fit in (baseline, extended)]
+    return [in_step(problem, fit.point, extended.noise) for fit in (baseline, extended)]
 
 
 def _misfit(problem: Problem, one_step: list[list[Filtered]]) -> dict[str, Pair]:
@@ -96,7 +97,7 @@ def _misfit(problem: Problem, one_step: list[list[Filtered]]) -> dict[str, Pair]
 
 
 def _open_loop(problem: Problem, fit: Fit) -> tuple[list[FloatArray], Problem]:
-    filtered = problem.filtered(fit.point, fit.noise)
+    filtered = in_step(problem, fit.point, fit.noise)
     pieces = [
         window
         for run, result in zip(problem.runs, filtered, strict=True)

@@ -20,6 +20,7 @@ import numpy.typing as npt
 from fish_env.data.vocabulary import COMMANDS
 from fish_env.identification.estimator import Fit
 from fish_env.identification.filtering import Filtered
+from fish_env.identification.phases import in_step
 from fish_env.identification.problem import Problem
 from fish_env.identification.runs import RunData
 from fish_env.model.state import BASE_STATES
@@ -190,13 +191,13 @@ def localise_fits(
     """Where the baseline's one-step errors are larger than the noise that the accepted fit found.
 
     Args:
-        problem: runs to look at, phases settled.
+        problem: runs to look at.
         baseline: refitted baseline.
         accepted: accepted explanation; its noise is the yardstick, its states are the regimes.
         rng: shuffles.
     """
-    residuals = problem.filtered(baseline.point, accepted.noise)
-    states = problem.filtered(accepted.point, accepted.noise)
+    residuals = in_step(problem, baseline.point, accepted.noise)
+    states = in_step(problem, accepted.point, accepted.noise)
     runs = [
         RunResiduals(
             np.where(np.isfinite(run.measured), r.innovations, np.nan), regime_series(run, s)

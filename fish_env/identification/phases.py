@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from fish_env.identification.filtering import NoiseModel, RunFilter
+from fish_env.identification.filtering import Filtered, NoiseModel, RunFilter
 from fish_env.identification.problem import Point, Problem
 from fish_env.identification.runs import FREQUENCY, RunData
 
@@ -45,6 +45,14 @@ def settle_phases(problem: Problem, point: Point, noise: NoiseModel) -> Problem:
     for i, phase in zip(unknown, _likeliest(problem, point, noise, close, FINE_SD), strict=True):
         runs[i] = _starting(runs[i], phase, FINE_SD)
     return problem.with_runs(runs)
+
+
+def in_step(problem: Problem, point: Point, noise: NoiseModel) -> list[Filtered]:
+    """Every run filtered from the starting phase that suits these parameters best.
+
+    Runs that were not fitted, or were fitted with other parameters, have another phase or none.
+    """
+    return settle_phases(problem, point, noise).filtered(point, noise)
 
 
 def _likeliest(

@@ -1,19 +1,21 @@
 """Gain on final runs: share of the reachable gap, and predictions without feedback."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from fish_env.data import CommandSteps, Dataset, Run
 from fish_env.diagnosis import open_loop
-from fish_env.diagnosis.gain import reachable_share
+from fish_env.diagnosis.gain import measure_gain, reachable_share
 from fish_env.identification import Problem
 from fish_env.identification.filtering import NoiseModel
 from fish_env.identification.problem import Point
 from fish_env.identification.runs import RunData
+from fish_env.params import load_fish
 from fish_env.simulator import Simulator
-from tests.identification.synthetic import ALL, FISH
+from tests.identification.synthetic import ALL, FISH, Setup, simulate
 
 
 def squares(level, runs=3, windows=10, seed=0):
@@ -96,3 +98,23 @@ def test_a_window_does_not_begin_with_a_soft_tail_unbent():
         for w in (pieces, unbent)
     )
     assert left < 0.3 * before
+
+
+def test_runs_of_unknown_phase_are_judged_in_step():
+    """Half a beat off, a filter spends the run on catching up, whatever the model."""
+    path, fish = "tail.lift.c1", load_fish(FISH)
+    data = simulate(
+        Setup(runs=4, changes={path: fish.get(path) + 3.0 * fish.prior_sd(path)},
+              phase=2.8, phase_known=False, channels=("x", "y", "z", "yaw"))
+    )  # fmt: skip
+    problem = Problem(data, paths=(path,))
+    noise = Setup(channels=problem.channels).noise
+    baseline, extended = (
+        SimpleNamespace(point=Point(np.array([z]), {}), noise=noise) for z in (0.0, 3.0)
+    )
+    found = measure_gain(problem, baseline, extended, np.random.default_rng(0))
+    assert all(pair.extended == pytest.approx(1.0, abs=0.15) for pair in found.misfit.values())
+    assert found.share == pytest.approx(1.0, abs=0.2)
+    out_of_step = problem.filtered(extended.point, noise)
+    left = np.concatenate([r.innovations.ravel() for r in out_of_step])
+    assert np.nanmean(left**2) > 1.2 * np.mean([p.extended**2 for p in found.misfit.values()])

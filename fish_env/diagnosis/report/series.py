@@ -20,6 +20,7 @@ from fish_env.effects.extended import build_model
 from fish_env.errors import SimulationDiverged
 from fish_env.identification.estimator import Fit
 from fish_env.identification.filtering import Filtered
+from fish_env.identification.phases import in_step
 from fish_env.identification.problem import Problem
 from fish_env.identification.runs import RunData
 from fish_env.params.schema import FishParams
@@ -129,7 +130,7 @@ def series_from(
     models = {"baseline": baseline} if accepted is baseline else {
         "baseline": baseline, "extended": accepted,
     }  # fmt: skip
-    filtered = {name: shown.filtered(fit.point, fit.noise) for name, fit in models.items()}
+    filtered = {name: in_step(shown, fit.point, fit.noise) for name, fit in models.items()}
     simulators = {name: _simulator(fit, dataset) for name, fit in models.items()}
     runs = []
     for i, run in enumerate(shown.runs):

@@ -30,6 +30,9 @@ from fish_env.identification.problem import Problem
 FloatArray = npt.NDArray[np.float64]
 MOST_CAUSES = 3
 MOST_LOOSE = 4
+OUT_OF_STEP = ("frequency_scale", "battery_sag", "clock_scale")
+"""Effects that put a beat out of step by more and more. After whole beats no small change tells
+which way to go, so they are tried whatever the screen makes of them."""
 WORTH_A_SKETCH = 20.0
 """Statistic above which an effect is tried; nothing is believed for it."""
 DOUBT = 6.0
@@ -229,7 +232,8 @@ def _with_wandering_phase(
         return None
     shown = screen(loose, causes, rng)
     effects = [s for s in shown.best() if s.cause.is_effect and s.unwidened > WORTH_A_SKETCH]
-    return loose, sorted(effects, key=lambda s: -s.unwidened)[:MOST_LOOSE]
+    first = sorted(effects, key=lambda s: -s.unwidened)[:MOST_LOOSE]
+    return loose, first + [s for s in effects if s.cause.name in OUT_OF_STEP and s not in first]
 
 
 def _new(after: Screen, chosen: Sequence[Signal]) -> list[Signal]:

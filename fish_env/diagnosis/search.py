@@ -10,7 +10,7 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from fish_env.diagnosis.causes import combined, effect_values
+from fish_env.diagnosis.causes import combined, effect_values, mirrored
 from fish_env.diagnosis.effort import FULL
 from fish_env.diagnosis.screening import Signal, zoomed
 from fish_env.identification.estimator import Fit, fit
@@ -288,11 +288,16 @@ def _baselines(base: Fit) -> tuple[FloatArray, ...]:
 
 
 def _probed(problem: Problem, signal: Signal, every: bool = False) -> list[dict[str, float]]:
-    """Settings to begin from: of the best shape at every size, or of every alternative."""
-    cause = signal.cause
-    shaped = any(p.shapes for p in problem.known[cause.name].parameters)
+    """Settings to begin from: of the best shape at every size, or of every alternative.
+
+    On either side of neutral: of a strong effect no linear estimate tells the sign.
+    """
+    cause, effect = signal.cause, problem.known[signal.cause.name]
+    shaped = any(p.shapes for p in effect.parameters)
     alternatives = (cause.probes[signal.probe],) if shaped and not every else cause.probes
-    return [effect_values(problem, cause.name, p) for probes in alternatives for p in probes]
+    settings = [p for probes in alternatives for p in probes]
+    settings += [other for p in settings if (other := mirrored(effect, p)) not in settings]
+    return [effect_values(problem, cause.name, p) for p in settings]
 
 
 def _finalists(

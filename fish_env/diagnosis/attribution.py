@@ -130,6 +130,9 @@ def extended(
     while len(current.causes) < MOST_CAUSES and not any(tied(current, e) for e in rivals):
         found = len(current.fit.released)
         chosen = shortlisted(problem, screens[-1], effort.shortlist, rough * total, lenience, found)
+        for name in current.causes if chosen and effort.retries else ():
+            # What looks like an accepted cause may be in its numbers, and shows no more.
+            chosen += _like(name, screens[-1], chosen, problem)
         loose = _with_wandering_phase(current, chosen, causes, rng) if effort.retries else None
         tried, base = refits(current, chosen, report, loose, effort.finalists)
         if base is None:

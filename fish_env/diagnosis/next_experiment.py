@@ -28,6 +28,8 @@ from fish_env.model.effect import Effect
 FloatArray = npt.NDArray[np.float64]
 RATE_HZ = 25.0
 STEP_S = 0.02
+SHOWN = 25.0
+"""A manoeuvre shows an effect that it changes the record by more than five deviations with."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,7 @@ class Proposal:
     Attributes:
         name: what it does.
         schedule: rows of ``t`` (s) and commands (SI), each held until the next.
-        separates: what it would tell apart.
+        separates: what it would tell from the present explanation.
         separation: mean squared distance between rivals and the present explanation, in noise
             units, that a refit cannot close.
     """
@@ -57,11 +59,16 @@ def propose(
     rivals = rivals_of(verdict, others, shown, lambda name: _plausible(fit, name))
     if not rivals:
         return None
-    names = tuple(rivals)
     points = list(rivals.values())
     found = [(separation(fit, points, m), m) for m in MENU]
     best, manoeuvre = max(found, key=lambda pair: float(np.mean(np.log1p(pair[0]))))
-    return Proposal(manoeuvre.name, manoeuvre.schedule, names, float(np.mean(best)))
+    apart = dict(zip(rivals, best.tolist(), strict=True))
+    if verdict.name != "ambiguous":  # of rivals the best manoeuvre is wanted, however good it is
+        apart = {name: size for name, size in apart.items() if size > SHOWN}
+    if not apart:
+        return None
+    separated = float(np.mean(list(apart.values())))
+    return Proposal(manoeuvre.name, manoeuvre.schedule, tuple(apart), separated)
 
 
 def rivals_of(

@@ -1,10 +1,14 @@
 """The next experiment: manoeuvres within limits, and separation that no refit can close."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from fish_env.diagnosis import next_experiment
 from fish_env.diagnosis.manoeuvres import DURATION_S, MENU, Manoeuvre
 from fish_env.diagnosis.next_experiment import unfollowed
+from fish_env.diagnosis.verdict import Verdict
 
 LIMITS = {"tail_offset": 0.6, "tail_amplitude": 0.6, "tail_frequency": 2.6,
           "block_displacement": 0.01, "block_angle": 0.6}  # fmt: skip
@@ -32,6 +36,25 @@ def test_a_manoeuvre_beyond_the_servo_would_be_found():
     assert faults(Manoeuvre("too fast", ((0.0, 0.0, 0.6, 2.6, 0.02, 0.0),))) == [
         "block_displacement", "stroke",
     ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("verdict", "named"),
+    [("no_misfit", ("seen",)), ("ambiguous", ("seen", "hardly", "never"))],
+)
+def test_only_what_a_manoeuvre_shows_is_promised(monkeypatch, verdict, named):
+    """An offset of depth changes nothing that any manoeuvre could show."""
+    rivals = {"seen": 900.0, "hardly": 4.0, "never": 0.0}
+    monkeypatch.setattr(next_experiment, "rivals_of", lambda *given: rivals)
+    sizes = np.array(list(rivals.values()))
+    monkeypatch.setattr(next_experiment, "separation", lambda *given: sizes)
+    attribution = SimpleNamespace(accepted=SimpleNamespace(fit=None), rivals=())
+    found = next_experiment.propose(attribution, Verdict(verdict), ())
+    assert found.separates == named
+    rivals.pop("seen")
+    sizes = sizes[1:]
+    if verdict == "no_misfit":
+        assert next_experiment.propose(attribution, Verdict(verdict), ()) is None
 
 
 def test_separation_is_what_no_coefficient_follows():

@@ -122,7 +122,8 @@ def draw_regimes(found: Localisation, folder: Path) -> Path:
     count = len(found.regimes)
     columns = 4
     rows = -(-count // columns)
-    top = max(float(np.nanmax(table)) for table in found.energy.values())
+    energies = np.concatenate([table.ravel() for table in found.energy.values()])
+    top = float(np.max(energies, initial=1.0, where=np.isfinite(energies)))
     with _page(9.4, (0.9 + 0.2 * len(found.channels)) * rows + 0.8) as figure:
         axes = figure.subplots(rows, columns, squeeze=False)
         for ax in axes.ravel()[count:]:

@@ -24,7 +24,7 @@ from fish_env.diagnosis.search import (
     without,
 )
 from fish_env.effects.extended import PREFIX
-from fish_env.identification.estimator import Fit
+from fish_env.identification.estimator import Fit, finished
 from fish_env.identification.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
@@ -164,6 +164,8 @@ def extended(
         others_like = [e for e in tried[1:] if explained_away(e.causes[-1], screens[-2], after)]
         rivals = rivals_of(current, [*others_like, *exchanges[1:]])
     current = pruned(current)
+    if current.causes and effort.retries:
+        current = Explanation(current.causes, finished(current.fit))
     # With a cause dropped, an explanation that has what is left and more is none of its own.
     rivals = tuple(e for e in rivals if not set(current.causes) <= set(e.causes))
     return Attribution(begun.baseline, tuple(screens), current, rivals, ranking, total)

@@ -12,7 +12,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from fish_env.data import Dataset, load_dataset, split_runs
-from fish_env.diagnosis.adequacy import Adequacy, adequacy
+from fish_env.diagnosis.adequacy import Adequacy, adequacy, strains
 from fish_env.diagnosis.answer import as_dict
 from fish_env.diagnosis.attribution import Attribution, attribute, extended
 from fish_env.diagnosis.beats import with_measured_beats
@@ -31,7 +31,7 @@ from fish_env.diagnosis.suitability import check_runs, divergence
 from fish_env.diagnosis.verdict import Verdict, decide
 from fish_env.diagnosis.writing import EXTENDING, write_answer
 from fish_env.errors import DatasetError
-from fish_env.identification.estimator import Fit, fit
+from fish_env.identification.estimator import Fit, finished, fit
 from fish_env.identification.problem import Problem
 from fish_env.params.io import load_fish
 from fish_env.params.schema import FishParams
@@ -234,8 +234,10 @@ def _with_weaker_causes(
 
 
 def _refitted(problem: Problem) -> Fit:
+    """The refitted baseline; at rest unless a misfit drives it, which then is what comes next."""
     try:
-        return fit(problem, rounds=2)
+        own = fit(problem, rounds=2)
+        return own if strains(own) else finished(own)
     except np.linalg.LinAlgError:
         raise divergence(problem) from None
 

@@ -290,13 +290,16 @@ def _baselines(base: Fit) -> tuple[FloatArray, ...]:
 def _probed(problem: Problem, signal: Signal, every: bool = False) -> list[dict[str, float]]:
     """Settings to begin from: of the best shape at every size, or of every alternative.
 
-    On either side of neutral: of a strong effect no linear estimate tells the sign.
+    On either side of neutral where there are two: of a strong effect no linear estimate tells the
+    sign. Never from neutral itself, where many an effect begins too flat to be left again.
     """
     cause, effect = signal.cause, problem.known[signal.cause.name]
-    shaped = any(p.shapes for p in effect.parameters)
+    switches = [p for p in effect.parameters if not p.shapes]
+    shaped = len(switches) < len(effect.parameters)
     alternatives = (cause.probes[signal.probe],) if shaped and not every else cause.probes
     settings = [p for probes in alternatives for p in probes]
-    settings += [other for p in settings if (other := mirrored(effect, p)) not in settings]
+    opposite = [mirrored(effect, p) for p in settings]
+    settings += [o for o in opposite if any(o[p.name] != p.neutral for p in switches)]
     return [effect_values(problem, cause.name, p) for p in settings]
 
 

@@ -96,7 +96,7 @@ def test_a_tie_ends_the_search_but_not_a_difference_that_a_misfit_drowns(monkeyp
         "tied": settled, "alike": drowned, "explained_away": lambda *a: True,
         "shortlisted": lambda *a: [], "implausible": lambda fit: (), "ranking_of": lambda *a: (),
         "pruned": lambda e: e, "exchanged": lambda e, *a: [e],
-        "_with_wandering_phase": lambda *a: None,
+        "_with_wandering_phase": lambda *a: None, "finished": lambda fit: fit,
     }.items():  # fmt: skip
         monkeypatch.setattr(attribution, name, value)
     begun = attribution.Attribution(nothing, (screens,), nothing, (), (), 0.0)

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from fish_env.diagnosis.causes import combined, effect_values, mirrored
 from fish_env.diagnosis.effort import FULL
 from fish_env.diagnosis.screening import Signal, zoomed
+from fish_env.effects.extended import PREFIX
 from fish_env.identification.estimator import Fit, fit
 from fish_env.identification.filtering import NoiseModel
 from fish_env.identification.free import REACH
@@ -133,7 +134,7 @@ def refits(
 
     tasks = [*(partial(followed, s) for s in shown), *(partial(alone, s) for s in chosen)]
     sketches = [s for found in side_by_side(tasks) for s in found]
-    finalists = _finalists(sketches, sketcher.base(), BEHIND, most)
+    finalists = _finalists(sketches, sketcher.base, BEHIND, most)
     leader = None
     while finalists and leader is None:
         (name, sketch), *finalists = finalists
@@ -172,7 +173,7 @@ def second_look(
 
     others = [s for s in chosen if s.cause.is_effect and s.cause.name not in done]
     sketches = [s for found in side_by_side(partial(again, s) for s in others) for s in found]
-    reached = sketcher.base()
+    reached = sketcher.base
     finalists = _finalists(sketches, reached, 0.0, FULL.finalists)
     finalists = [f for f in finalists if f[1].objective < reached + LEEWAY]
     more = _rest(current, finalists, best, report)
@@ -204,7 +205,7 @@ def exchanged(current: Explanation, left: Sequence[Signal], report: Report) -> l
     if not found:
         return [current]
     _, causes, sketch = min(found, key=lambda f: f[0])
-    if sketch.objective >= sketcher.base() + LEEWAY:
+    if sketch.objective >= sketcher.base + LEEWAY:
         return [current]
     report(f"fitting {' and '.join(causes)}")
     fitted = _in_full(own.problem, sketch, own.noise)
@@ -246,12 +247,26 @@ def without(current: Explanation, name: str) -> Explanation | None:
 def _sketches(
     sketcher: Sketcher, base: Fit, signal: Signal, begin: Sequence[Point]
 ) -> list[tuple[str, Sketch]]:
-    """The sketch of one cause; none where the simulation diverges from every start."""
+    """The sketch of one cause; none where the simulation diverges from every start.
+
+    Where the few runs of a sketch show nothing of an effect it may end switched off, and the
+    estimate from all runs, the first start, is the better one to fit it from.
+    """
     cause = signal.cause
     effects = (*base.effects, cause.name) if cause.is_effect else base.effects
     released = base.released if cause.is_effect else (*base.released, cause.path or "")
     found = reached(lambda: sketcher.sketch(effects, released, begin))
-    return [] if found is None else [(cause.name, found)]
+    if found is None:
+        return []
+    if cause.is_effect and _off(base.problem, found.point, cause.name):
+        found = replace(found, point=begin[0])
+    return [(cause.name, found)]
+
+
+def _off(problem: Problem, point: Point, name: str) -> bool:
+    """Whether an effect does nothing at a point."""
+    switches = [p for p in problem.known[name].parameters if not p.shapes]
+    return all(point.effects[f"{PREFIX}{name}.{p.name}"] == p.neutral for p in switches)
 
 
 def starts(base: Fit, signal: Signal, z: FloatArray | None = None) -> list[Point]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -50,6 +51,7 @@ class Sketcher:
         self.few: Problem = problem.subset(runs)
         self.one: Problem = problem.subset(1)
 
+    @cached_property
     def base(self) -> float:
         """Objective of the fit itself on these runs."""
         own = Free(self.few, self.fit.effects, self.fit.released)

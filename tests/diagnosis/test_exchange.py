@@ -32,6 +32,7 @@ class Judge:
     def __init__(self, fit):
         self.fit = fit
 
+    @property
     def base(self):
         return self.fit.objective
 

@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from agents.evaluation.metrics import METRICS, late, success_rate
+from agents.evaluation.metrics import LATE_S, METRICS, success_rate
 from agents.evaluation.record import Record, swim_suite
 from agents.evaluation.suites import RESERVED_SEEDS, Suite, load_suite, suite_names
 from agents.registry import Agent, load_agents
@@ -42,14 +42,15 @@ def measured(agent: Agent, suite: Suite, task: str) -> tuple[FloatArray, dict[st
 
 def outside(record: Record, success: FloatArray) -> dict[str, float]:
     """Share of episodes that fail with a late error of depth, heading or speed out of its limit."""
+    late = slice(-round(LATE_S / record.period_s), None)
+    limits = {"depth": record.limits["depth"], "heading": record.limits["heading"]}
     speed = record.limits["speed"] * record.info["goal_speed"][-1]
-    limits = {name: record.limits[name] for name in ("depth", "heading")}
     limits["speed"] = np.maximum(speed, record.limits["speed_floor"])
-    shares = {}
-    for name, limit in limits.items():
-        missed = (np.abs(late(record, f"{name}_error")) > limit).any(axis=0)
-        shares[name] = float(np.mean(missed & (success == 0.0)))
-    return shares
+    return {
+        name: float(np.mean((np.abs(record.info[f"{name}_error"][late]) > limit).any(axis=0)
+                            & (success == 0.0)))
+        for name, limit in limits.items()
+    }  # fmt: skip
 
 
 def interval(values: FloatArray) -> str:

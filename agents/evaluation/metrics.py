@@ -29,8 +29,7 @@ def _rms(values: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(np.mean(values**2, axis=0)))
 
 
-def late(record: Record, key: str) -> FloatArray:
-    """A signal at the end of each episode, (steps, N)."""
+def _late(record: Record, key: str) -> FloatArray:
     return record.info[key][-round(LATE_S / record.period_s) :]
 
 
@@ -105,8 +104,8 @@ METRICS: dict[str, Callable[[Record], FloatArray]] = {
     "depth_rmse_m": lambda record: _rms(record.info["depth_error"]),
     "heading_rmse_rad": lambda record: _rms(record.info["heading_error"]),
     "speed_rmse_m_per_s": lambda record: _rms(record.info["speed_error"]),
-    "depth_late_rmse_m": lambda record: _rms(late(record, "depth_error")),
-    "heading_late_rmse_rad": lambda record: _rms(late(record, "heading_error")),
+    "depth_late_rmse_m": lambda record: _rms(_late(record, "depth_error")),
+    "heading_late_rmse_rad": lambda record: _rms(_late(record, "heading_error")),
     "mean_power_w": lambda record: _mean_alive(record.info["power"], record),
     "cost_of_transport": cost_of_transport,
     "action_change": action_change,

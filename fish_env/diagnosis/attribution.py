@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +20,7 @@ from fish_env.diagnosis.search import (
     Explanation,
     exchanged,
     loosened,
+    reached,
     refits,
     second_look,
     without,
@@ -165,7 +167,8 @@ def extended(
         rivals = rivals_of(current, [*others_like, *exchanges[1:]])
     current = pruned(current)
     if current.causes and effort.retries:
-        current = Explanation(current.causes, finished(current.fit))
+        rested = reached(partial(finished, current.fit))
+        current = Explanation(current.causes, rested) if rested else current
     # With a cause dropped, an explanation that has what is left and more is none of its own.
     rivals = tuple(e for e in rivals if not set(current.causes) <= set(e.causes))
     return Attribution(begun.baseline, tuple(screens), current, rivals, ranking, total)
@@ -236,8 +239,8 @@ def _with_wandering_phase(
     if loose is None:
         return None
     shown = screen(loose, causes, rng)
-    effects = [s for s in shown.best() if s.cause.is_effect and s.unwidened > WORTH_A_SKETCH]
-    first = sorted(effects, key=lambda s: -s.unwidened)[:MOST_LOOSE]
+    effects = sorted((s for s in shown.best() if s.cause.is_effect), key=lambda s: -s.unwidened)
+    first = [s for s in effects[:MOST_LOOSE] if s.unwidened > WORTH_A_SKETCH]
     return loose, first + [s for s in effects if s.cause.name in OUT_OF_STEP and s not in first]
 
 

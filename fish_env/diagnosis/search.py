@@ -313,7 +313,7 @@ def _probed(problem: Problem, signal: Signal, every: bool = False) -> list[dict[
     shaped = len(switches) < len(effect.parameters)
     alternatives = (cause.probes[signal.probe],) if shaped and not every else cause.probes
     settings = [p for probes in alternatives for p in probes]
-    opposite = [mirrored(effect, p) for p in settings]
+    opposite = [o for o in (mirrored(effect, p) for p in settings) if o not in settings]
     settings += [o for o in opposite if any(o[p.name] != p.neutral for p in switches)]
     return [effect_values(problem, cause.name, p) for p in settings]
 

@@ -10,8 +10,9 @@ from fish_env.cli import app
 from fish_env.data import write_dataset
 from fish_env.errors import EffectError
 from fish_env.identification import Problem, fit, identified_fish
-from fish_env.identification.estimator import default_noise, sandwich
+from fish_env.identification.estimator import default_noise, finished, sandwich
 from fish_env.identification.free import Linearised
+from fish_env.identification.problem import Point
 from fish_env.identification.products import inner
 from fish_env.params import load_fish, save_fish
 from fish_env.simulator import Simulator
@@ -133,3 +134,13 @@ def test_the_command_fits_and_writes(tmp_path):
     for words in ("95 %", "disturbance found", "condition number", "written"):
         assert words in result.output
     assert load_fish(out).name == "identified"
+
+
+def test_a_fit_that_was_cut_short_is_taken_on_until_it_rests():
+    problem = Problem(simulate(Setup(seed=3, runs=2, duration=6.0)), paths=PATHS)
+    short = fit(problem, rounds=1, iterations=1, start=Point(np.full(len(PATHS), 1.5), {}))
+    rested = finished(short)
+    assert rested.objective < short.objective - 1.0
+    assert finished(rested).objective == pytest.approx(rested.objective, abs=0.25)
+    through = fit(problem, rounds=6, start=Point(np.full(len(PATHS), 1.5), {}))
+    assert rested.objective == pytest.approx(through.objective, abs=1.0)

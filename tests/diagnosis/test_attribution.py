@@ -103,3 +103,50 @@ def test_a_tie_ends_the_search_but_not_a_difference_that_a_misfit_drowns(monkeyp
     found = attribution.extended(begun, (), None)
     assert len(found.accepted.causes) == steps
     assert len(found.rivals) == (1 if steps == 1 else 0)
+
+
+def effect_signal(name, unwidened):
+    return SimpleNamespace(
+        cause=SimpleNamespace(name=name, is_effect=True), unwidened=unwidened, log_p=-unwidened
+    )
+
+
+def test_what_puts_a_beat_out_of_step_is_tried_whatever_the_screen_makes_of_it(monkeypatch):
+    strong = [effect_signal(name, 1000.0) for name in ("sensor_delay", "block_lag", "added_mass")]
+    weak = [effect_signal(name, 1.0) for name in ("clock_scale", "battery_sag", "tether")]
+    shown = SimpleNamespace(best=lambda: [*weak, *strong])
+    loose = SimpleNamespace()
+    for name, value in {
+        "strains": lambda fit: ("a push",), "loosened": lambda current: loose,
+        "screen": lambda *a: shown,
+    }.items():  # fmt: skip
+        monkeypatch.setattr(attribution, name, value)
+    nothing = SimpleNamespace(causes=(), fit=None)
+    found, tried = attribution._with_wandering_phase(nothing, strong, (), None)
+    assert found is loose
+    names = [s.cause.name for s in tried]
+    assert names == ["sensor_delay", "block_lag", "added_mass", "clock_scale", "battery_sag"]
+
+
+def test_relatives_of_an_accepted_cause_are_tried_along_with_what_shows_next(monkeypatch):
+    """Two delays in a row are nearly one: the second shows no more, and what shows is its echo."""
+    echo, twin, other = (effect_signal(n, 50.0) for n in ("block_lag", "sensor_delay", "tether"))
+    screens = SimpleNamespace(best=lambda: [echo, twin, other])
+    asked = []
+
+    def refits(current, chosen, *rest):
+        asked.append([s.cause.name for s in chosen])
+        return [], None
+
+    monkeypatch.setattr(attribution, "refits", refits)
+    monkeypatch.setattr(attribution, "_with_wandering_phase", lambda *a: None)
+    monkeypatch.setattr(attribution, "finished", lambda fit: fit)
+    fit = SimpleNamespace(
+        problem=SimpleNamespace(known=catalogue()), released=(), effects=("servo_delay",)
+    )
+    accepted = SimpleNamespace(causes=("servo_delay",), fit=fit, score=0.0)
+    begun = attribution.Attribution(accepted, (screens,), accepted, (), (), 0.0)
+    for shown, expected in (([echo], ["block_lag", "sensor_delay"]), ([], [])):
+        monkeypatch.setattr(attribution, "shortlisted", lambda *a, shown=shown: [*shown])
+        attribution.extended(begun, (), None)
+        assert asked.pop() == expected

@@ -278,8 +278,8 @@ def may_not_act(fit: Fit, name: str) -> bool:
     any finite value.
     """
     if name in fit.effects:
-        switches = [p for p in fit.problem.known[name].parameters if not p.shapes]
-        off = {f"{PREFIX}{name}.{p.name}": p.neutral for p in switches}
+        switching = fit.problem.known[name].switching
+        off = {f"{PREFIX}{name}.{p.name}": p.neutral for p in switching}
     else:
         path = name.removeprefix(PARAMETER)
         off = {path: float(fit.problem.baseline.mean[fit.problem.baseline.paths.index(path)])}

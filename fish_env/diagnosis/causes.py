@@ -145,7 +145,7 @@ def probes_of(
     """
     if phase_of(effect):
         return _oscillations(effect, length)
-    switches = [p for p in effect.parameters if not p.shapes]
+    switches = effect.switching
     shapes = [p for p in effect.parameters if p.shapes]
     alternatives: list[tuple[Probe, ...]] = []
     for values in product(*(_shape_values(s) for s in shapes)):
@@ -161,7 +161,7 @@ def probes_of(
 def phase_of(effect: Effect) -> str | None:
     """The phase (rad) of an effect that oscillates with one amplitude; None of any other."""
     phases = [p.name for p in effect.parameters if p.shapes and _turns(p)]
-    switches = [p for p in effect.parameters if not p.shapes]
+    switches = effect.switching
     return phases[0] if len(phases) == 1 and len(switches) == 1 else None
 
 
@@ -173,7 +173,7 @@ def _turns(parameter: EffectParameter) -> bool:
 def _oscillations(effect: Effect, length: float) -> tuple[tuple[Probe, ...], ...]:
     """Sine and cosine at every frequency that runs of a length (s) can tell from its neighbours."""
     phase = phase_of(effect)
-    (size,) = (p for p in effect.parameters if not p.shapes)
+    (size,) = effect.switching
     shapes = [p for p in effect.parameters if p.shapes and p.name != phase]
     values = [_frequencies(s, length) if s.unit == "Hz" else _middle(s) for s in shapes]
     return tuple(
@@ -211,13 +211,13 @@ def combined(
     """
     phase = phase_of(effect)
     if phase:
-        (amplitude,) = (p.name for p in effect.parameters if not p.shapes)
+        (amplitude,) = (p.name for p in effect.switching)
         sine, cosine = (n * setting[amplitude] for n, setting in zip(size, settings, strict=True))
         angle = float(np.arctan2(cosine, sine))
         return {**settings[0], amplitude: float(np.hypot(sine, cosine)), phase: angle}
     values = {**start, **{p.name: settings[0][p.name] for p in effect.parameters if p.shapes}}
     for factor, setting in zip(size, settings, strict=True):
-        for name in (p.name for p in effect.parameters if not p.shapes):
+        for name in (p.name for p in effect.switching):
             endless = np.isinf(start[name])
             values[name] = (
                 setting[name] if endless else values[name] + factor * (setting[name] - start[name])
@@ -228,8 +228,8 @@ def combined(
 def mirrored(effect: Effect, probe: Probe) -> Probe:
     """The setting as far on the other side of neutral, within what physics allows."""
     other = dict(probe)
-    for p in effect.parameters:
-        if not p.shapes and np.isfinite(p.neutral):
+    for p in effect.switching:
+        if np.isfinite(p.neutral):
             other[p.name] = float(np.clip(2.0 * p.neutral - probe[p.name], p.lower, p.upper))
     return other
 
@@ -268,7 +268,7 @@ def _around(parameter: EffectParameter, value: float, length: float) -> tuple[fl
 
 
 def _alternative(
-    effect: Effect, switches: list[EffectParameter], setting: Probe, share: float
+    effect: Effect, switches: Sequence[EffectParameter], setting: Probe, share: float
 ) -> tuple[Probe, ...]:
     off = {p.name: p.neutral for p in switches}
     return tuple({**off, **setting, p.name: _between(p, share)} for p in switches)

@@ -22,6 +22,7 @@ from fish_env.identification.problem import Problem
 from fish_env.identification.runs import RunData
 
 FloatArray = npt.NDArray[np.float64]
+OneStep = tuple[list[Filtered], list[Filtered]]
 WINDOW_S = 3.0
 RESAMPLES = 2000
 ANGLES = ("roll", "yaw")
@@ -66,38 +67,40 @@ def measure_gain(problem: Problem, baseline: Fit, extended: Fit, rng: np.random.
         extended: extended model, from the same other runs.
         rng: for the interval.
     """
-    own = [_open_loop(problem, fit) for fit in (baseline, extended)]
+    judged = one_step(problem, baseline, extended)
+    before_any = in_step(problem, baseline.point, baseline.noise)
+    own = [_open_loop(problem, baseline, before_any), _open_loop(problem, extended, judged[1])]
     fit_percent = Pair(*(_fit_percent(errors, problem) for errors, problem in own))
     rmse = {
         name: Pair(*(_rms([e[:, i] for e in errors]) for errors, _ in own))
         for i, name in enumerate(problem.channels)
     }
-    one_step = _one_step(problem, baseline, extended)
-    misfit = _misfit(problem, one_step)
-    before, after = (_energies(problem.runs, filtered) for filtered in one_step)
+    before, after = (_energies(problem.runs, filtered) for filtered in judged)
     share, interval = reachable_share(before, after, rng)
     ids = tuple(run.id for run in problem.runs)
-    return Gain(ids, fit_percent, rmse, misfit, share, interval)
+    return Gain(ids, fit_percent, rmse, misfit_of(problem, judged), share, interval)
 
 
-def misfit_of(problem: Problem, baseline: Fit, extended: Fit) -> dict[str, Pair]:
-    """Whitened one-step errors by channel on the runs of a problem, both with one noise model."""
-    return _misfit(problem, _one_step(problem, baseline, extended))
+def one_step(problem: Problem, baseline: Fit, extended: Fit) -> OneStep:
+    """The runs of a problem filtered with each of two fits, both under the second one's noise."""
+    after = in_step(problem, extended.point, extended.noise)
+    if extended is baseline:
+        return after, after
+    return in_step(problem, baseline.point, extended.noise), after
 
 
-def _one_step(problem: Problem, baseline: Fit, extended: Fit) -> list[list[Filtered]]:
-    return [in_step(problem, fit.point, extended.noise) for fit in (baseline, extended)]
-
-
-def _misfit(problem: Problem, one_step: list[list[Filtered]]) -> dict[str, Pair]:
+def misfit_of(problem: Problem, judged: OneStep) -> dict[str, Pair]:
+    """Whitened one-step errors by channel, baseline and extended."""
     return {
-        name: Pair(*(_rms(_present(problem.runs, f, i)) for f in one_step))
+        name: Pair(*(_rms(_present(problem.runs, f, i)) for f in judged))
         for i, name in enumerate(problem.channels)
     }
 
 
-def _open_loop(problem: Problem, fit: Fit) -> tuple[list[FloatArray], Problem]:
-    filtered = in_step(problem, fit.point, fit.noise)
+def _open_loop(
+    problem: Problem, fit: Fit, filtered: list[Filtered]
+) -> tuple[list[FloatArray], Problem]:
+    """Errors over windows that begin from filtered states, and the windows."""
     pieces = [
         window
         for run, result in zip(problem.runs, filtered, strict=True)

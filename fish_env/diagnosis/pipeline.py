@@ -20,7 +20,7 @@ from fish_env.diagnosis.causes import Cause, causes_of
 from fish_env.diagnosis.consistency import Consistency, check_consistency
 from fish_env.diagnosis.effort import FULL, QUICK
 from fish_env.diagnosis.extended_file import extended_fish
-from fish_env.diagnosis.gain import Gain, Pair, measure_gain, misfit_of
+from fish_env.diagnosis.gain import Gain, Pair, measure_gain, misfit_of, one_step
 from fish_env.diagnosis.next_experiment import Proposal, propose
 from fish_env.diagnosis.noise_floor import Floor, noise_floors
 from fish_env.diagnosis.preconditions import Precondition, preconditions
@@ -207,10 +207,11 @@ def _diagnose_runs(
         progress("measuring the gain on final runs")
         gain = measure_gain(Problem(dataset, fish, final), baseline, accepted, rng)
     progress("locating the misfit")
-    place = localise_fits(problem, baseline, accepted, np.random.default_rng([seed, 3]))
+    judged = one_step(problem, baseline, accepted)
+    place = localise_fits(problem, judged, np.random.default_rng([seed, 3]))
     progress("choosing the next experiment")
     proposal = propose(attribution, verdict, shown)
-    misfit = misfit_of(problem, baseline, accepted)
+    misfit = misfit_of(problem, judged)
     return Diagnosis(
         dataset, final, floors, agreed, problem, attribution, left, shown, verdict, place, misfit,
         gain, proposal, seed, quick, time.perf_counter() - begin,

@@ -121,7 +121,7 @@ def _settings(problem: Problem, screen: Screen, signal: Signal) -> list[Setting]
     """The switching parameters of an effect, each from the mildest probe of the same shape."""
     effect = problem.known[signal.cause.name]
     shapes = [p.name for p in effect.parameters if p.shapes]
-    switches = [p for p in effect.parameters if not p.shapes]
+    switches = effect.switching
     mildest = next(
         other
         for other in _alternatives(screen)[effect.name]

@@ -18,9 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fish_env.data.vocabulary import COMMANDS
-from fish_env.identification.estimator import Fit
 from fish_env.identification.filtering import Filtered
-from fish_env.identification.phases import in_step
 from fish_env.identification.problem import Problem
 from fish_env.identification.runs import RunData
 from fish_env.model.state import BASE_STATES
@@ -186,23 +184,23 @@ class Localisation:
 
 
 def localise_fits(
-    problem: Problem, baseline: Fit, accepted: Fit, rng: np.random.Generator
+    problem: Problem,
+    judged: tuple[list[Filtered], list[Filtered]],
+    rng: np.random.Generator,
 ) -> Localisation:
     """Where the baseline's one-step errors are larger than the noise that the accepted fit found.
 
     Args:
         problem: runs to look at.
-        baseline: refitted baseline.
-        accepted: accepted explanation; its noise is the yardstick, its states are the regimes.
+        judged: the runs filtered with the refitted baseline and with the accepted explanation,
+            whose noise is the yardstick and whose states are the regimes.
         rng: shuffles.
     """
-    residuals = in_step(problem, baseline.point, accepted.noise)
-    states = in_step(problem, accepted.point, accepted.noise)
     runs = [
         RunResiduals(
             np.where(np.isfinite(run.measured), r.innovations, np.nan), regime_series(run, s)
         )
-        for run, r, s in zip(problem.runs, residuals, states, strict=True)
+        for run, r, s in zip(problem.runs, *judged, strict=True)
     ]
     return localise(problem.channels, runs, rng)
 

@@ -24,6 +24,7 @@ from fish_env.identification.information import (
     BLOCK_S,
     LONG_BLOCK_S,
     block_index,
+    gradient,
     information,
     prior_precision,
     sums_over,
@@ -147,9 +148,13 @@ class Projector:
         variance = float(self.moved(np.eye(len(self.vector))[:, [i]], others)[i, 0])
         at = float(self.vector[i])
         if own.any():
-            pull = inner(self.lin.slopes, self.lin.residuals[:, None])
-            at -= float(self.moved(pull + (self.prior * self.vector)[:, None], others)[i, 0])
+            at -= float(self.moved(self.gradient[:, None], others)[i, 0])
         return at, variance
+
+    @cached_property
+    def gradient(self) -> FloatArray:
+        """What pulls the free parameters (n,), along bounds and across them."""
+        return gradient(self.lin.slopes, self.lin.residuals, self.prior, self.vector)
 
     def _free(self, pull: FloatArray) -> FloatArray:
         return np.asarray(np.linalg.solve(self.factor.T, np.linalg.solve(self.factor, pull)))

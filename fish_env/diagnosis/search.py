@@ -265,8 +265,8 @@ def _sketches(
 
 def _off(problem: Problem, point: Point, name: str) -> bool:
     """Whether an effect does nothing at a point."""
-    switches = [p for p in problem.known[name].parameters if not p.shapes]
-    return all(point.effects[f"{PREFIX}{name}.{p.name}"] == p.neutral for p in switches)
+    switching = problem.known[name].switching
+    return all(point.effects[f"{PREFIX}{name}.{p.name}"] == p.neutral for p in switching)
 
 
 def starts(base: Fit, signal: Signal, z: FloatArray | None = None) -> list[Point]:
@@ -309,12 +309,11 @@ def _probed(problem: Problem, signal: Signal, every: bool = False) -> list[dict[
     sign. Never from neutral itself, where many an effect begins too flat to be left again.
     """
     cause, effect = signal.cause, problem.known[signal.cause.name]
-    switches = [p for p in effect.parameters if not p.shapes]
-    shaped = len(switches) < len(effect.parameters)
+    shaped = len(effect.switching) < len(effect.parameters)
     alternatives = (cause.probes[signal.probe],) if shaped and not every else cause.probes
     settings = [p for probes in alternatives for p in probes]
     opposite = [o for o in (mirrored(effect, p) for p in settings) if o not in settings]
-    settings += [o for o in opposite if any(o[p.name] != p.neutral for p in switches)]
+    settings += [o for o in opposite if any(o[p.name] != p.neutral for p in effect.switching)]
     return [effect_values(problem, cause.name, p) for p in settings]
 
 

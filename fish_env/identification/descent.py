@@ -17,8 +17,6 @@ DAMPINGS = (0.1, 10.0)
 NEAR, SLIGHT = 1.0, 0.1
 """Where the quadratic model promises less than the first (in -2 log likelihood), a shortened step
 that gains less than the second follows the objective's roughness."""
-
-
 AT = 0.01
 """A vector is at a bound when it is as near to it, in standard deviations."""
 

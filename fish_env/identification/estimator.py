@@ -12,11 +12,10 @@ import numpy.typing as npt
 from fish_env.identification.descent import descend, promised
 from fish_env.identification.filtering import Filtered, NoiseModel
 from fish_env.identification.free import Free, Linearised, linearise, objective
-from fish_env.identification.information import block_sums, information
+from fish_env.identification.information import block_sums, gradient, information
 from fish_env.identification.noise import disturbance_range, fit_noise
 from fish_env.identification.phases import settle_phases
 from fish_env.identification.problem import Point, Problem
-from fish_env.identification.products import inner
 
 FloatArray = npt.NDArray[np.float64]
 MORE = 3
@@ -151,7 +150,7 @@ def gauss_newton(
         lin = linearise(problem, free, at, noise, filtered)
         hessian = information(lin.slopes, free.prior)
         free.suit_steps(hessian)
-        return hessian, _gradient(lin, free.prior, at)
+        return hessian, gradient(lin.slopes, lin.residuals, free.prior, at)
 
     return descend(
         vector, partial(objective, problem, free, noise=noise), linearised, free.within,
@@ -168,20 +167,16 @@ def finished(own: Fit) -> Fit:
     for _ in range(MORE):
         free = Free(own.problem, own.effects, own.released)
         vector = free.pack(own.point)
-        hessian = information(own.linearised.slopes, free.prior)
-        gradient = _gradient(own.linearised, free.prior, vector)
-        if promised(hessian, gradient, free.within.step(hessian, gradient, vector)) < RESTING:
+        lin = own.linearised
+        hessian = information(lin.slopes, free.prior)
+        pull = gradient(lin.slopes, lin.residuals, free.prior, vector)
+        if promised(hessian, pull, free.within.step(hessian, pull, vector)) < RESTING:
             break
         again = fit(own.problem, own.effects, own.point, own.noise, own.released, rounds=2)
         if again.objective > own.objective:
             break
         own = again
     return own
-
-
-def _gradient(lin: Linearised, prior: FloatArray, vector: FloatArray) -> FloatArray:
-    """Half the gradient (n,) of the objective at a vector."""
-    return np.asarray(inner(lin.slopes, lin.residuals[:, None])[:, 0] + prior * vector)
 
 
 def _settled(before: NoiseModel, after: NoiseModel, share: float = 0.1) -> bool:
@@ -247,7 +242,7 @@ def _finish(
 ) -> Fit:
     lin = linearise(problem, free, vector, noise, filtered)
     hessian = information(lin.slopes, free.prior)
-    gradient = _gradient(lin, free.prior, vector)
+    pull = gradient(lin.slopes, lin.residuals, free.prior, vector)
     inverse = np.asarray(np.linalg.inv(hessian), float)
     covariance = sandwich(lin, inverse, free.prior)
     scale = free.scale()
@@ -260,7 +255,7 @@ def _finish(
     return Fit(
         problem, effects, released, point, noise, free.names, estimates, physical,
         float(sum(r.log_likelihood for r in filtered)), value, bounds,
-        free.within.held(hessian, gradient, vector), condition, filtered, lin,
+        free.within.held(hessian, pull, vector), condition, filtered, lin,
     )  # fmt: skip
 
 

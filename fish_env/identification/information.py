@@ -44,6 +44,20 @@ def information(slopes: FloatArray, prior: FloatArray) -> FloatArray:
     return np.asarray(of_data + np.diag(prior + floor))
 
 
+def gradient(
+    slopes: FloatArray, residuals: FloatArray, prior: FloatArray, at: FloatArray
+) -> FloatArray:
+    """Half the gradient (n,) of the squared residuals and the prior.
+
+    Args:
+        slopes: (D, n) derivative of whitened residuals.
+        residuals: (D,) whitened.
+        prior: (n,) precision.
+        at: (n,) where the slopes were taken.
+    """
+    return np.asarray(inner(slopes, residuals[:, None])[:, 0] + prior * at)
+
+
 def block_sums(
     scores: FloatArray,
     run_of: npt.NDArray[np.int64],

@@ -174,9 +174,9 @@ class Effect:
         return {p.name: p.neutral for p in self.parameters}
 
     @property
-    def switching(self) -> tuple[str, ...]:
-        """Names of the parameters that switch it on; the others only shape it."""
-        return tuple(p.name for p in self.parameters if not p.shapes)
+    def switching(self) -> tuple[EffectParameter, ...]:
+        """The parameters that switch it on; the others only shape it."""
+        return tuple(p for p in self.parameters if not p.shapes)
 
     @property
     def acts_on_motion(self) -> bool:

@@ -13,11 +13,12 @@ EFFECTS = sorted(catalogue())
 def faults(effect: Effect) -> list[str]:
     """What is wrong with the probes of an effect."""
     bounds = {p.name: (p.lower, p.upper) for p in effect.parameters}
+    switches = {p.name for p in effect.switching}
     found = [] if probes_of(effect) else ["none"]
     for alternative in probes_of(effect):
-        switched = {n for probe in alternative for n in effect.switching
+        switched = {n for probe in alternative for n in switches
                     if probe[n] != effect.neutral[n]}  # fmt: skip
-        if switched != set(effect.switching):
+        if switched != switches:
             found.append(f"{alternative}: not every switch is probed")
         for probe in alternative:
             outside = [n for n, v in probe.items() if not bounds[n][0] <= v <= bounds[n][1]]

@@ -127,7 +127,7 @@ def test_drawings_follow_the_readers_ground():
 @pytest.mark.slow
 def test_series_are_predictions_of_the_two_models(tmp_path):
     from fish_env.data import load_dataset
-    from fish_env.diagnosis.gain import measure_gain
+    from fish_env.diagnosis.gain import measure_gain, one_step
     from tests.diagnosis.small_cases import small_case
 
     truth = small_case(tmp_path / "data", {"servo_lag": 1.0}, runs=3, duration=7.0)
@@ -137,7 +137,7 @@ def test_series_are_predictions_of_the_two_models(tmp_path):
     start = Point(np.zeros_like(baseline.point.z), lag)
     extended = fit(baseline.problem, ("servo_lag",), start, rounds=1, iterations=2)
     rng = np.random.default_rng(0)
-    place = localise_fits(baseline.problem, baseline, extended, rng)
+    place = localise_fits(baseline.problem, one_step(baseline.problem, baseline, extended), rng)
     series = series_from(dataset, baseline, extended, ("r03",), place)
     assert [run.id for run in series.runs] == ["r03", "r01", "r02"]
     assert [run.final for run in series.runs] == [True, False, False]

@@ -228,7 +228,7 @@ def _effect_signals(fit: SteadyFit, projector: Projector, causes: Sequence[Cause
 
 def one_sided(effect: Effect) -> bool:
     """Whether its switching parameter can leave the neutral value one way only."""
-    only = [p for p in effect.parameters if not p.shapes]
+    only = effect.switching
     return len(only) == 1 and (only[0].lower >= only[0].neutral or only[0].upper <= only[0].neutral)
 
 

@@ -64,7 +64,7 @@ def _sizes(problem: SteadyProblem, signal: Signal, threshold: float) -> dict[str
     sizes: dict[str, float] = {}
     for i, probe in enumerate(signal.cause.probes[signal.probe]):
         alone = smallest_detectable(signal, i, threshold)
-        for name in effect.switching:
+        for name in (p.name for p in effect.switching):
             value, neutral = probe.get(name, effect.neutral[name]), effect.neutral[name]
             if value == neutral or name in sizes:
                 continue

@@ -112,7 +112,7 @@ def of_visible(
 
 def causes_of(problem: Problem) -> tuple[Cause, ...]:
     """Every cause that can be considered for a problem."""
-    step = longest_step(problem)
+    step = problem.longest_step
     length = max(run.duration for run in problem.runs)
     effects = [
         Cause(effect.name, probes_of(effect, step, length))
@@ -121,11 +121,6 @@ def causes_of(problem: Problem) -> tuple[Cause, ...]:
     ]
     coefficients = [Cause(f"{PARAMETER}{p}", path=p) for p in problem.baseline.paths]
     return (*effects, *coefficients)
-
-
-def longest_step(problem: Problem) -> float:
-    """Longest RK4 step (s) between the samples of a problem."""
-    return max(float(np.max(np.diff(run.clock) / run.substeps[1:])) for run in problem.runs)
 
 
 def probes_of(
@@ -152,7 +147,7 @@ def probes_of(
         setting = dict(zip([s.name for s in shapes], values, strict=True))
         for shares in (SHARES, SHARES[-1:]):
             candidates = [_alternative(effect, switches, setting, share) for share in shares]
-            slow = [c for c in candidates if slow_enough(effect, c, step)]
+            slow = [c for c in candidates if all(effect.is_followed(p, step) for p in c)]
             if slow and slow[0] not in alternatives:
                 alternatives.append(slow[0])
     return tuple(alternatives)
@@ -272,13 +267,6 @@ def _alternative(
 ) -> tuple[Probe, ...]:
     off = {p.name: p.neutral for p in switches}
     return tuple({**off, **setting, p.name: _between(p, share)} for p in switches)
-
-
-def slow_enough(effect: Effect, alternative: Iterable[Probe], step: float) -> bool:
-    """Whether RK4 follows the effect: its shortest time constant is about a step or longer."""
-    if effect.time_scale is None:
-        return True
-    return all(effect.time_scale(probe) >= 0.9 * step for probe in alternative)
 
 
 def _shape_values(parameter: EffectParameter) -> tuple[float, ...]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fish_env.diagnosis.causes import Probe, longest_step, slow_enough
+from fish_env.diagnosis.causes import Probe
 from fish_env.diagnosis.screening import (
     Projector,
     Screen,
@@ -96,7 +96,7 @@ def simulated(fit: Fit, screen: Screen, settings: Sequence[Setting]) -> FloatArr
         screen: signals and threshold.
         settings: what to find the size of.
     """
-    step = longest_step(fit.problem)
+    step = fit.problem.longest_step
     least = np.array([_least(fit.problem, setting, step) for setting in settings])
     wanted = in_proportion(settings, screen.threshold)
     probe = np.ones(len(settings))
@@ -135,10 +135,10 @@ def _power(
 def _least(problem: Problem, setting: Setting, step: float) -> float:
     """Smallest multiple of a probe that the simulation follows; 0 if it follows any."""
     effect = problem.known[setting.effect]
-    if slow_enough(effect, [setting.probe(1e-9)], step):
+    if effect.is_followed(setting.probe(1e-9), step):
         return 0.0
     multiples = np.geomspace(1e-6, 1.0, 200)
-    return next(float(m) for m in multiples if slow_enough(effect, [setting.probe(m)], step))
+    return next(float(m) for m in multiples if effect.is_followed(setting.probe(m), step))
 
 
 def _information(setting: Setting) -> float:

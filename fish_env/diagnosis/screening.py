@@ -18,6 +18,7 @@ from scipy.special import chdtrc
 from scipy.stats import chi2, ncx2
 
 from fish_env.diagnosis.causes import Cause, Probe, best_of_each, effect_values, finer, of_visible
+from fish_env.diagnosis.tails import chi2_log_tail
 from fish_env.effects.extended import PREFIX
 from fish_env.identification.estimator import Fit
 from fish_env.identification.information import (
@@ -76,7 +77,7 @@ class Signal:
     @property
     def log_p(self) -> float:
         """Logarithm of the p-value of this one test: overwhelming evidence still ranks."""
-        return float(chi2.logsf(self.statistic, self.freedom))
+        return float(chi2_log_tail(self.statistic, self.freedom))
 
     @cached_property
     def span(self) -> FloatArray:

@@ -216,12 +216,18 @@ def exchanged(current: Explanation, left: Sequence[Signal], report: Report) -> l
 
 
 def _exchange(sketcher: Sketcher, own: Fit, name: str, signal: Signal) -> Sketch | None:
-    """The sketch with one effect in the place of another, from all its sizes."""
+    """The sketch with one effect in the place of another, from all its sizes.
+
+    One that ends switched off had begun too far away, and is tried from each size in turn.
+    """
     kept = {p: v for p, v in own.point.effects.items() if p.split(".")[1] != name}
     effects = tuple(signal.cause.name if e == name else e for e in own.effects)
     sizes = _probed(own.problem, signal, every=True)
     begin = [Point(z, {**kept, **values}) for z in _baselines(own) for values in sizes]
-    return reached(lambda: sketcher.sketch(effects, own.released, begin))
+    sketches = [reached(partial(sketcher.sketch, effects, own.released, begin))]
+    if sketches[0] is None or _off(own.problem, sketches[0].point, signal.cause.name):
+        sketches += [reached(partial(sketcher.sketch, effects, own.released, [b])) for b in begin]
+    return min((s for s in sketches if s), key=lambda s: s.objective, default=None)
 
 
 def without(current: Explanation, name: str) -> Explanation | None:

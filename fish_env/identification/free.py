@@ -144,9 +144,15 @@ class Free:
         return [f.path for f, value in values if value <= f.lower or value >= f.upper]
 
     def lanes(self, vector: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Perturbed vectors (n, 1 + n), the centre first, and the signed steps (n,)."""
+        """Perturbed vectors (n, 1 + n), the centre first, and the signed steps (n,).
+
+        A lag that is off is switched on by as much as the simulation can follow: less would
+        diverge, and it would seem to do nothing.
+        """
         steps = self.steps.copy()
         for i, freedom in enumerate(self.freedoms, start=self.count):
+            if vector[i] < freedom.least:
+                steps[i] = max(steps[i], freedom.least - vector[i])
             if vector[i] + steps[i] > freedom.upper:
                 steps[i] = -steps[i]
         return np.column_stack([vector, vector[:, None] + np.diag(steps)]), steps

@@ -8,11 +8,12 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
+from scipy.optimize import bisect
 
 from fish_env.effects.extended import PREFIX, ExtendedModel
 from fish_env.errors import ParameterError
 from fish_env.identification.filtering import Measurement
-from fish_env.model.effect import Effect
+from fish_env.model.effect import Effect, EffectParameter
 from fish_env.params.packing import PATHS
 from fish_env.params.schema import FishParams
 
@@ -33,25 +34,44 @@ class EffectFreedom:
         lower: smallest value allowed.
         upper: largest value allowed.
         step: size for finite differences, about a hundredth of what matters.
+        least: values between neutral and this one are too quick to be simulated.
     """
 
     path: str
     lower: float
     upper: float
     step: float
+    least: float
 
 
-def freedoms(effect: Effect) -> tuple[EffectFreedom, ...]:
-    """All parameters of an effect, free within their physical bounds."""
+def freedoms(effect: Effect, step: float) -> tuple[EffectFreedom, ...]:
+    """All parameters of an effect, free within their physical bounds, for RK4 steps (s)."""
     return tuple(
         EffectFreedom(
             f"{PREFIX}{effect.name}.{p.name}",
             p.lower,
             p.upper,
             0.02 * (p.plausible[1] - p.plausible[0]),
+            p.neutral + least_followed(effect, p, step),
         )
         for p in effect.parameters
     )
+
+
+def least_followed(effect: Effect, parameter: EffectParameter, step: float) -> float:
+    """Smallest departure of one parameter from neutral that RK4 steps (s) follow; 0 if any is.
+
+    Zero, too, where the effect is as quick at every size: it then has short steps of its own.
+    """
+
+    def is_followed(departure: float) -> bool:
+        there = {**effect.neutral, parameter.name: parameter.neutral + departure}
+        return effect.is_followed(there, step)
+
+    near, far = 1e-9 * parameter.plausible[1], parameter.plausible[1]
+    if not np.isfinite(parameter.neutral) or is_followed(near) or not is_followed(far):
+        return 0.0
+    return float(bisect(lambda d: is_followed(d) - 0.5, near, far))
 
 
 class Baseline:

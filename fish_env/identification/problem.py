@@ -190,9 +190,15 @@ class Problem:
         """Values of effects as the fish's file has them, neutral where it says nothing."""
         return neutral_values(self.model, self.known, names)
 
+    @property
+    def longest_step(self) -> float:
+        """Longest RK4 step (s) between samples."""
+        return max(float(np.max(np.diff(run.clock) / run.substeps[1:])) for run in self.runs)
+
     def freedoms(self, names: Iterable[str]) -> tuple[EffectFreedom, ...]:
         """Free parameters of effects."""
-        return tuple(f for name in names for f in freedoms(self.known[name]))
+        step = self.longest_step
+        return tuple(f for name in names for f in freedoms(self.known[name], step))
 
     def innovations(
         self,

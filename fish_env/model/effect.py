@@ -62,6 +62,8 @@ SECTIONS = (
     "surroundings",
     "measurement",
 )
+FOLLOWED = 0.9
+"""Steps of RK4 that a time constant has to last to be followed."""
 
 
 @dataclass(frozen=True)
@@ -182,6 +184,10 @@ class Effect:
     def acts_on_motion(self) -> bool:
         """Whether the kernel must contain it; if not, it acts on what is recorded alone."""
         return bool(self.hooks or self.command_delay)
+
+    def is_followed(self, values: Mapping[str, float], step: float) -> bool:
+        """Whether RK4 steps (s) follow it: its shortest time constant is about a step or longer."""
+        return self.time_scale is None or self.time_scale(values) >= FOLLOWED * step
 
     @property
     def state_names(self) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.stats import chi2, ncx2
 
-from fish_env.diagnosis.causes import Cause, longest_step, probes_of
+from fish_env.diagnosis.causes import Cause, probes_of
 from fish_env.diagnosis.detectable import changes
 from fish_env.diagnosis.screening import Projector
 from fish_env.identification.filtering import NoiseModel
@@ -112,7 +112,7 @@ def probe_at(problem: Problem, name: str, size: float) -> dict[str, float]:
     effect_name, parameter = name.split(".")
     effect = problem.known[effect_name]
     neutral = effect.neutral[parameter]
-    probes = probes_of(effect, longest_step(problem))[0]
+    probes = probes_of(effect, problem.longest_step)[0]
     there = next(p[parameter] for p in probes if p[parameter] != neutral)
     side = float(np.sign(there - neutral))
     return {**effect.neutral, parameter: neutral + side * size}

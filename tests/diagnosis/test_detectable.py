@@ -49,6 +49,7 @@ class Bending:
         self.known = {"extra": effect}
         clock = STEP * np.arange(10.0)
         self.runs = [SimpleNamespace(clock=clock, substeps=np.ones(10, np.int64))]
+        self.longest_step = STEP
 
     def neutral(self, names) -> dict[str, float]:
         return {PATH: 0.0}

@@ -39,7 +39,19 @@ class Judge:
     def sketch(self, effects, released, begin):
         names = {p.split(".")[1] for point in begin for p in point.effects}
         assert names == set(effects)  # nothing of the effect that was taken out
-        return SimpleNamespace(effects=effects, objective=OBJECTIVES[effects])
+        return SimpleNamespace(effects=effects, objective=OBJECTIVES[effects], point=begin[0])
+
+
+class Passing(Judge):
+    """Sketches that run past the effect, to where it is off, unless they begin at a small size."""
+
+    def sketch(self, effects, released, begin):
+        last = begin[-1].effects
+        near = len(begin) == 1 and min(last.values()) < 0.02
+        nothing = {p: v if "current" in p else 0.0 for p, v in last.items()}
+        point = begin[0] if near else SimpleNamespace(effects=nothing)
+        objective = OBJECTIVES[effects] if near else 500.0
+        return SimpleNamespace(effects=effects, objective=objective, point=point)
 
 
 def signals(*names):
@@ -58,6 +70,17 @@ def test_a_better_look_alike_takes_the_place(monkeypatch, reached, kept):
     now = Explanation(effects, fit_of(effects, reached))
     left = signals("servo_delay", "servo_lag", "gyro_bias")  # the last looks like neither
     assert exchanged(now, left, lambda step: None)[0].causes == kept
+
+
+def test_one_that_ends_switched_off_is_tried_from_each_size(monkeypatch):
+    monkeypatch.setattr(search, "Sketcher", Passing)
+    monkeypatch.setattr(
+        search, "_in_full", lambda problem, s, noise: fit_of(s.effects, s.objective)
+    )
+    effects = ("tail_flexibility", "current")
+    now = Explanation(effects, fit_of(effects, 0.0))
+    found = exchanged(now, signals("servo_lag"), lambda step: None)
+    assert found[0].causes == ("servo_lag", "current")
 
 
 def test_the_last_cause_is_not_exchanged(monkeypatch):

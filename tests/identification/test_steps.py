@@ -7,6 +7,7 @@ import pytest
 
 from fish_env.data import CommandSteps
 from fish_env.diagnosis.open_loop import errors
+from fish_env.identification.free import Free, linearise
 from fish_env.identification.problem import Point, Problem
 from fish_env.identification.runs import FINE_STEP_S, SWITCH_S
 from tests.identification.synthetic import Setup, simulate
@@ -89,6 +90,28 @@ def test_only_corners_ask_for_fine_steps(dataset):
     assert problem.has_corners(LIMIT)
     assert not problem.has_corners(LAG)
     assert not problem.with_plain_steps().has_corners(LIMIT)
+
+
+def likeness_where_it_is_off(dataset, effect):
+    """Cosine between the slope by a lag that is off and what a lag does that steps follow."""
+    problem = Problem(dataset).with_plain_steps()
+    free, noise = Free(problem, (effect,), ()), noise_of(problem)
+    (path,) = free.names[free.count :]
+    nothing = Point(np.zeros(free.count), {path: 0.0})
+    filtered = problem.filtered(nothing, noise)
+    free.suit_steps(1e12 * np.eye(len(free.names)))  # as if the data told the smallest change
+    slope = linearise(problem, free, free.pack(nothing), noise, filtered).slopes[:, -1]
+    sizes = {path: np.array([0.0, 0.02])}
+    before, after = problem.innovations(np.zeros((free.count, 2)), sizes, noise, filtered)
+    lengths = np.linalg.norm(slope) * np.linalg.norm(after - before)
+    return slope @ (after - before) / max(lengths, 1e-12)
+
+
+@pytest.mark.parametrize("effect", ["servo_lag", "wake_memory"])
+def test_a_lag_that_is_off_can_be_switched_on(dataset, effect, monkeypatch):
+    assert likeness_where_it_is_off(dataset, effect) > 0.8
+    monkeypatch.setattr("fish_env.identification.parameters.least_followed", lambda *a: 0.0)
+    assert likeness_where_it_is_off(dataset, effect) < 0.2  # steps too long for it diverge
 
 
 def test_late_samples_show_the_time_before_the_run():

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import chi2
 
 from fish_env.diagnosis.causes import (
     Cause,
@@ -28,6 +27,7 @@ from fish_env.diagnosis.steady.fitting import (
 from fish_env.diagnosis.steady.freedoms import freedoms_of
 from fish_env.diagnosis.steady.scatter import Scatter, push_variances, response
 from fish_env.diagnosis.steady.screening import Screen, Signal, screen
+from fish_env.diagnosis.tails import chi2_log_tail
 from fish_env.errors import DatasetError
 from fish_env.identification.problem import Point
 
@@ -173,7 +173,7 @@ def worth_it(before: Explanation, after: Explanation, threshold: float) -> bool:
     added = len(after.fit.names) + len(after.fit.released)
     added -= len(before.fit.names) + len(before.fit.released)
     gained = before.fit.objective - after.fit.objective
-    return bool(chi2.logsf(gained, added) < threshold and after.score > before.score)
+    return bool(chi2_log_tail(gained, added) < threshold and after.score > before.score)
 
 
 def alike(best: Explanation, other: Explanation) -> bool:

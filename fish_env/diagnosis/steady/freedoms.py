@@ -9,6 +9,7 @@ import numpy as np
 
 from fish_env.diagnosis.steady.problem import SteadyProblem
 from fish_env.effects.extended import PREFIX
+from fish_env.identification.parameters import least_followed
 
 REACH = 3.0
 """How many times its plausible departure an effect may be off."""
@@ -42,7 +43,8 @@ def freedoms_of(problem: SteadyProblem, effects: Sequence[str]) -> list[Freedom]
                 lower, upper = max(p.lower, p.neutral - away), min(p.upper, p.neutral + away)
             else:
                 lower, upper = max(p.lower, low / REACH), min(p.upper, high * REACH)
-            if effect.time_scale is not None and p.unit == "s":
-                lower = max(lower, 0.9 * problem.dt)
+            least = least_followed(effect, p, problem.dt)
+            if least > 0.0:
+                lower = max(lower, p.neutral + least)
             found.append(Freedom(f"{PREFIX}{name}.{p.name}", lower, upper, 0.25 * (high - low)))
     return found

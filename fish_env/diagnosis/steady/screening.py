@@ -28,6 +28,7 @@ from fish_env.diagnosis.causes import (
 from fish_env.diagnosis.steady.fitting import SteadyFit, lines
 from fish_env.diagnosis.steady.orbit import coordinates
 from fish_env.diagnosis.steady.problem import SteadyProblem
+from fish_env.diagnosis.tails import chi2_log_tail
 from fish_env.effects.extended import PREFIX
 from fish_env.identification.problem import Point
 from fish_env.model.effect import Effect
@@ -93,7 +94,7 @@ def log_p(statistic: npt.ArrayLike, freedom: int, one_sided: bool) -> FloatArray
     values = np.asarray(statistic, float)
     if one_sided:
         return np.where(values > 0.0, norm.logsf(np.sqrt(values)), 0.0)
-    return np.asarray(chi2.logsf(values, freedom))
+    return chi2_log_tail(values, freedom)
 
 
 @dataclass(frozen=True, eq=False)

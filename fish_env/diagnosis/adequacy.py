@@ -7,20 +7,17 @@ them after everything that is free has been refitted, something remains that the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from fish_env.diagnosis.causes import Cause
-from fish_env.diagnosis.moderation import moderated, spreads
 from fish_env.diagnosis.screening import Projector, Signal, null_threshold
-from fish_env.diagnosis.tails import f_log_tail
 from fish_env.effects.extended import PREFIX
 from fish_env.identification.estimator import Fit
 from fish_env.identification.filtering import Filtered, Pushes
-from fish_env.identification.information import BLOCK_S, LONG_BLOCK_S, block_begins
 from fish_env.identification.noise import disturbance_range
 from fish_env.identification.runs import RunData
 from fish_env.model.effect import EffectParameter
@@ -138,16 +135,16 @@ def adequacy(fit: Fit, rng: np.random.Generator, tolerated: float = 0.0) -> Adeq
         rng: for the null distribution.
         tolerated: evidence (in -2 log likelihood) that an error of the simulation may make up.
     """
-    names, columns, signals = generic_forces(fit)
-    threshold = null_threshold(signals, rng, LEVEL)
+    names, signals = generic_forces(fit)
+    threshold = null_threshold([s for _, s in signals], rng, LEVEL)
     unit = np.repeat([1e-3, 1e-5], 3)
     found = []
-    for column, signal, log_p in zip(columns, signals, evidence(fit, signals), strict=True):
+    for column, signal in signals:
         function, direction = divmod(column, 6)
         amount = float(abs(signal.score[0] / signal.projected[0, 0])) * unit[direction]
-        found.append(Misfit(names[function], DIRECTIONS[direction], float(log_p), amount))
+        found.append(Misfit(names[function], DIRECTIONS[direction], signal.log_p, amount))
     found.sort(key=lambda m: m.log_p)
-    strongest = max((signal.statistic for signal in signals), default=0.0)
+    strongest = max((signal.statistic for _, signal in signals), default=0.0)
     reached = not found or found[0].log_p >= threshold or strongest < tolerated
     strained = (*strains(fit), *implausible(fit))
     return Adequacy(reached and not strained, threshold, tuple(found[:8]), strained)
@@ -155,38 +152,12 @@ def adequacy(fit: Fit, rng: np.random.Generator, tolerated: float = 0.0) -> Adeq
 
 def strongest_alarm(fit: Fit, rng: np.random.Generator) -> tuple[float, float]:
     """The smallest log p-value, and the threshold it has in white residuals: to calibrate by."""
-    signals = generic_forces(fit)[2]
-    return float(evidence(fit, signals).min()), null_threshold(signals, rng, LEVEL)
+    signals = [signal for _, signal in generic_forces(fit)[1]]
+    return min(s.log_p for s in signals), null_threshold(signals, rng, LEVEL)
 
 
-def evidence(fit: Fit, signals: Sequence[Signal]) -> FloatArray:
-    """Log p-value of each signal (n,), whose spread is moderated by that of all.
-
-    The larger of two, for blocks long enough for most disturbances and for slow ones.
-    """
-    if not signals:
-        return np.zeros(0)
-    lin = fit.linearised
-    short, long = (
-        block_begins(lin.run_of, lin.time_of, length) for length in (BLOCK_S, LONG_BLOCK_S)
-    )
-    energy, sums = np.empty((2, len(short), len(signals)))
-    statistic = np.empty(len(signals))
-    for i, signal in enumerate(signals):
-        left, step = signal.left[:, 0], signal.score[0] / signal.projected[0, 0]
-        statistic[i] = step * signal.score[0]
-        energy[:, i] = np.add.reduceat(left * left, short)
-        sums[:, i] = np.add.reduceat(left * lin.residuals, short) + step * energy[:, i]
-    found = []
-    for begins in (np.arange(len(short)), np.searchsorted(short, long)):
-        blocks = (np.add.reduceat(table, begins, axis=0) for table in (energy, sums))
-        own = moderated(spreads(*blocks))
-        found.append(f_log_tail(statistic / np.maximum(own.variance, 1.0), own.freedom))
-    return np.asarray(np.maximum(*found))
-
-
-def generic_forces(fit: Fit) -> tuple[list[str], list[int], list[Signal]]:
-    """Names of the functions, and signals with their columns (6 * function + direction)."""
+def generic_forces(fit: Fit) -> tuple[list[str], list[tuple[int, Signal]]]:
+    """Names of the functions, and a signal for each (6 * function + direction)."""
     tables = [
         regressors(run, filtered)
         for run, filtered in zip(fit.problem.runs, fit.filtered, strict=True)
@@ -197,16 +168,16 @@ def generic_forces(fit: Fit) -> tuple[list[str], list[int], list[Signal]]:
     spread = np.sqrt(np.mean(stacked**2, axis=0))
     kept = [i for i in range(len(names)) if spread[i] > 1e-9]
     bases = [np.ascontiguousarray(basis[:, kept] / spread[kept]) for basis in bases]
-    return [names[i] for i in kept], *_signals(fit, bases, len(kept))
+    return [names[i] for i in kept], _signals(fit, bases, len(kept))
 
 
-def _signals(fit: Fit, bases: list[FloatArray], functions: int) -> tuple[list[int], list[Signal]]:
+def _signals(fit: Fit, bases: list[FloatArray], functions: int) -> list[tuple[int, Signal]]:
     problem, projector = fit.problem, Projector(fit)
     columns = np.arange(6 * functions)
     unit = np.tile(np.repeat([1e-3, 1e-5], 3), functions)
     residuals = fit.linearised.residuals
     nothing = Cause("generic")
-    shown, signals = [], []
+    result = []
     chunk = 96
     for first in range(0, len(columns), chunk):
         part = columns[first : first + chunk]
@@ -217,9 +188,8 @@ def _signals(fit: Fit, bases: list[FloatArray], functions: int) -> tuple[list[in
         for i, column in enumerate(part):
             signal = projector.signal(nothing, 0, (out[i] - residuals)[:, None], strain=False)
             if signal is not None:
-                shown.append(int(column))
-                signals.append(signal)
-    return shown, signals
+                result.append((int(column), signal))
+    return result
 
 
 def regressors(run: RunData, filtered: Filtered) -> dict[str, FloatArray]:

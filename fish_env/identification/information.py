@@ -76,14 +76,6 @@ def block_index(
     return np.unique(block, return_inverse=True)[1]
 
 
-def block_begins(
-    run_of: npt.NDArray[np.int64], time_of: FloatArray, length_s: float
-) -> npt.NDArray[np.int64]:
-    """(blocks,) index of the first residual of each block, residuals being in order of time."""
-    index = block_index(run_of, time_of, length_s)
-    return np.asarray(np.flatnonzero(np.diff(index, prepend=-1)))
-
-
 def sums_over(index: npt.NDArray[np.int64], scores: FloatArray) -> FloatArray:
     """Scores (D, m) summed over the blocks of an index (D,), shape (blocks, m)."""
     return np.column_stack([np.bincount(index, weights=column) for column in scores.T])

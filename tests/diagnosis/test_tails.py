@@ -1,0 +1,16 @@
+"""P-values too small for a number."""
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from fish_env.diagnosis.tails import chi2_log_tail
+
+
+@pytest.mark.parametrize("freedom", [1, 2, 3, 8])
+def test_tails_of_chi_squared_go_on_where_scipy_ends(freedom):
+    near = np.array([0.0, 1.0, 30.0, 900.0, 1150.0, 1300.0])
+    np.testing.assert_allclose(chi2_log_tail(near, freedom), chi2.logsf(near, freedom), rtol=1e-9)
+    slope = np.diff(chi2_log_tail([1e5, 1e5 + 9.0, 1e6, 1e6 + 9.0], freedom))
+    np.testing.assert_allclose(slope[[0, 2]], -4.5, rtol=0.01)
+    assert np.isneginf(chi2.logsf(3000.0, freedom))  # what made strong causes all alike

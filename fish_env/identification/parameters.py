@@ -34,7 +34,8 @@ class EffectFreedom:
         lower: smallest value allowed.
         upper: largest value allowed.
         step: size for finite differences, about a hundredth of what matters.
-        least: values between neutral and this one are too quick to be simulated.
+        least: values between neutral and this one are too quick to be simulated; minus infinity
+            where none is.
     """
 
     path: str
@@ -52,26 +53,27 @@ def freedoms(effect: Effect, step: float) -> tuple[EffectFreedom, ...]:
             p.lower,
             p.upper,
             0.02 * (p.plausible[1] - p.plausible[0]),
-            p.neutral + least_followed(effect, p, step),
+            least_followed(effect, p, step),
         )
         for p in effect.parameters
     )
 
 
 def least_followed(effect: Effect, parameter: EffectParameter, step: float) -> float:
-    """Smallest departure of one parameter from neutral that RK4 steps (s) follow; 0 if any is.
+    """Smallest value of one parameter above neutral that RK4 steps (s) follow.
 
-    Zero, too, where the effect is as quick at every size: it then has short steps of its own.
+    Minus infinity where they follow any, and where the effect is as quick at every size: it then
+    has short steps of its own.
     """
 
-    def is_followed(departure: float) -> bool:
-        there = {**effect.neutral, parameter.name: parameter.neutral + departure}
-        return effect.is_followed(there, step)
+    def is_followed(value: float) -> bool:
+        return effect.is_followed({**effect.neutral, parameter.name: value}, step)
 
-    near, far = 1e-9 * parameter.plausible[1], parameter.plausible[1]
-    if not np.isfinite(parameter.neutral) or is_followed(near) or not is_followed(far):
-        return 0.0
-    return float(bisect(lambda d: is_followed(d) - 0.5, near, far))
+    neutral, far = parameter.neutral, parameter.plausible[1]
+    near = neutral + 1e-9 * (far - neutral)
+    if not np.isfinite(neutral) or is_followed(near) or not is_followed(far):
+        return -np.inf
+    return float(bisect(lambda value: is_followed(value) - 0.5, near, far))
 
 
 class Baseline:

@@ -110,8 +110,21 @@ def likeness_where_it_is_off(dataset, effect):
 @pytest.mark.parametrize("effect", ["servo_lag", "wake_memory"])
 def test_a_lag_that_is_off_can_be_switched_on(dataset, effect, monkeypatch):
     assert likeness_where_it_is_off(dataset, effect) > 0.8
-    monkeypatch.setattr("fish_env.identification.parameters.least_followed", lambda *a: 0.0)
+    monkeypatch.setattr("fish_env.identification.parameters.least_followed", lambda *a: -np.inf)
     assert likeness_where_it_is_off(dataset, effect) < 0.2  # steps too long for it diverge
+
+
+def test_only_what_is_too_quick_takes_other_steps(dataset):
+    problem = Problem(dataset).with_plain_steps()
+    free = Free(problem, problem.known, ())
+    for side in (-1.0, 1.0):
+        values = {f.path: 3.0 * side * f.step if f.lower < 0.0 else 2.0 for f in free.freedoms}
+        start = free.clip(free.pack(Point(np.zeros(free.count), values)))
+        steps = free.lanes(start)[1]
+        np.testing.assert_array_equal(np.abs(steps), free.largest_steps)
+    least = {f.path for f in free.freedoms if np.isfinite(f.least)}
+    lags = ("servo_lag", "block_lag", "wake_memory")
+    assert least == {f"effects.{name}.time_constant" for name in lags}
 
 
 def test_late_samples_show_the_time_before_the_run():

@@ -43,8 +43,6 @@ def freedoms_of(problem: SteadyProblem, effects: Sequence[str]) -> list[Freedom]
                 lower, upper = max(p.lower, p.neutral - away), min(p.upper, p.neutral + away)
             else:
                 lower, upper = max(p.lower, low / REACH), min(p.upper, high * REACH)
-            least = least_followed(effect, p, problem.dt)
-            if least > 0.0:
-                lower = max(lower, p.neutral + least)
+            lower = max(lower, least_followed(effect, p, problem.dt))
             found.append(Freedom(f"{PREFIX}{name}.{p.name}", lower, upper, 0.25 * (high - low)))
     return found

@@ -24,6 +24,7 @@ from fish_env.steady import steady_motion
 FISH = "zheng-2021-a"
 SWIM = (0.0, 0.3, 2.0, 0.0, 0.0)
 EFFECT: EffectValues = {"servo_lag": {"time_constant": 0.05}}
+WATER: EffectValues = {"current": {"north": 0.01}}
 
 
 def one_fish(effects: EffectValues) -> None:
@@ -67,8 +68,11 @@ def filters(effects: EffectValues) -> None:
 
 
 TASKS: Mapping[str, tuple[Callable[[EffectValues], None], EffectValues]] = {
+    "filter, all effects": (filters, {**EFFECT, **WATER}),
+    "filter, effects of water": (filters, WATER),
+} | {
     f"{name}, {kind}": (task, effects)
-    for kind, effects in (("catalogue of effects", EFFECT), ("no effects", {}))
+    for kind, effects in (("an effect of the tail", EFFECT), ("no effects", {}))
     for name, task in (
         ("filter", filters),
         ("vector environment", vector_environment),

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import spearmanr
 
 from fish_env.comparison.errors import plain, unit_of
 from fish_env.data import COMMANDS, SteadyDataset
@@ -205,6 +204,8 @@ def _repeat_sd(values: FloatArray, conditions: tuple[str, ...]) -> float:
 
 
 def _trend(error: FloatArray, commands: FloatArray) -> tuple[str, float] | None:
+    from scipy.stats import spearmanr  # a third of a second to load, for nobody else's use
+
     used = np.isfinite(error)
     found: list[tuple[str, float]] = []
     for column, name in enumerate(COMMANDS):

@@ -8,8 +8,7 @@ from functools import partial
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import chi2
-from scipy.stats import t as student
+from scipy.special import chdtri, stdtrit
 
 from fish_env.diagnosis.adequacy import implausible, strains
 from fish_env.diagnosis.causes import PARAMETER, Cause, same_causes
@@ -136,7 +135,8 @@ def extended(
             # What looks like an accepted cause may be in its numbers, and shows no more.
             chosen += _like(name, screens[-1], chosen, problem)
         loose = _with_wandering_phase(current, chosen, causes, rng) if effort.retries else None
-        tried, base = refits(current, chosen, report, loose, effort.finalists)
+        like = partial(_like, before=screens[-1], chosen=chosen, problem=problem)
+        tried, base = refits(current, chosen, report, loose, effort, like)
         if base is None:
             break
         if not ranking:
@@ -210,7 +210,7 @@ def ranking_of(tried: Sequence[Explanation], base: Explanation) -> tuple[Ranked,
 def _ranked(name: str, gains: FloatArray) -> Ranked:
     """A cause by what it gains in each run (runs,)."""
     count, total = len(gains), float(gains.sum())
-    half = float(student.ppf(0.975, count - 1) * gains.std(ddof=1) * np.sqrt(count))
+    half = float(stdtrit(count - 1, 0.975) * gains.std(ddof=1) * np.sqrt(count))
     return Ranked(name, total, (total - half, total + half))
 
 
@@ -288,7 +288,7 @@ def may_not_act(fit: Fit, name: str) -> bool:
     at = [fit.names.index(path) for path in off]
     gap = fit.estimates[at] - np.array(list(off.values()))
     distance = gap @ np.linalg.solve(fit.covariance[np.ix_(at, at)], gap)
-    return bool(distance < chi2.isf(0.05, len(at)))
+    return bool(distance < chdtri(len(at), 0.05))
 
 
 def shortlisted(

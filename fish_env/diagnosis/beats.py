@@ -13,8 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import minimize_scalar
-from scipy.stats import chi2
-from scipy.stats import f as fisher
+from scipy.special import chdtrc, fdtrc
 
 from fish_env.data.schema import CommandSteps, Dataset, Run
 from fish_env.data.vocabulary import COMMANDS
@@ -111,7 +110,7 @@ def frequency_of(t: FloatArray, sway: FloatArray, near: float) -> tuple[float, f
     variance = float(residuals @ residuals) / freedom * _colour(residuals)
     # The best of as many frequencies as the range tells apart.
     looks = (NEAR[1] - NEAR[0]) * near * length
-    if looks * fisher.sf(gain / 3.0 / variance, 3, freedom) > SURE:
+    if looks * fdtrc(3, freedom, gain / 3.0 / variance) > SURE:
         return None
     turning = 2.0 * np.pi * (t - t.mean())
     slope = turning * (weights[-1] * columns[:, -2] - weights[-2] * columns[:, -1])
@@ -145,7 +144,7 @@ def uneven(beats: Sequence[Beat]) -> bool:
     ratios, errors = pairs.T
     weights = errors**-2
     square = float(weights @ (ratios - weights @ ratios / weights.sum()) ** 2)
-    by_chance = chi2.sf(square, len(pairs) - 1) > BY_CHANCE
+    by_chance = chdtrc(len(pairs) - 1, square) > BY_CHANCE
     return bool(np.std(ratios, ddof=1) > UNEVEN and not by_chance)
 
 

@@ -25,6 +25,7 @@ class Effort:
     left_out: tuple[str, ...] = ()
 
 
+PICTURES = "figures as PNG"
 FULL = Effort(runs=10_000, shortlist=6, finalists=4, retries=True)
 QUICK = Effort(
     runs=2,
@@ -35,7 +36,8 @@ QUICK = Effort(
         "all but two of the runs for fitting",
         "fits of rival causes, so nothing comes out as ambiguous",
         "second looks: from the winner, at tails out of step, for weaker causes",
+        PICTURES,
     ),
 )
-STEADY_LEFT_OUT = ("fits of all but the three likeliest causes",)
+STEADY_LEFT_OUT = ("fits of all but the three likeliest causes", PICTURES)
 """What a first look at a steady table leaves out."""

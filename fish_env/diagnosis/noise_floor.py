@@ -16,8 +16,7 @@ from math import comb
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import get_window
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from fish_env.data.schema import Dataset, Run
 from fish_env.data.units import SI_UNIT
@@ -50,7 +49,7 @@ class Spread:
     @property
     def ci95(self) -> tuple[float, float]:
         """95 % interval, for Gaussian noise."""
-        low, high = chi2.ppf([0.975, 0.025], self.freedom)
+        low, high = chdtri(self.freedom, [0.025, 0.975])
         return float(self.sd * (self.freedom / low) ** 0.5), float(
             self.sd * (self.freedom / high) ** 0.5
         )
@@ -271,7 +270,7 @@ def mean_spectrum(series: list[tuple[FloatArray, FloatArray]]) -> Spectrum | Non
     if not pieces:
         return None
     # Twice differenced and restored: the strong slow motion must not leak along the spectrum.
-    taper = get_window("hann", SEGMENT - 2)
+    taper = np.hanning(SEGMENT - 1)[:-1]
     rows = [np.abs(np.fft.rfft(taper * np.diff(piece, 2))) ** 2 for piece in pieces]
     frequency = np.fft.rfftfreq(SEGMENT - 2)[1:].astype(np.float64)
     gain = (2.0 * np.sin(np.pi * frequency)) ** 4

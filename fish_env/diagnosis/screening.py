@@ -13,12 +13,10 @@ from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import brentq
 from scipy.special import chdtrc
-from scipy.stats import chi2, ncx2
 
 from fish_env.diagnosis.causes import Cause, Probe, best_of_each, effect_values, finer, of_visible
-from fish_env.diagnosis.tails import chi2_log_tail
+from fish_env.diagnosis.tails import chi2_log_tail, noncentrality
 from fish_env.effects.extended import PREFIX
 from fish_env.identification.estimator import Fit
 from fish_env.identification.information import (
@@ -363,10 +361,7 @@ def smallest_detectable(
     The statistic is then noncentral chi-squared with as many degrees of freedom as settings; its
     noncentrality is the multiple squared times the projected information.
     """
-    bound = float(chi2.isf(np.exp(threshold), signal.freedom))
-    target = brentq(
-        lambda nc: ncx2.sf(bound, signal.freedom, nc) - power, 1e-3, 4.0 * bound + 100.0
-    )
+    target = noncentrality(threshold, signal.freedom, power)
     information = float(signal.projected[setting, setting]) / signal.inflation
     return float(np.sqrt(target / max(information, 1e-12)))
 

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fish_env.diagnosis.causes import combined, effect_values, mirrored
-from fish_env.diagnosis.effort import FULL
+from fish_env.diagnosis.effort import FULL, Effort
 from fish_env.diagnosis.screening import Signal, zoomed
 from fish_env.effects.extended import PREFIX
 from fish_env.identification.estimator import Fit, fit
@@ -104,7 +104,8 @@ def refits(
     chosen: Sequence[Signal],
     report: Report,
     loose: tuple[Fit, Sequence[Signal]] | None = None,
-    most: int = FULL.finalists,
+    effort: Effort = FULL,
+    like: Callable[[str], Sequence[Signal]] = lambda name: (),
 ) -> tuple[list[Explanation], Explanation | None]:
     """Fits with one more cause each, best first, and the present one under the best one's noise.
 
@@ -116,7 +117,8 @@ def refits(
         chosen: causes to add.
         report: told what is being done.
         loose: fit with a wandering phase, and what it shows to be missing.
-        most: how many causes to fit in full.
+        effort: how many causes to try beside the chosen ones, and to fit in full.
+        like: further causes known to look like one, which are tried if it leads.
     """
     base = current.fit
     sketcher = Sketcher(base)
@@ -134,7 +136,11 @@ def refits(
 
     tasks = [*(partial(followed, s) for s in shown), *(partial(alone, s) for s in chosen)]
     sketches = [s for found in side_by_side(tasks) for s in found]
-    finalists = _finalists(sketches, sketcher.base, BEHIND, most)
+    if sketches:
+        ahead = min(sketches, key=lambda s: s[1].objective)[0]
+        more = side_by_side(partial(alone, s) for s in like(ahead)[: effort.shortlist])
+        sketches += [s for found in more for s in found]
+    finalists = _finalists(sketches, sketcher.base, BEHIND, effort.finalists)
     leader = None
     while finalists and leader is None:
         (name, sketch), *finalists = finalists

@@ -1,13 +1,14 @@
-"""Logarithms of p-values, also of those too small for a number: overwhelming evidence still ranks.
+"""Tails of chi-squared: p-values, also those too small for a number, and what a test can find.
 
-Source: Abramowitz and Stegun (1964), 6.5.32 (the incomplete gamma function of large arguments).
+Overwhelming evidence still ranks. Source: Abramowitz and Stegun (1964), 6.5.32 (the incomplete
+gamma function of large arguments).
 """
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import chdtrc, gammaln
+from scipy.special import chdtrc, chdtri, chndtrinc, gammaln
 
 FloatArray = npt.NDArray[np.float64]
 SMALL = -600.0
@@ -32,3 +33,14 @@ def chi2_log_tail(statistic: npt.ArrayLike, freedom: npt.ArrayLike) -> FloatArra
         series = series + term
     far = (half - 1.0) * np.log(y) - y - gammaln(half) + np.log(series)
     return np.asarray(np.where(direct > SMALL, direct, far))
+
+
+def noncentrality(log_p: float, freedom: int, power: float) -> float:
+    """Noncentrality of a chi-squared statistic that exceeds a threshold with some power.
+
+    Args:
+        log_p: log p-value at the threshold.
+        freedom: degrees of freedom.
+        power: probability to exceed it.
+    """
+    return float(chndtrinc(chdtri(freedom, np.exp(log_p)), freedom, 1.0 - power))

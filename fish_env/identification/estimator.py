@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 import numpy.typing as npt
+from scipy.special import ndtri
 
 from fish_env.identification.descent import descend, promised
 from fish_env.identification.filtering import Filtered, NoiseModel
@@ -64,10 +65,8 @@ class Fit:
 
     def interval(self, name: str, level: float = 0.95) -> tuple[float, float]:
         """Normal interval of one parameter."""
-        from scipy.stats import norm
-
         i = self.names.index(name)
-        half = float(norm.ppf(0.5 + level / 2)) * np.sqrt(self.covariance[i, i])
+        half = float(ndtri(0.5 + level / 2)) * np.sqrt(self.covariance[i, i])
         return float(self.estimates[i] - half), float(self.estimates[i] + half)
 
 
@@ -145,17 +144,29 @@ def gauss_newton(
     Raises:
         LinAlgError: the simulation diverges where the steps begin.
     """
-
-    def linearised(at: FloatArray, filtered: list[Filtered]) -> tuple[FloatArray, FloatArray]:
-        lin = linearise(problem, free, at, noise, filtered)
-        hessian = information(lin.slopes, free.prior)
-        free.suit_steps(hessian)
-        return hessian, gradient(lin.slopes, lin.residuals, free.prior, at)
-
     return descend(
-        vector, partial(objective, problem, free, noise=noise), linearised, free.within,
-        iterations, tolerance,
+        vector,
+        partial(objective, problem, free, noise=noise),
+        lambda at, filtered: quadratic(problem, free, at, noise, filtered),
+        free.within, iterations, tolerance,
     )  # fmt: skip
+
+
+def quadratic(
+    problem: Problem,
+    free: Free,
+    vector: FloatArray,
+    noise: NoiseModel,
+    filtered: Sequence[Filtered],
+) -> tuple[FloatArray, FloatArray]:
+    """Half the Hessian (n, n) and half the gradient (n,) of the objective, for Gauss-Newton.
+
+    The steps of later slopes are suited to this Hessian.
+    """
+    lin = linearise(problem, free, vector, noise, filtered)
+    hessian = information(lin.slopes, free.prior)
+    free.suit_steps(hessian)
+    return hessian, gradient(lin.slopes, lin.residuals, free.prior, vector)
 
 
 def finished(own: Fit) -> Fit:

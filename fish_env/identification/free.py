@@ -198,3 +198,25 @@ def objective(
     results = problem.filtered(free.unpack(vector), noise)
     value = -2.0 * sum(r.log_likelihood for r in results) + free.prior @ (vector * vector)
     return float(value), results
+
+
+def objectives_with_gains(
+    problem: Problem,
+    free: Free,
+    vectors: Sequence[FloatArray],
+    noise: NoiseModel,
+    filtered: Sequence[Filtered],
+) -> list[float]:
+    """-2 log likelihood + prior with the gains of a filter that has run, but for a constant.
+
+    The constant is that of the gains: models can be compared under the same ones. All vectors
+    together take no longer than one filter. Infinite where no fish can have the coefficients, or
+    the simulation diverges.
+    """
+    columns = np.column_stack(vectors)
+    effects = {f.path: columns[free.count + i] for i, f in enumerate(free.freedoms)}
+    innovations = problem.innovations(columns[: free.count], effects, noise, filtered)
+    values = np.einsum("nd,nd->n", innovations, innovations) + free.prior @ (columns * columns)
+    possible = [problem.baseline.possible(vector[: free.count]) for vector in vectors]
+    kept = zip(possible, values.tolist(), strict=True)
+    return [value if able and np.isfinite(value) else np.inf for able, value in kept]

@@ -7,12 +7,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import numpy.typing as npt
 
-from fish_env.identification.estimator import Fit, gauss_newton, objective_at
-from fish_env.identification.free import Free, objective
+from fish_env.identification.descent import descend
+from fish_env.identification.estimator import Fit, quadratic
+from fish_env.identification.free import Free, objectives_with_gains
 from fish_env.identification.phases import settle_phases
 from fish_env.identification.problem import Point, Problem
 
+FloatArray = npt.NDArray[np.float64]
 STEPS = 5
 TOLERANCE = 0.5
 """A sketch ends when no parameter moves by more of its standard deviation."""
@@ -26,7 +29,8 @@ class Sketch:
         effects: names of the effects that are free.
         released: baseline coefficients whose prior is lifted.
         point: values reached.
-        objective: -2 log likelihood + prior there, on the runs of the sketch.
+        objective: -2 log likelihood + prior there, on the runs of the sketch, but for a constant
+            of the sketcher.
     """
 
     effects: tuple[str, ...]
@@ -36,7 +40,10 @@ class Sketch:
 
 
 class Sketcher:
-    """Sketches on a few runs of a fit.
+    """Sketches on a few runs of a fit, with the gains of its filter.
+
+    The gains follow the noise and hardly the parameters; to filter anew at every point takes many
+    times as long, and the fit that follows a sketch does.
 
     Args:
         fit: what is fitted already; its noise model is used.
@@ -45,22 +52,22 @@ class Sketcher:
 
     def __init__(self, fit: Fit, runs: int = 2) -> None:
         self.fit = fit
-        problem = fit.problem
+        problem, chosen = fit.problem, fit.problem.spread(runs)
         if not problem.has_corners(fit.point.effects):
             problem = problem.with_plain_steps()  # good enough to see who leads, and much quicker
-        self.few: Problem = problem.subset(runs)
-        self.one: Problem = problem.subset(1)
+        self.few: Problem = problem.with_runs([problem.runs[i] for i in chosen])
+        self.filtered = [fit.filtered[i] for i in chosen]
 
     @cached_property
     def base(self) -> float:
         """Objective of the fit itself on these runs."""
         own = Free(self.few, self.fit.effects, self.fit.released)
-        return objective(self.few, own, own.pack(self.fit.point), self.fit.noise)[0]
+        return self._objectives(self.few, own, [own.pack(self.fit.point)])[0]
 
     def sketch(
         self, effects: Sequence[str], released: Sequence[str], starts: Sequence[Point]
     ) -> Sketch:
-        """A few Gauss-Newton steps from the best of some starts, which a single run chooses.
+        """A few Gauss-Newton steps from the best of some starts.
 
         Args:
             effects: names of effects that are free.
@@ -71,10 +78,32 @@ class Sketcher:
             LinAlgError: the simulation diverges from every start.
         """
         free = Free(self.few, effects, released)
-        noise = self.fit.noise
-        values = [objective_at(self.one, effects, point, noise, released) for point in starts]
-        best = int(np.argmin(np.where(np.isfinite(values), values, np.inf)))
-        vector = free.clip(free.pack(starts[best]))
-        few = settle_phases(self.few, free.unpack(vector), noise)
-        vector, value, _ = gauss_newton(few, free, vector, noise, STEPS, TOLERANCE)
+        vectors = [free.clip(free.pack(start)) for start in starts]
+        few, vector = self._best(free, vectors)
+
+        def evaluate(several: Sequence[FloatArray]) -> list[tuple[float, None]]:
+            return [(value, None) for value in self._objectives(few, free, several)]
+
+        vector, value, _ = descend(
+            vector,
+            lambda at: evaluate([at])[0],
+            lambda at, _: quadratic(few, free, at, self.fit.noise, self.filtered),
+            free.within, STEPS, TOLERANCE, evaluate,
+        )  # fmt: skip
         return Sketch(tuple(effects), tuple(released), free.unpack(vector), value)
+
+    def _best(self, free: Free, vectors: Sequence[FloatArray]) -> tuple[Problem, FloatArray]:
+        """The best of some vectors, and the problem with the tail phases that it asks for."""
+        few, noise = self.few, self.fit.noise
+        if all(run.phase_known for run in few.runs):
+            values = self._objectives(few, free, vectors)
+            return few, vectors[int(np.argmin(values))]
+        settled = [settle_phases(few, free.unpack(v), noise) for v in vectors]
+        pairs = zip(settled, vectors, strict=True)
+        return min(pairs, key=lambda pair: self._objectives(pair[0], free, [pair[1]])[0])
+
+    def _objectives(
+        self, problem: Problem, free: Free, vectors: Sequence[FloatArray]
+    ) -> list[float]:
+        noise, filtered = self.fit.noise, self.filtered
+        return objectives_with_gains(problem, free, vectors, noise, filtered)

@@ -35,7 +35,7 @@ def test_a_cause_without_which_the_simulation_diverges_is_not_dropped(monkeypatc
     assert attribution.pruned(both) is both
 
 
-def contest(monkeypatch, results):
+def contest(monkeypatch, results, shown="abc"):
     """Three sketches, best first, and what becomes of each when it is fitted in full."""
     sketches = [(name, SimpleNamespace(objective=i, name=name)) for i, name in enumerate("abc")]
     monkeypatch.setattr(search, "Sketcher", lambda base: SimpleNamespace(base=lambda: 1000.0))
@@ -49,9 +49,12 @@ def contest(monkeypatch, results):
         search, "_at_noise", lambda problem, at, noise, n: results.get(getattr(at, "name", None))
     )
     monkeypatch.setattr(search, "_best_first", lambda tried: (tried, None))
-    monkeypatch.setattr(search, "_finalists", lambda found, base, behind, most: found)
-    named = [Signal(name) for name in "abc"]
-    return refits(Explanation((), fake("base")), named, lambda step: None)
+    monkeypatch.setattr(
+        search, "_finalists", lambda found, *rest: sorted(found, key=lambda f: f[1].objective)
+    )
+    named = [Signal(name) for name in shown]
+    like = {shown[0]: [Signal(name) for name in "abc" if name not in shown]}.__getitem__
+    return refits(Explanation((), fake("base")), named, lambda step: None, like=like)
 
 
 class Signal(str):
@@ -70,3 +73,9 @@ def test_the_best_of_those_that_do_not_diverge_leads(monkeypatch):
 
 def test_no_cause_is_found_where_all_diverge(monkeypatch):
     assert contest(monkeypatch, dict.fromkeys("abc")) == ([], None)
+
+
+def test_what_looks_like_the_best_is_tried_too(monkeypatch):
+    """A strong effect is screened far from where it is, and one that looks like it may hide it."""
+    tried, _ = contest(monkeypatch, {"a": fake("a"), "b": fake("b"), "c": fake("c")}, shown="bc")
+    assert [e.causes for e in tried] == [("a",), ("b",), ("c",)]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fish_env.diagnosis.answer import words
+from fish_env.diagnosis.effort import QUICK
 from fish_env.diagnosis.regimes import localise_fits
 from fish_env.diagnosis.report import series_from, write_report
 from fish_env.diagnosis.report.html import inline, text
@@ -110,6 +111,10 @@ def test_a_quick_answer_draws_fewer_runs(tmp_path):
     write_report(answer(quick=True), run_series(), tmp_path)
     assert (tmp_path / "figures" / "run_r01.svg").exists()
     assert not (tmp_path / "figures" / "run_r02.svg").exists()
+    assert not list((tmp_path / "figures").glob("*.png"))
+    assert "figures as PNG" in QUICK.left_out
+    write_report(answer(), run_series(), tmp_path)
+    assert (tmp_path / "figures" / "run_r01.png").exists()
 
 
 def test_figures_of_an_earlier_diagnosis_go(tmp_path):

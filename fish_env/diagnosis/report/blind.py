@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from fish_env.diagnosis.report import figures as draw
+from fish_env.diagnosis.report.figures import Album
 from fish_env.diagnosis.report.html import figure, number, paragraph, section, table, text
 from fish_env.diagnosis.report.series import ReportSeries, SteadySeries
 from fish_env.effects import catalogue
@@ -18,7 +18,7 @@ MOST_NAMED = 8
 """Names in one sentence."""
 
 
-def unseen(answer: Answer, series: ReportSeries | SteadySeries | None, folder: Path) -> str:
+def unseen(answer: Answer, series: ReportSeries | SteadySeries | None, album: Album) -> str:
     """What these runs could have shown of each effect, and what they confuse it with."""
     found = answer.get("preconditions", [])
     if not found:
@@ -35,7 +35,7 @@ def unseen(answer: Answer, series: ReportSeries | SteadySeries | None, folder: P
         names = [p["name"] for p in found]
         cosines = np.array([[_cosine(p, name) for name in names] for p in found])
         caption = "How alike the signals of two effects are, after a refit of the baseline."
-        parts.append(figure(draw.draw_confusability(names, cosines, folder), caption))
+        parts.append(figure(draw.draw_confusability(names, cosines, album), caption))
     return section("What could not have been seen", *parts, key="unseen")
 
 

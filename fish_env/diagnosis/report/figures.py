@@ -1,9 +1,10 @@
-"""Figures of the report: each a PNG and an SVG, in the project's style."""
+"""Figures of the report: each an SVG and a PNG, in the project's style."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,11 +21,15 @@ from fish_env.plotting.style import BLUE, DOTS_PER_INCH, MEASURED, VERMILION, dr
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.collections import QuadMesh
+    from matplotlib.colors import LogNorm
     from matplotlib.figure import Figure
 
 FloatArray = npt.NDArray[np.float64]
 BASELINE, EXTENDED = VERMILION, BLUE
 Plain = Mapping[str, Any]
+MAPS = 4
+"""Maps of regimes beside each other."""
 WIDE = 30.0
 """Largest ratio of bars on a linear axis."""
 LOOKS: dict[str, dict[str, Any]] = {
@@ -33,6 +38,19 @@ LOOKS: dict[str, dict[str, Any]] = {
     "extended": {"color": EXTENDED},
 }
 LEFT_OUT_GAIN = "log score on {} left out, above the refitted baseline's"
+
+
+@dataclass(frozen=True)
+class Album:
+    """Where figures go.
+
+    Attributes:
+        folder: Their folder.
+        bitmaps: Whether each is a PNG too, not only an SVG.
+    """
+
+    folder: Path
+    bitmaps: bool = True
 
 
 @contextmanager
@@ -47,18 +65,19 @@ def _page(width: float, height: float) -> Iterator[Figure]:
         yield figure
 
 
-def _saved(figure: Figure, folder: Path, name: str) -> Path:
-    """Writes both formats and returns the path of the SVG."""
-    folder.mkdir(parents=True, exist_ok=True)
-    vector = folder / f"{name}.svg"
+def _saved(figure: Figure, album: Album, name: str) -> Path:
+    """Writes the figure and returns the path of the SVG."""
+    album.folder.mkdir(parents=True, exist_ok=True)
+    vector = album.folder / f"{name}.svg"
     figure.savefig(vector)
-    # What was laid out stays; finding it again takes as long as drawing.
-    figure.set_layout_engine("none")
-    figure.savefig(vector.with_suffix(".png"), dpi=DOTS_PER_INCH)
+    if album.bitmaps:
+        # What was laid out stays; finding it again takes as long as drawing.
+        figure.set_layout_engine("none")
+        figure.savefig(vector.with_suffix(".png"), dpi=DOTS_PER_INCH)
     return vector
 
 
-def draw_paths(runs: Sequence[RunSeries], folder: Path) -> Path:
+def draw_paths(runs: Sequence[RunSeries], album: Album) -> Path:
     """Paths of whole runs from above, and their depth over time."""
     with _page(0.6 + 2.6 * max(len(runs), 2), 4.4) as figure:
         axes = figure.subplots(2, len(runs), squeeze=False, height_ratios=(3, 2))
@@ -78,10 +97,10 @@ def draw_paths(runs: Sequence[RunSeries], folder: Path) -> Path:
         axes[1, 0].set_ylabel("z, depth (m)")
         handles, words = axes[0, 0].get_legend_handles_labels()
         figure.legend(handles, words, loc="outside upper center", ncols=3)
-        return _saved(figure, folder, "paths")
+        return _saved(figure, album, "paths")
 
 
-def draw_run(run: RunSeries, window_s: float, folder: Path) -> Path:
+def draw_run(run: RunSeries, window_s: float, album: Album) -> Path:
     """Channels of a run over time: measured, and predicted over windows."""
     names = list(run.measured)
     columns = 2 if len(names) > 4 else 1
@@ -98,7 +117,7 @@ def draw_run(run: RunSeries, window_s: float, folder: Path) -> Path:
             bottom.tick_params(labelbottom=True)
         handles, words = axes[0, 0].get_legend_handles_labels()
         figure.legend(handles, words, loc="outside upper center", ncols=3)
-        return _saved(figure, folder, f"run_{run.id}")
+        return _saved(figure, album, f"run_{run.id}")
 
 
 def _draw_channel(ax: Axes, run: RunSeries, name: str, window_s: float) -> None:
@@ -117,51 +136,59 @@ def _draw_channel(ax: Axes, run: RunSeries, name: str, window_s: float) -> None:
         ax.invert_yaxis()
 
 
-def draw_regimes(found: Localisation, folder: Path) -> Path:
+def draw_regimes(found: Localisation, album: Album) -> Path:
     """Residual energy by channel, one map for each regime; cells that stand out are framed."""
-    count = len(found.regimes)
-    columns = 4
-    rows = -(-count // columns)
+    from matplotlib.colors import LogNorm
+
+    lines = [found.regimes[i : i + MAPS] for i in range(0, len(found.regimes), MAPS)]
     energies = np.concatenate([table.ravel() for table in found.energy.values()])
-    top = float(np.max(energies, initial=1.0, where=np.isfinite(energies)))
-    with _page(9.4, (0.9 + 0.2 * len(found.channels)) * rows + 0.8) as figure:
-        axes = figure.subplots(rows, columns, squeeze=False)
-        for ax in axes.ravel()[count:]:
-            ax.set_axis_off()
-        for i, (ax, regime) in enumerate(zip(axes.ravel(), found.regimes, strict=False)):
-            image = _draw_map(ax, found, regime.name, top)
-            title = f"{regime.name.replace('_', ' ')} ({regime.unit})"
-            edges = [f"{regime.factor * e:.3g}" for e in regime.edges]
-            ax.set_xticks(np.arange(len(edges)), edges, fontsize=7, rotation=45)
-            ax.set_title(title, loc="left", fontsize=8.5)
-            names = found.channels if i % columns == 0 else [""] * len(found.channels)
-            ax.set_yticks(np.arange(len(found.channels)) + 0.5, names, fontsize=8)
+    top = float(np.sqrt(np.max(energies, initial=1.0, where=np.isfinite(energies))))
+    norm = LogNorm(0.7, max(top, 1.5))
+    with _page(9.4, (0.9 + 0.2 * len(found.channels)) * len(lines) + 0.8) as figure:
+        # One axes for a line of maps: each of its own would take three times as long to lay out.
+        axes = figure.subplots(len(lines), 1, squeeze=False).ravel()
+        for ax, line in zip(axes, lines, strict=True):
+            ticks: dict[float, str] = {}
+            for i, regime in enumerate(line):
+                image, edges = _draw_map(ax, found, regime.name, norm, 1.15 * i)
+                words = (f"{regime.factor * edge:.3g}" for edge in regime.edges)
+                ticks.update(zip(edges.tolist(), words, strict=True))
+                title = f"{regime.name.replace('_', ' ')} ({regime.unit})"
+                ax.text(edges[0], -0.2, title, fontsize=8.5)
+            ax.set_xlim(-0.01, 1.15 * MAPS - 0.14)
+            ax.set_ylim(len(found.channels), 0)
+            ax.set_xticks(list(ticks), list(ticks.values()), fontsize=7, rotation=45)
+            ax.set_yticks(np.arange(len(found.channels)) + 0.5, found.channels, fontsize=8)
             ax.tick_params(axis="y", length=0)
+            ax.spines[["left", "bottom"]].set_visible(False)
+            ax.grid(False)
         bar = figure.colorbar(image, ax=axes, shrink=0.8, pad=0.01)
         bar.set_label("error of the refitted baseline\n(1: noise alone)")
-        ticks = [tick for tick in (1, 2, 3, 5, 10, 20, 30, 50, 100) if tick <= np.sqrt(top)]
-        bar.set_ticks(ticks or [1], labels=[str(tick) for tick in ticks or [1]])
+        marks = [mark for mark in (1, 2, 3, 5, 10, 20, 30, 50, 100) if mark <= top]
+        bar.set_ticks(marks or [1], labels=[str(mark) for mark in marks or [1]])
         bar.minorticks_off()
-        return _saved(figure, folder, "regimes")
+        return _saved(figure, album, "regimes")
 
 
-def _draw_map(ax: Axes, found: Localisation, name: str, top: float) -> Any:
-    from matplotlib.colors import LogNorm
+def _draw_map(
+    ax: Axes, found: Localisation, name: str, norm: LogNorm, left: float
+) -> tuple[QuadMesh, FloatArray]:
+    """A map of unit width, and the edges of its columns."""
     from matplotlib.patches import Rectangle
 
     size = np.sqrt(found.energy[name])
-    norm = LogNorm(0.7, max(float(np.sqrt(top)), 1.5))
-    image = ax.pcolormesh(size, cmap="cividis", norm=norm)
-    ax.invert_yaxis()
-    ax.grid(False)
+    edges = left + np.linspace(0.0, 1.0, size.shape[1] + 1)
+    wide = edges[1] - edges[0]
+    image = ax.pcolormesh(edges, np.arange(len(size) + 1), size, cmap="cividis", norm=norm)
     for c, b in np.argwhere(np.isnan(size)):
-        ax.add_patch(Rectangle((b, c), 1, 1, fc="none", ec="#999999", hatch="////", lw=0))
+        ax.add_patch(Rectangle((edges[b], c), wide, 1, fc="none", ec="#999999", hatch="////", lw=0))
     for c, b in np.argwhere(found.p_values[name] < LEVEL):
-        ax.add_patch(Rectangle((b + 0.04, c + 0.06), 0.92, 0.88, fill=False, ec=VERMILION, lw=1.8))
-    return image
+        corner = (edges[b] + 0.04 * wide, c + 0.06)
+        ax.add_patch(Rectangle(corner, 0.92 * wide, 0.88, fill=False, ec=VERMILION, lw=1.8))
+    return image, edges
 
 
-def draw_ranking(answer: Plain, folder: Path) -> Path:
+def draw_ranking(answer: Plain, album: Album) -> Path:
     """How much better each cause foretells what it has not seen, with intervals if known."""
     rows = list(answer["ranking"])[::-1]
     accepted = {cause["name"] for cause in answer["causes"]}
@@ -182,10 +209,10 @@ def draw_ranking(answer: Plain, folder: Path) -> Path:
         ax.axvline(0.0, color=MEASURED, lw=0.8)
         ax.set_xlabel(meaning)
         ax.grid(axis="y", visible=False)
-        return _saved(figure, folder, "ranking")
+        return _saved(figure, album, "ranking")
 
 
-def draw_confusability(names: Sequence[str], cosines: FloatArray, folder: Path) -> Path:
+def draw_confusability(names: Sequence[str], cosines: FloatArray, album: Album) -> Path:
     """Cosine between the signals of every two causes, after a refit of the baseline."""
     side = 1.6 + 0.2 * len(names)
     with _page(side + 1.2, side) as figure:
@@ -195,10 +222,10 @@ def draw_confusability(names: Sequence[str], cosines: FloatArray, folder: Path) 
         ax.set_xticks(range(len(names)), names, rotation=90, fontsize=7)
         ax.set_yticks(range(len(names)), names, fontsize=7)
         figure.colorbar(image, ax=ax, shrink=0.7).set_label("likeness (1: the same signal)")
-        return _saved(figure, folder, "confusability")
+        return _saved(figure, album, "confusability")
 
 
-def draw_misfit(answer: Plain, folder: Path) -> Path:
+def draw_misfit(answer: Plain, album: Album) -> Path:
     """Errors by channel in units of the noise, of the baseline and the best explanation."""
     names = list(answer["misfit"])
     pairs = [answer["misfit"][name] for name in names]
@@ -221,10 +248,10 @@ def draw_misfit(answer: Plain, folder: Path) -> Path:
         ax.grid(axis="x", visible=False)
         ax.legend(loc="upper right", ncols=3)
         ax.set_ylim(0.0, 1.25 * max([*before, 1.0]))
-        return _saved(figure, folder, "misfit")
+        return _saved(figure, album, "misfit")
 
 
-def draw_gain(runs: Mapping[str, tuple[float, float]], folder: Path) -> Path:
+def draw_gain(runs: Mapping[str, tuple[float, float]], album: Album) -> Path:
     """Fit percent of each final run: from the refitted baseline to the extended model."""
     with _page(7.0, 1.0 + 0.34 * len(runs)) as figure:
         ax = figure.subplots()
@@ -240,10 +267,10 @@ def draw_gain(runs: Mapping[str, tuple[float, float]], folder: Path) -> Path:
         ax.axvline(100.0, color=MEASURED, lw=1.0, ls=":")
         ax.set_xlabel("fit of predictions over windows (%, 100: perfect)")
         figure.legend(loc="outside upper center", ncols=2)
-        return _saved(figure, folder, "gain")
+        return _saved(figure, album, "gain")
 
 
-def draw_schedule(schedule: Sequence[Mapping[str, float]], folder: Path) -> Path:
+def draw_schedule(schedule: Sequence[Mapping[str, float]], album: Album) -> Path:
     """Commands of the next experiment over time."""
     varied = [n for n in COMMANDS if len({row.get(n, 0.0) for row in schedule}) > 1]
     shown = varied or ["tail_amplitude", "tail_frequency"]
@@ -260,10 +287,10 @@ def draw_schedule(schedule: Sequence[Mapping[str, float]], folder: Path) -> Path
             ax.margins(y=0.15)
         axes[-1].set_xlabel("time (s)")
         figure.align_ylabels()
-        return _saved(figure, folder, "next_experiment")
+        return _saved(figure, album, "next_experiment")
 
 
-def draw_steady(series: SteadySeries, folder: Path) -> Path:
+def draw_steady(series: SteadySeries, album: Album) -> Path:
     """Predicted over measured values; rows kept for judging are filled."""
     names = list(series.measured)
     models = {"baseline": (series.baseline, BASELINE, "s")}
@@ -289,4 +316,4 @@ def draw_steady(series: SteadySeries, folder: Path) -> Path:
             ax.set_ylabel(f"predicted {label(name)}")
         handles, words = axes[0].get_legend_handles_labels()
         figure.legend(handles, words, loc="outside upper center", ncols=4)
-        return _saved(figure, folder, "steady")
+        return _saved(figure, album, "steady")

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
+from fish_env.diagnosis.report.figures import Album
 from fish_env.diagnosis.report.html import folded, number, section, table, text
 from fish_env.diagnosis.report.series import ReportSeries, SteadySeries
 from fish_env.diagnosis.report.units import shown_unit
@@ -13,7 +13,7 @@ from fish_env.diagnosis.report.units import shown_unit
 Answer = Mapping[str, Any]
 
 
-def measurements(answer: Answer, series: ReportSeries | SteadySeries | None, folder: Path) -> str:
+def measurements(answer: Answer, series: ReportSeries | SteadySeries | None, album: Album) -> str:
     """Whether the channels agree among themselves, and how noisy each of them is."""
     agreed = (answer.get("consistency") or {}).get("sentences", [])
     sentences = "".join(f"<li>{text(sentence)}</li>" for sentence in agreed)

@@ -8,6 +8,7 @@ from typing import Any
 
 from fish_env.diagnosis.report import sections
 from fish_env.diagnosis.report.blind import unseen
+from fish_env.diagnosis.report.figures import Album
 from fish_env.diagnosis.report.html import text
 from fish_env.diagnosis.report.measurements import measurements
 from fish_env.diagnosis.report.series import ReportSeries, SteadySeries
@@ -15,7 +16,7 @@ from fish_env.replay import component_scripts, component_style
 
 Answer = Mapping[str, Any]
 Series = ReportSeries | SteadySeries | None
-Part = Callable[[Answer, Series, Path], str]
+Part = Callable[[Answer, Series, Album], str]
 STYLE = Path(__file__).with_name("report.css")
 PARTS: tuple[Part, ...] = (
     sections.verdict,
@@ -36,7 +37,9 @@ PARTS: tuple[Part, ...] = (
 
 
 def write_report(answer: Answer, series: Series, out: str | Path) -> Path:
-    """Writes ``report.html`` and its figures, as SVG and PNG, into a folder.
+    """Writes ``report.html`` and its figures into a folder.
+
+    Figures are SVG and, but for a first look, PNG.
 
     Args:
         answer: Content of ``diagnosis.json``; what it lacks is left out of the page.
@@ -51,7 +54,8 @@ def write_report(answer: Answer, series: Series, out: str | Path) -> Path:
     figures.mkdir(parents=True, exist_ok=True)
     for old in (*figures.glob("*.svg"), *figures.glob("*.png")):
         old.unlink()  # figures of an earlier diagnosis would contradict this one
-    body = "\n".join(filter(None, (part(answer, series, figures) for part in PARTS)))
+    album = Album(figures, bitmaps=not answer.get("quick"))
+    body = "\n".join(filter(None, (part(answer, series, album) for part in PARTS)))
     page = folder / "report.html"
     page.write_text(_page(answer, body), encoding="utf-8")
     return page

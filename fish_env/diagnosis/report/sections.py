@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ import numpy.typing as npt
 from fish_env.diagnosis.answer import words
 from fish_env.diagnosis.causes import PARAMETER
 from fish_env.diagnosis.report import figures as draw
+from fish_env.diagnosis.report.figures import Album
 from fish_env.diagnosis.report.html import (
     figure,
     folded,
@@ -41,7 +41,7 @@ VERDICTS = {
 }
 
 
-def verdict(answer: Answer, series: Series, folder: Path) -> str:
+def verdict(answer: Answer, series: Series, album: Album) -> str:
     """Heading: the verdict in two sentences."""
     name = str(answer["verdict"])
     facts = [f"dataset {answer.get('dataset', '?')}", f"fish {answer.get('fish', '?')}"]
@@ -54,7 +54,7 @@ def verdict(answer: Answer, series: Series, folder: Path) -> str:
     )
 
 
-def cause_values(answer: Answer, series: Series, folder: Path) -> str:
+def cause_values(answer: Answer, series: Series, album: Album) -> str:
     """What was found, and its rivals, with intervals."""
     rows = []
     sets = [("accepted", answer.get("causes", []))]
@@ -71,7 +71,7 @@ def cause_values(answer: Answer, series: Series, folder: Path) -> str:
     return section("What was found", table(heads, rows))
 
 
-def swimming(answer: Answer, series: Series, folder: Path) -> str:
+def swimming(answer: Answer, series: Series, album: Album) -> str:
     """The replay: measured, baseline and extended fish in three dimensions."""
     if not isinstance(series, ReportSeries) or not series.runs:
         return ""
@@ -87,7 +87,7 @@ def swimming(answer: Answer, series: Series, folder: Path) -> str:
             "predictions further down start afresh every few seconds."
         ),
         component(groups, series.fish, "runs"),
-        figure(draw.draw_paths(drawn, folder), caption) if drawn else "",
+        figure(draw.draw_paths(drawn, album), caption) if drawn else "",
         *(paragraph(note, "rp-note") for note in notes),
         key="replay",
     )
@@ -101,11 +101,11 @@ def _drawn(answer: Answer, series: ReportSeries) -> tuple[RunSeries, ...]:
     return series.runs[: 1 if answer.get("quick") else MOST_DRAWN]
 
 
-def channels(answer: Answer, series: Series, folder: Path) -> str:
+def channels(answer: Answer, series: Series, album: Album) -> str:
     """One-step misfit, and each channel over time."""
     parts = []
     if answer.get("misfit"):
-        picture = draw.draw_misfit(answer, folder)
+        picture = draw.draw_misfit(answer, album)
         errors = "Errors" if _noun(answer) == "condition" else "One-step prediction errors"
         parts.append(figure(picture, f"{errors} in units of the noise."))
     if isinstance(series, ReportSeries):
@@ -115,16 +115,16 @@ def channels(answer: Answer, series: Series, folder: Path) -> str:
                 f"{_run_name(run.id, run.final)}: measured, and predicted over windows of "
                 f"{window:g} s."
             )
-            drawn = figure(draw.draw_run(run, window, folder), caption)
+            drawn = figure(draw.draw_run(run, window, album), caption)
             parts.append(drawn if i == 0 else folded(_run_name(run.id, run.final), drawn))
     return section("Channel by channel", *parts, key="channels")
 
 
-def steady(answer: Answer, series: Series, folder: Path) -> str:
+def steady(answer: Answer, series: Series, album: Album) -> str:
     """A table of steady motion: predicted against measured, condition by condition."""
     if not isinstance(series, SteadySeries):
         return ""
-    picture = figure(draw.draw_steady(series, folder), "Predicted against measured steady motion.")
+    picture = figure(draw.draw_steady(series, album), "Predicted against measured steady motion.")
     return section(
         "Condition by condition",
         picture,
@@ -155,7 +155,7 @@ def _cell(value: float) -> str:
     return number(float(value)) if np.isfinite(value) else "–"
 
 
-def gain(answer: Answer, series: Series, folder: Path) -> str:
+def gain(answer: Answer, series: Series, album: Album) -> str:
     """How much better the extended model predicts runs that chose nothing."""
     found = answer.get("gain")
     if not found:
@@ -164,7 +164,7 @@ def gain(answer: Answer, series: Series, folder: Path) -> str:
     runs = _fit_by_run(found, series)
     if runs:
         caption = "Fit of each run kept for judging, mean over its channels."
-        parts.append(figure(draw.draw_gain(runs, folder), caption))
+        parts.append(figure(draw.draw_gain(runs, album), caption))
         rows = [(text(run), number(a), number(b), number(b - a)) for run, (a, b) in runs.items()]
         heads = ("final run", "baseline fit (%)", "extended fit (%)", "gained")
         parts.append(table(heads, rows))
@@ -216,7 +216,7 @@ def _errors(found: Answer) -> str:
     return folded("Error by channel", table(heads, rows))
 
 
-def where(answer: Answer, series: Series, folder: Path) -> str:
+def where(answer: Answer, series: Series, album: Album) -> str:
     """Where in the regime the misfit sits, and what was never visited."""
     parts = []
     found = series.localisation if isinstance(series, ReportSeries) else None
@@ -224,7 +224,7 @@ def where(answer: Answer, series: Series, folder: Path) -> str:
         parts.append(paragraph(found.words()))
         parts.append(
             figure(
-                draw.draw_regimes(found, folder),
+                draw.draw_regimes(found, album),
                 "Error of the refitted baseline in each channel and regime. Framed: more than "
                 "chance gives anywhere in the table. Hatched: never visited.",
             )
@@ -259,7 +259,7 @@ def _asked_for(answer: Answer) -> str:
     return table(("force or moment in", "depends on", "rms"), rows, caption)
 
 
-def ranking(answer: Answer, series: Series, folder: Path) -> str:
+def ranking(answer: Answer, series: Series, album: Album) -> str:
     """The refitted causes by how much each explains."""
     if not answer.get("ranking"):
         return ""
@@ -267,10 +267,10 @@ def ranking(answer: Answer, series: Series, folder: Path) -> str:
         "How much better each refitted cause foretells what was left out of the fit; "
         "blue: accepted; lines: 95 % intervals over runs."
     )
-    return section("Ranking", figure(draw.draw_ranking(answer, folder), caption), key="ranking")
+    return section("Ranking", figure(draw.draw_ranking(answer, album), caption), key="ranking")
 
 
-def experiment(answer: Answer, series: Series, folder: Path) -> str:
+def experiment(answer: Answer, series: Series, album: Album) -> str:
     """The next experiment as a schedule to fly."""
     proposal = answer.get("next_experiment") or {}
     schedule = proposal.get("schedule")
@@ -288,13 +288,13 @@ def experiment(answer: Answer, series: Series, folder: Path) -> str:
     return section(
         "Next experiment",
         paragraph(f"Fly “{name}” from rest{goal}."),
-        figure(draw.draw_schedule(schedule, folder), f"Commands of “{name}”."),
+        figure(draw.draw_schedule(schedule, album), f"Commands of “{name}”."),
         table(heads, rows, "Each row holds until the next"),
         key="next",
     )
 
 
-def coefficients(answer: Answer, series: Series, folder: Path) -> str:
+def coefficients(answer: Answer, series: Series, album: Album) -> str:
     """Every coefficient: before, after, and how surprising the move is."""
     rows = []
     found = answer.get("parameters", [])
@@ -324,7 +324,7 @@ def coefficients(answer: Answer, series: Series, folder: Path) -> str:
     )
 
 
-def about(answer: Answer, series: Series, folder: Path) -> str:
+def about(answer: Answer, series: Series, album: Album) -> str:
     """Noise, notes, and how this was made."""
     lines = [str(note) for note in answer.get("notes", [])]
     d = (answer.get("noise") or {}).get("disturbance", {})

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import f as f_distribution
+from scipy.special import fdtrc
 
 from fish_env.data.vocabulary import COMMANDS
 from fish_env.diagnosis.causes import Cause
@@ -93,7 +93,7 @@ def lack_of_fit(fit: SteadyFit) -> tuple[float | None, float | None]:
     if freedom < 1:
         return None, None
     ratio = (between / freedom) / (within / table.repeats)
-    return ratio, float(f_distribution.sf(ratio, freedom, table.repeats))
+    return ratio, float(fdtrc(freedom, table.repeats, ratio))
 
 
 def wrenches(fit: SteadyFit, rng: np.random.Generator) -> tuple[float, tuple[Misfit, ...]]:

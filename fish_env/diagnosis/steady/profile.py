@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from fish_env.diagnosis.steady.fitting import (
     SteadyFit,
@@ -21,7 +21,7 @@ from fish_env.diagnosis.steady.freedoms import freedoms_of
 from fish_env.diagnosis.steady.orbit import Orbits
 from fish_env.identification.problem import Point
 
-WORSE = float(chi2.isf(0.05, 1))
+WORSE = float(chdtri(1, 0.05))
 BETTER = 0.1
 """A fit whose objective is lower by less is the same fit."""
 FIRST, GROWTH = 2.2, 1.5

@@ -14,8 +14,7 @@ from functools import partial
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import brentq
-from scipy.stats import chi2, ncx2, norm
+from scipy.special import log_ndtr, ndtri
 
 from fish_env.diagnosis.causes import (
     Cause,
@@ -28,7 +27,7 @@ from fish_env.diagnosis.causes import (
 from fish_env.diagnosis.steady.fitting import SteadyFit, lines
 from fish_env.diagnosis.steady.orbit import coordinates
 from fish_env.diagnosis.steady.problem import SteadyProblem
-from fish_env.diagnosis.tails import chi2_log_tail
+from fish_env.diagnosis.tails import chi2_log_tail, noncentrality
 from fish_env.effects.extended import PREFIX
 from fish_env.identification.problem import Point
 from fish_env.model.effect import Effect
@@ -93,7 +92,7 @@ def log_p(statistic: npt.ArrayLike, freedom: int, one_sided: bool) -> FloatArray
     """Log p-value of a likelihood ratio."""
     values = np.asarray(statistic, float)
     if one_sided:
-        return np.where(values > 0.0, norm.logsf(np.sqrt(values)), 0.0)
+        return np.where(values > 0.0, log_ndtr(-np.sqrt(values)), 0.0)
     return chi2_log_tail(values, freedom)
 
 
@@ -277,12 +276,8 @@ def smallest_detectable(signal: Signal, setting: int, threshold: float) -> float
     """Multiple of one probed setting that would be found with power 0.8."""
     information = max(float(signal.projected[setting, setting]), 1e-12)
     if signal.one_sided:
-        bound = float(norm.isf(np.exp(threshold)))
-        return float((bound + norm.ppf(POWER)) / np.sqrt(information))
-    bound = float(chi2.isf(np.exp(threshold), signal.freedom))
-    target = brentq(
-        lambda nc: ncx2.sf(bound, signal.freedom, nc) - POWER, 1e-3, 4.0 * bound + 100.0
-    )
+        return float((ndtri(POWER) - ndtri(np.exp(threshold))) / np.sqrt(information))
+    target = noncentrality(threshold, signal.freedom, POWER)
     return float(np.sqrt(target / information))
 
 

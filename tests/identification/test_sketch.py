@@ -1,0 +1,63 @@
+"""Sketches keep the gains of a filter: they must rank models as filtering anew does."""
+
+import numpy as np
+import pytest
+
+from fish_env.data import load_dataset
+from fish_env.identification import Problem, fit
+from fish_env.identification.free import Free, objective, objectives_with_gains
+from fish_env.identification.problem import Point
+from fish_env.identification.sketch import Sketcher
+from tests.diagnosis.small_cases import small_case
+
+LAG = "effects.servo_lag.time_constant"
+
+
+@pytest.fixture(scope="module")
+def baseline(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("late") / "data"
+    small_case(folder, {"servo_lag": 1.0}, runs=2)
+    return fit(Problem(load_dataset(folder)), rounds=2)
+
+
+def vectors(free, baseline):
+    """Some lags, and a heavier fish, around the baseline."""
+    points = [Point(baseline.point.z, {LAG: lag}) for lag in (0.0, 0.02, 0.04, 0.06, 0.09)]
+    heavier = baseline.point.z.copy()
+    heavier[baseline.problem.baseline.paths.index("mass.total")] += 1.0
+    return [free.pack(point) for point in (*points, Point(heavier, {LAG: 0.06}))]
+
+
+def test_objectives_with_gains_differ_as_filtered_ones_do(baseline):
+    problem, free = baseline.problem, Free(baseline.problem, ["servo_lag"], ())
+    tried = vectors(free, baseline)
+    kept = objectives_with_gains(problem, free, tried, baseline.noise, baseline.filtered)
+    anew = [objective(problem, free, vector, baseline.noise)[0] for vector in tried]
+    assert np.ptp(anew) > 200.0
+    np.testing.assert_allclose(np.diff(kept), np.diff(anew), atol=0.03 * np.ptp(anew))
+    np.testing.assert_array_equal(np.argsort(kept), np.argsort(anew))
+
+
+def test_impossible_and_diverging_models_do_not_lead(baseline):
+    problem, free = baseline.problem, Free(baseline.problem, ["servo_lag"], ())
+    vector = free.pack(Point(baseline.point.z, {LAG: 0.05}))
+    impossible = vector.copy()
+    impossible[problem.baseline.paths.index("mass.total")] = -1e4
+    diverging = vector.copy()
+    diverging[-1] = 1e-5  # a lag that no step follows
+    found = objectives_with_gains(
+        problem, free, [vector, impossible, diverging], baseline.noise, baseline.filtered
+    )
+    assert np.isinf(found[1])
+    assert found[2] > 1e6 * found[0] > 0.0
+
+
+def test_a_sketch_comes_near_what_a_fit_finds(baseline):
+    sketcher = Sketcher(baseline)
+    begin = [Point(baseline.point.z, {LAG: lag}) for lag in (0.01, 0.2)]
+    sketch = sketcher.sketch(["servo_lag"], (), begin)
+    found = fit(baseline.problem, ["servo_lag"], sketch.point, baseline.noise, refit_noise=False)
+    assert sketch.objective < sketcher.base - 100.0
+    i = found.names.index(LAG)
+    error = sketch.point.effects[LAG] - found.estimates[i]
+    assert abs(error) < 2.0 * np.sqrt(found.covariance[i, i])

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 FloatArray = npt.NDArray[np.float64]
 BASELINE, EXTENDED = VERMILION, BLUE
 Plain = Mapping[str, Any]
-MAPS = 4
-"""Maps of regimes beside each other."""
+MAPS, PITCH = 4, 1.15
+"""Maps of regimes beside each other, and from one to the next in widths of a map."""
 WIDE = 30.0
 """Largest ratio of bars on a linear axis."""
 LOOKS: dict[str, dict[str, Any]] = {
@@ -145,17 +145,17 @@ def draw_regimes(found: Localisation, album: Album) -> Path:
     top = float(np.sqrt(np.max(energies, initial=1.0, where=np.isfinite(energies))))
     norm = LogNorm(0.7, max(top, 1.5))
     with _page(9.4, (0.9 + 0.2 * len(found.channels)) * len(lines) + 0.8) as figure:
-        # One axes for a line of maps: each of its own would take three times as long to lay out.
+        # One axes for a line of maps: many axes take long to lay out.
         axes = figure.subplots(len(lines), 1, squeeze=False).ravel()
         for ax, line in zip(axes, lines, strict=True):
             ticks: dict[float, str] = {}
             for i, regime in enumerate(line):
-                image, edges = _draw_map(ax, found, regime.name, norm, 1.15 * i)
+                image, edges = _draw_map(ax, found, regime.name, norm, PITCH * i)
                 words = (f"{regime.factor * edge:.3g}" for edge in regime.edges)
                 ticks.update(zip(edges.tolist(), words, strict=True))
                 title = f"{regime.name.replace('_', ' ')} ({regime.unit})"
                 ax.text(edges[0], -0.2, title, fontsize=8.5)
-            ax.set_xlim(-0.01, 1.15 * MAPS - 0.14)
+            ax.set_xlim(-0.01, PITCH * (MAPS - 1) + 1.01)
             ax.set_ylim(len(found.channels), 0)
             ax.set_xticks(list(ticks), list(ticks.values()), fontsize=7, rotation=45)
             ax.set_yticks(np.arange(len(found.channels)) + 0.5, found.channels, fontsize=8)

@@ -11,6 +11,7 @@ class Effort:
 
     Attributes:
         runs: most runs that are fitted.
+        seconds: longest stretch of each, from its beginning.
         shortlist: effects tried at each step.
         finalists: of these, fitted in full.
         retries: whether what was found is questioned: other starts from where the winner is,
@@ -19,6 +20,7 @@ class Effort:
     """
 
     runs: int
+    seconds: float
     shortlist: int
     finalists: int
     retries: bool
@@ -26,14 +28,15 @@ class Effort:
 
 
 PICTURES = "figures as PNG"
-FULL = Effort(runs=10_000, shortlist=6, finalists=4, retries=True)
+FULL = Effort(runs=10_000, seconds=float("inf"), shortlist=6, finalists=4, retries=True)
 QUICK = Effort(
     runs=2,
+    seconds=20.0,
     shortlist=3,
     finalists=1,
     retries=False,
     left_out=(
-        "all but two of the runs for fitting",
+        "all but the first 20 s of two of the runs for fitting",
         "fits of rival causes, so nothing comes out as ambiguous",
         "second looks: from the winner, at tails out of step, for weaker causes",
         PICTURES,

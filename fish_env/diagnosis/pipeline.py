@@ -188,7 +188,7 @@ def _diagnose_runs(
     agreed = check_consistency(dataset, np.random.default_rng([seed, 2]), floors)
     fitted, final = fitted_and_final(dataset, seed)
     progress("refitting the baseline")
-    problem = Problem(dataset, fish, fitted).subset(effort.runs)
+    problem = Problem(dataset, fish, fitted).subset(effort.runs).until(effort.seconds)
     baseline = _refitted(problem)
     problem = baseline.problem  # with the tail phases settled
     causes = causes_of(problem)

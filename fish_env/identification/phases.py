@@ -84,10 +84,4 @@ def _beginning(run: RunData) -> RunData:
     """The beginning of a run, up to some seconds after its tail starts to beat."""
     beats = run.command_values[:, AMPLITUDE] * run.command_values[:, FREQUENCY] > 0
     first = max(0.0, float(run.command_times[np.argmax(beats)])) if beats.any() else 0.0
-    count = max(2, int(np.searchsorted(run.clock, first + WINDOW_S, side="right")))
-    return replace(
-        run,
-        clock=run.clock[:count],
-        substeps=run.substeps[:count],
-        measured=np.ascontiguousarray(run.measured[:count]),
-    )
+    return run.until(first + WINDOW_S)

@@ -160,6 +160,10 @@ class Problem:
             return self
         return self.with_runs([self.runs[i] for i in self.spread(count)])
 
+    def until(self, end_s: float) -> Problem:
+        """The same problem on the beginnings of its runs."""
+        return self.with_runs([run.until(end_s) for run in self.runs])
+
     def spread(self, count: int) -> list[int]:
         """Which runs stand for all: at most ``count`` of them, spread over the list."""
         last = len(self.runs) - 1

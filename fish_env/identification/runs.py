@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -98,6 +98,16 @@ class RunData:
         """Switch times (m,) and commands (m, 5) of the run itself."""
         first = int(self.command_times[0] <= -0.5 * BEFORE_S)
         return self.command_times[first:], self.command_values[first:]
+
+    def until(self, end_s: float) -> RunData:
+        """The beginning of the run, at least two samples of it."""
+        count = max(2, int(np.searchsorted(self.clock, end_s, side="right")))
+        return replace(
+            self,
+            clock=self.clock[:count],
+            substeps=self.substeps[:count],
+            measured=np.ascontiguousarray(self.measured[:count]),
+        )
 
     @property
     def duration(self) -> float:

@@ -12,6 +12,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from fish_env.diagnosis.answer import words
+from fish_env.diagnosis.generic_forces import wrench_unit
 from fish_env.diagnosis.pipeline import diagnose
 
 
@@ -70,7 +71,9 @@ def print_answer(console: Console, answer: dict[str, Any]) -> None:
     if answer["causes"]:
         console.print(_causes(answer))
     console.print(_misfit(answer))
-    if answer["unexplained"]:
+    if answer.get("residual_model"):
+        console.print(_residual_model(answer["residual_model"]))
+    elif answer["unexplained"]:
         console.print(_unexplained(answer))
     experiment = answer["next_experiment"]
     if experiment["separates"]:
@@ -111,9 +114,20 @@ def _misfit(answer: dict[str, Any]) -> Table:
     return table
 
 
+def _residual_model(model: dict[str, Any]) -> Table:
+    title = "What is left, described by simple functions at their root mean square"
+    table = _table(title, "direction", "depends on", "coefficient", "95 % interval", "unit")
+    for term in model["terms"]:
+        low, high = term["ci95"]
+        interval = f"{low:.3g} to {high:.3g}"
+        size = f"{term['coefficient']:.3g}"
+        table.add_row(term["direction"], term["depends_on"], size, interval, term["unit"])
+    return table
+
+
 def _unexplained(answer: dict[str, Any]) -> Table:
     table = _table("Asked for beyond every known cause", "direction", "depends on", "rms")
     for item in answer["unexplained"][:5]:
-        unit = "N" if item["direction"] in ("surge", "sway", "heave") else "N m"
-        table.add_row(item["direction"], item["depends_on"], f"{item['rms']:.2g} {unit}")
+        size = f"{item['rms']:.2g} {wrench_unit(item['direction'])}"
+        table.add_row(item["direction"], item["depends_on"], size)
     return table

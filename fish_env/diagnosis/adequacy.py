@@ -7,24 +7,23 @@ them after everything that is free has been refitted, something remains that the
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from fish_env.diagnosis.causes import Cause
+from fish_env.diagnosis.generic_forces import (
+    DIRECTIONS,
+    GenericForces,
+    generic_forces,
+    generic_signals,
+    probes,
+)
 from fish_env.diagnosis.screening import Projector, Signal, null_threshold
 from fish_env.effects.extended import PREFIX
 from fish_env.identification.estimator import Fit
-from fish_env.identification.filtering import Filtered, Pushes
 from fish_env.identification.noise import disturbance_range
-from fish_env.identification.runs import RunData
 from fish_env.model.effect import EffectParameter
-from fish_env.sensing.channels import channels_from_states
 
-FloatArray = npt.NDArray[np.float64]
-DIRECTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 FAR_OFF = 10.0
 ASTONISHING = 4.9
 """Prior standard deviations that one coefficient in a million passes."""
@@ -135,14 +134,15 @@ def adequacy(fit: Fit, rng: np.random.Generator, tolerated: float = 0.0) -> Adeq
         rng: for the null distribution.
         tolerated: evidence (in -2 log likelihood) that an error of the simulation may make up.
     """
-    names, signals = generic_forces(fit)
+    forces, signals = _asked(fit)
     threshold = null_threshold([s for _, s in signals], rng, LEVEL)
-    unit = np.repeat([1e-3, 1e-5], 3)
     found = []
     for column, signal in signals:
         function, direction = divmod(column, 6)
-        amount = float(abs(signal.score[0] / signal.projected[0, 0])) * unit[direction]
-        found.append(Misfit(names[function], DIRECTIONS[direction], signal.log_p, amount))
+        unit = probes(np.array([column]))[0]
+        amount = float(abs(signal.score[0] / signal.projected[0, 0]) * unit)
+        name = forces.names[function]
+        found.append(Misfit(name, DIRECTIONS[direction], signal.log_p, amount))
     found.sort(key=lambda m: m.log_p)
     strongest = max((signal.statistic for _, signal in signals), default=0.0)
     reached = not found or found[0].log_p >= threshold or strongest < tolerated
@@ -152,73 +152,11 @@ def adequacy(fit: Fit, rng: np.random.Generator, tolerated: float = 0.0) -> Adeq
 
 def strongest_alarm(fit: Fit, rng: np.random.Generator) -> tuple[float, float]:
     """The smallest log p-value, and the threshold it has in white residuals: to calibrate by."""
-    signals = [signal for _, signal in generic_forces(fit)[1]]
+    signals = [signal for _, signal in _asked(fit)[1]]
     return min(s.log_p for s in signals), null_threshold(signals, rng, LEVEL)
 
 
-def generic_forces(fit: Fit) -> tuple[list[str], list[tuple[int, Signal]]]:
-    """Names of the functions, and a signal for each (6 * function + direction)."""
-    tables = [
-        regressors(run, filtered)
-        for run, filtered in zip(fit.problem.runs, fit.filtered, strict=True)
-    ]
-    names = list(tables[0])
-    bases = [np.column_stack([table[name] for name in names]) for table in tables]
-    stacked = np.concatenate(bases)
-    spread = np.sqrt(np.mean(stacked**2, axis=0))
-    kept = [i for i in range(len(names)) if spread[i] > 1e-9]
-    bases = [np.ascontiguousarray(basis[:, kept] / spread[kept]) for basis in bases]
-    return [names[i] for i in kept], _signals(fit, bases, len(kept))
-
-
-def _signals(fit: Fit, bases: list[FloatArray], functions: int) -> list[tuple[int, Signal]]:
-    problem, projector = fit.problem, Projector(fit)
-    columns = np.arange(6 * functions)
-    unit = np.tile(np.repeat([1e-3, 1e-5], 3), functions)
-    residuals = fit.linearised.residuals
-    nothing = Cause("generic")
-    result = []
-    chunk = 96
-    for first in range(0, len(columns), chunk):
-        part = columns[first : first + chunk]
-        z = np.repeat(fit.point.z[:, None], len(part), axis=1)
-        effects = {path: np.full(len(part), value) for path, value in fit.point.effects.items()}
-        pushes = Pushes(bases, part, unit[part])
-        out = problem.innovations(z, effects, fit.noise, fit.filtered, pushes)
-        for i, column in enumerate(part):
-            signal = projector.signal(nothing, 0, (out[i] - residuals)[:, None], strain=False)
-            if signal is not None:
-                result.append((int(column), signal))
-    return result
-
-
-def regressors(run: RunData, filtered: Filtered) -> dict[str, FloatArray]:
-    """Functions of the filtered motion that a missing force may depend on, each (T,)."""
-    c = channels_from_states(filtered.states.T[:18])
-    row = np.searchsorted(run.command_times, run.clock, side="right") - 1
-    command = run.command_values[np.maximum(row, 0)]
-    offset, amplitude, frequency, stroke, bracket = command.T
-    phase = filtered.states[:, 13]
-    beat = amplitude * frequency
-    u, v, w, p, q, r = (c[name] for name in ("u", "v", "w", "p", "q", "r"))
-    plain: dict[str, FloatArray] = {"constant": np.ones_like(u), "time": run.clock / 30.0}
-    plain |= {"u": u, "v": v, "w": w, "p": p, "q": q, "r": r}
-    plain |= {f"{n}|{n}|": x * np.abs(x) for n, x in zip("uvwpqr", (u, v, w, p, q, r), strict=True)}
-    plain |= {"u v": u * v, "u w": u * w, "u q": u * q, "u r": u * r, "v r": v * r, "w q": w * q}
-    plain |= {"p r": p * r, "u^3": u**3, "v^3": v**3}
-    plain |= {"sin pitch": np.sin(c["pitch"]), "sin roll": np.sin(c["roll"])}
-    plain |= {"cos yaw": np.cos(c["yaw"]), "sin yaw": np.sin(c["yaw"])}
-    depth = c["z"] - np.mean(c["z"])
-    plain |= {"depth": depth, "depth^2": depth**2, "depth^3": depth**3}
-    plain |= {"north": c["x"] - c["x"].mean(), "east": c["y"] - c["y"].mean()}
-    plain |= {"beat speed^2": beat**2, "offset beat^2": offset * beat**2, "u beat": u * beat}
-    plain |= {"frequency": frequency - frequency.mean(), "amplitude": amplitude - amplitude.mean()}
-    plain |= {"block": stroke, "bracket": bracket, "offset": offset}
-    waves: tuple[tuple[str, Callable[[FloatArray], FloatArray]], ...] = (
-        ("sin", np.sin),
-        ("cos", np.cos),
-    )
-    for harmonic in (1, 2, 3):
-        for name, function in waves:
-            plain[f"{name} {harmonic} phase"] = beat**2 * function(harmonic * phase)
-    return plain
+def _asked(fit: Fit) -> tuple[GenericForces, list[tuple[int, Signal]]]:
+    """Forces along the fitted runs, and what the data say of each."""
+    forces = generic_forces(fit.problem.runs, fit.filtered)
+    return forces, list(generic_signals(fit, forces, Projector(fit)))

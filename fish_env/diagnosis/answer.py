@@ -16,11 +16,14 @@ from fish_env.diagnosis.entries import (
     Plain,
     cause_entry,
     coefficient_entries,
+    disturbance_entry,
     experiment_entry,
     gain_entry,
     misfit_entry,
     precondition_entry,
+    residual_entry,
 )
+from fish_env.diagnosis.generic_forces import wrench_unit
 from fish_env.diagnosis.regimes import as_plain
 from fish_env.diagnosis.screening import smallest_detectable
 from fish_env.diagnosis.suitability import doubts
@@ -62,6 +65,7 @@ def as_dict(diagnosis: Diagnosis) -> Plain:
         "ranking": [_rank(ranked) for ranked in diagnosis.attribution.ranking],
         "localisation": as_plain(diagnosis.localisation),
         "unexplained": [] if diagnosis.adequacy.reached else _unexplained(diagnosis),
+        "residual_model": residual_entry(diagnosis.residual),
         "next_experiment": experiment_entry(diagnosis.next_experiment),
         "strained": list(diagnosis.adequacy.strained),
         "notes": list(diagnosis.dataset.notes),
@@ -84,12 +88,7 @@ def _noise(fit: Fit) -> Plain:
     sensors = zip(fit.problem.channels, fit.noise.sensor_sd.tolist(), strict=True)
     return {
         "sensor_sd": dict(sensors),
-        "disturbance": {
-            "force_sd": fit.noise.force_sd,
-            "moment_sd": fit.noise.moment_sd,
-            "correlation_s": fit.noise.correlation_s,
-            "phase_sd": fit.noise.phase_sd,
-        },
+        "disturbance": disturbance_entry(fit.noise),
     }
 
 
@@ -175,8 +174,12 @@ def _blind(answer: Plain) -> str:
 def _asked(answer: Plain) -> str:
     if not answer["unexplained"]:
         return ""
-    first = answer["unexplained"][0]
+    model = answer.get("residual_model")
+    first = model["terms"][0] if model else answer["unexplained"][0]
+    gain = model and model["gain"]
+    elsewhere = gain and gain["log_likelihood"]["ci95"][0] > 0.0
+    kind = "force" if wrench_unit(first["direction"]) == "N" else "moment"
     return (
-        f"What is left looks most like a force or moment in {first['direction']} that depends on "
-        f"{first['depends_on']}."
+        f"What is left looks most like a {kind} in {first['direction']} that depends on "
+        f"{first['depends_on']}{', on runs kept for judging too' if elsewhere else ''}."
     )

@@ -15,7 +15,8 @@ class Effort:
         shortlist: effects tried at each step.
         finalists: of these, fitted in full.
         retries: whether what was found is questioned: other starts from where the winner is,
-            tails out of step with their beat, weaker causes where something is missing.
+            tails out of step with their beat, weaker causes where something is missing; and what
+            no cause explains described.
         left_out: in words, what a full diagnosis does beyond this one.
     """
 
@@ -39,6 +40,7 @@ QUICK = Effort(
         "all but the first 20 s of two of the runs for fitting",
         "fits of rival causes, so nothing comes out as ambiguous",
         "second looks: from the winner, at tails out of step, for weaker causes",
+        "a model of what no cause explains",
         PICTURES,
     ),
 )

@@ -9,12 +9,16 @@ from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
+from scipy.special import ndtri
 
 from fish_env.diagnosis.causes import PARAMETER
 from fish_env.diagnosis.gain import Gain, Pair
+from fish_env.diagnosis.generic_forces import wrench_unit
 from fish_env.diagnosis.next_experiment import Proposal
 from fish_env.diagnosis.preconditions import Precondition
+from fish_env.diagnosis.residual_model import ResidualModel, Term
 from fish_env.effects.extended import PREFIX
+from fish_env.identification.filtering import NoiseModel
 from fish_env.identification.parameters import Baseline
 from fish_env.model.effect import Effect
 from fish_env.params.schema import FishParams
@@ -121,6 +125,46 @@ def gain_entry(gain: Gain | None, units: Mapping[str, str] | None = None) -> Pla
         "rmse": {name: {**asdict(pair), **named.get(name, {})} for name, pair in gain.rmse.items()},
         "misfit": misfit_entry(gain.misfit),
         "share_of_reachable": share,
+    }
+
+
+def residual_entry(model: ResidualModel | None) -> Plain | None:
+    """An empirical model of what is left: wrench = coefficient * function / function_rms."""
+    if model is None:
+        return None
+    judged = model.judged
+    gain = judged and {
+        "final_runs": list(judged.runs),
+        "log_likelihood": {"estimate": judged.gain, "ci95": list(judged.gain_ci95)},
+    }
+    without, beside = (disturbance_entry(noise) for noise in model.noise)
+    return {
+        "terms": [_term(term) for term in model.terms],
+        "beside": list(model.beside),
+        "disturbance": {"without": without, "with": beside},
+        "gain": gain,
+    }
+
+
+def _term(term: Term) -> Plain:
+    half = float(ndtri(0.975)) * term.error
+    return {
+        "direction": term.direction,
+        "depends_on": term.function,
+        "coefficient": term.coefficient,
+        "ci95": [term.coefficient - half, term.coefficient + half],
+        "unit": wrench_unit(term.direction),
+        "function_rms": term.scale,
+    }
+
+
+def disturbance_entry(noise: NoiseModel) -> Plain:
+    """The random push that a fit needs."""
+    return {
+        "force_sd": noise.force_sd,
+        "moment_sd": noise.moment_sd,
+        "correlation_s": noise.correlation_s,
+        "phase_sd": noise.phase_sd,
     }
 
 

@@ -8,7 +8,7 @@ found; the floor is 1, what its own sensor noise and disturbance leave.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -75,7 +75,10 @@ def measure_gain(problem: Problem, baseline: Fit, extended: Fit, rng: np.random.
         name: Pair(*(_rms([e[:, i] for e in errors]) for errors, _ in own))
         for i, name in enumerate(problem.channels)
     }
-    before, after = (_energies(problem.runs, filtered) for filtered in judged)
+    before, after = (
+        by_window(problem.runs, [f.innovations**2 for f in filtered], np.nanmean)
+        for filtered in judged
+    )
     share, interval = reachable_share(before, after, rng)
     ids = tuple(run.id for run in problem.runs)
     return Gain(ids, fit_percent, rmse, misfit_of(problem, judged), share, interval)
@@ -137,14 +140,22 @@ def _rms(parts: Sequence[FloatArray]) -> float:
     return float(np.sqrt(np.nanmean(np.concatenate(parts) ** 2)))
 
 
-def _energies(runs: Sequence[RunData], filtered: Sequence[Filtered]) -> list[FloatArray]:
-    """Mean squared whitened error of each window of each run."""
+def by_window(
+    runs: Sequence[RunData], values: Sequence[FloatArray], combine: Callable[[FloatArray], float]
+) -> list[FloatArray]:
+    """One number for each window of each run.
+
+    Args:
+        runs: the runs.
+        values: (T, C) of each.
+        combine: of the values in a window, NaN where nothing was measured.
+    """
     result = []
-    for run, f in zip(runs, filtered, strict=True):
-        squares = np.where(np.isfinite(run.measured), f.innovations**2, np.nan)
+    for run, own in zip(runs, values, strict=True):
+        present = np.where(np.isfinite(run.measured), own, np.nan)
         row = np.floor(run.clock / WINDOW_S).astype(np.int64)
-        parts = [squares[row == k] for k in np.unique(row)]
-        result.append(np.array([np.nanmean(p) for p in parts if np.isfinite(p).any()]))
+        parts = [present[row == k] for k in np.unique(row)]
+        result.append(np.array([combine(p) for p in parts if np.isfinite(p).any()]))
     return result
 
 

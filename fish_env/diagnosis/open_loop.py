@@ -69,6 +69,7 @@ def _cut(run: RunData, state: FloatArray, first: int, last: int) -> RunData:
         command_times=np.ascontiguousarray(run.command_times[max(held, 0) :]),
         command_values=np.ascontiguousarray(run.command_values[max(held, 0) :]),
         measured=np.ascontiguousarray(run.measured[first:last]),
+        wrench=None if run.wrench is None else np.ascontiguousarray(run.wrench[first:last]),
         state0=np.ascontiguousarray(state),
         swimming=run.swimming or first > 0,
         as_measured=False,

@@ -12,7 +12,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from fish_env.data import Dataset, load_dataset, split_runs
-from fish_env.diagnosis.adequacy import Adequacy, adequacy, strains
+from fish_env.diagnosis.adequacy import Adequacy, adequacy, implausible, strains
 from fish_env.diagnosis.answer import as_dict
 from fish_env.diagnosis.attribution import Attribution, attribute, extended
 from fish_env.diagnosis.beats import with_measured_beats
@@ -26,6 +26,7 @@ from fish_env.diagnosis.noise_floor import Floor, noise_floors
 from fish_env.diagnosis.preconditions import Precondition, preconditions
 from fish_env.diagnosis.regimes import Localisation, localise_fits
 from fish_env.diagnosis.report import ReportSeries, series_from, write_report
+from fish_env.diagnosis.residual_model import ResidualModel, residual_model
 from fish_env.diagnosis.steady.pipeline import diagnose_steady
 from fish_env.diagnosis.suitability import check_runs, divergence
 from fish_env.diagnosis.verdict import Verdict, decide
@@ -58,6 +59,7 @@ class Diagnosis:
         localisation: where in the regime the baseline's misfit sits.
         misfit: whitened one-step errors by channel, baseline and accepted.
         gain: on the final runs; None without an extension, or without final runs.
+        residual: what no known cause explains, as a sum of simple wrenches, if it can be so told.
         next_experiment: manoeuvre that separates what is still open; None where nothing is.
         seed: seed of splits and null distributions.
         quick: whether this is a first look.
@@ -76,6 +78,7 @@ class Diagnosis:
     localisation: Localisation
     misfit: dict[str, Pair]
     gain: Gain | None
+    residual: ResidualModel | None
     next_experiment: Proposal | None
     seed: int
     quick: bool
@@ -206,6 +209,13 @@ def _diagnose_runs(
     if verdict.name in EXTENDING and final:
         progress("measuring the gain on final runs")
         gain = measure_gain(Problem(dataset, fish, final), baseline, accepted, rng)
+    residual = None
+    if verdict.name == "outside_library" and effort.retries:
+        progress("describing what is left")
+        # Numbers that nobody believes would bend what is left.
+        basis = baseline if implausible(accepted) else accepted
+        elsewhere = Problem(dataset, fish, final) if final else None
+        residual = residual_model(basis, left.threshold, elsewhere)
     progress("locating the misfit")
     judged = one_step(problem, baseline, accepted)
     place = localise_fits(problem, judged, np.random.default_rng([seed, 3]))
@@ -214,7 +224,7 @@ def _diagnose_runs(
     misfit = misfit_of(problem, judged)
     return Diagnosis(
         dataset, final, floors, agreed, problem, attribution, left, shown, verdict, place, misfit,
-        gain, proposal, seed, quick, time.perf_counter() - begin,
+        gain, residual, proposal, seed, quick, time.perf_counter() - begin,
     )  # fmt: skip
 
 

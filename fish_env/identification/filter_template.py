@@ -73,11 +73,20 @@ def slopes_of_interval(
             f[j, k] = gap[j, k + 1] * (1.0 / PERTURB)
 
 
+@kernel
+def carry(work, width, known, sample, sign, count):
+    """Add a known wrench (T, 6) to the disturbance of the first lanes; no rows for none."""
+    if known.shape[0] > 0:
+        for j in range(6):
+            for k in range(count):
+                work[(WRENCH + j) * width + k] += sign * known[sample, j]
+
+
 @entry_point
 def ekf_run(
     state0, swimming, par, pace_one, delay_one, gain, bias, clock, substeps, times, values,
     measured, codes, noise_variance, covariance0, wrench_variance, wrench_decay_s, wander,
-    history_rows, tables, k_out, w_out, e_out, x_out, d_out, f_out, h_out, raw_out,
+    history_rows, known, tables, k_out, w_out, e_out, x_out, d_out, f_out, h_out, raw_out,
 ):  # fmt: skip
     """Extended Kalman filter over one run, relinearised at every sample.
 
@@ -101,6 +110,7 @@ def ekf_run(
         wrench_decay_s: its correlation time (s).
         wander: variance that the tail phase gains in a second (rad^2/s).
         history_rows: room for late tail commands, 0 for none.
+        known: (T, 6) known force and moment from each sample to the next, or no rows.
         tables: packed coefficient curves.
         k_out: (T, 19, C) gains.
         w_out: (T, C, C) whitening.
@@ -145,10 +155,12 @@ def ekf_run(
         if sample > 0:
             begin = clock[sample - 1]
             span = clock[sample] - begin
+            carry(work, width, known, sample - 1, 1.0, 1)
             slopes_of_interval(
                 work, width, substeps[sample], span / substeps[sample], begin, times, values, at,
                 pace, delay, late, history, tables, error, gap, f,
             )  # fmt: skip
+            carry(work, width, known, sample - 1, -1.0, 1)
             keep = math.exp(-span / wrench_decay_s)
             for j in range(6):
                 work[(WRENCH + j) * width] *= keep
@@ -218,8 +230,8 @@ def take_sample(work, width, measured, codes, gain, bias, k_in, w_in, e, error, 
 @kernel
 def filter_block(
     states0, swimming, par, pace_all, delay_all, gain_all, bias_all, clock, substeps, times, values,
-    measured, codes, k_in, w_in, wrench_decay_s, history_rows, push_basis, push_column, push_size,
-    tables, out, first, count,
+    measured, codes, k_in, w_in, wrench_decay_s, history_rows, known, push_basis, push_column,
+    push_size, tables, out, first, count,
 ):  # fmt: skip
     """Lanes first..first+count through a run with given gains (see :func:`filter_lanes`)."""
     width = FILTER_LANES
@@ -247,6 +259,7 @@ def filter_block(
         if sample > 0:
             span = clock[sample] - clock[sample - 1]
             h = span / substeps[sample]
+            carry(work, width, known, sample - 1, 1.0, width)
             if pushed:
                 push(work, width, push_basis, sample - 1, push_column, push_size, 1.0, first, count)
             for i in range(substeps[sample]):
@@ -257,6 +270,7 @@ def filter_block(
                 push(
                     work, width, push_basis, sample - 1, push_column, push_size, -1.0, first, count
                 )
+            carry(work, width, known, sample - 1, -1.0, width)
             keep = math.exp(-span / wrench_decay_s)
             for n in range(WRENCH * width, (WRENCH + 6) * width):
                 work[n] *= keep
@@ -272,8 +286,8 @@ def filter_block(
 @entry_point
 def filter_lanes(
     states0, swimming, par, pace, delay, gain, bias, clock, substeps, times, values, measured,
-    codes, k_in, w_in, wrench_decay_s, history_rows, push_basis, push_column, push_size, tables,
-    out, first, last,
+    codes, k_in, w_in, wrench_decay_s, history_rows, known, push_basis, push_column, push_size,
+    tables, out, first, last,
 ):  # fmt: skip
     """Whitened innovations of many parameter sets on one run, with the gains of one of them.
 
@@ -295,6 +309,7 @@ def filter_lanes(
         w_in: (T, C, C) whitening.
         wrench_decay_s: correlation time of the wrench.
         history_rows: room for late tail commands, 0 for none.
+        known: (T, 6) known force and moment from each sample to the next, or no rows.
         push_basis: (T, J) functions of time that scale an extra wrench, or no rows.
         push_column: (N,) 6 * function + direction for each lane.
         push_size: (N,) N or N m; zero for none.
@@ -306,7 +321,7 @@ def filter_lanes(
     for block in range(first, last, FILTER_LANES):
         filter_block(
             states0, swimming, par, pace, delay, gain, bias, clock, substeps, times, values,
-            measured, codes, k_in, w_in, wrench_decay_s, history_rows, push_basis, push_column,
-            push_size, tables, out, block, min(FILTER_LANES, last - block),
+            measured, codes, k_in, w_in, wrench_decay_s, history_rows, known, push_basis,
+            push_column, push_size, tables, out, block, min(FILTER_LANES, last - block),
         )  # fmt: skip
     return 0

@@ -190,8 +190,8 @@ class RunFilter:
                 steps_of(data, corners), data.command_times, data.command_values,
                 data.measured, self.codes, noise.sensor_sd**2,
                 data.covariance0, noise.wrench_variance, noise.correlation_s, noise.phase_sd**2,
-                self._history_rows(record, data), self.model.tables, k, w, e, x, d,
-                slopes.motion, slopes.channels, slopes.raw,
+                self._history_rows(record, data), data.known_wrench, self.model.tables,
+                k, w, e, x, d, slopes.motion, slopes.channels, slopes.raw,
             )  # fmt: skip
             return Filtered(k, w, e, x, d, float(value), slopes if keep_slopes else None, corners)
 
@@ -258,8 +258,8 @@ class RunFilter:
                 measurement.gain, measurement.bias, data.clock,
                 steps_of(data, gains.corners), data.command_times, data.command_values,
                 data.measured, self.codes, gains.gains, gains.whitening,
-                noise.correlation_s, self._history_rows(records, data), basis, column, size,
-                self.model.tables, out, first, last,
+                noise.correlation_s, self._history_rows(records, data), data.known_wrench, basis,
+                column, size, self.model.tables, out, first, last,
             )  # fmt: skip
 
         list(_threads().map(one, jobs))

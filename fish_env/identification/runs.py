@@ -70,6 +70,8 @@ class RunData:
         swimming: whether the tail was beating before the run began.
         as_measured: whether position and heading of the initial state are as the samples show them,
             with whatever distorts those; otherwise they are true.
+        wrench: (T, 6) known force (N) and moment (N m) on the hull, body frame, from each sample to
+            the next; None for none.
     """
 
     id: str
@@ -84,6 +86,12 @@ class RunData:
     phase_known: bool
     swimming: bool = False
     as_measured: bool = True
+    wrench: FloatArray | None = None
+
+    @property
+    def known_wrench(self) -> FloatArray:
+        """(T, 6) known wrench, or no rows."""
+        return self.wrench if self.wrench is not None else np.zeros((0, 6))
 
     @property
     def corner_substeps(self) -> npt.NDArray[np.int64]:
@@ -107,6 +115,7 @@ class RunData:
             clock=self.clock[:count],
             substeps=self.substeps[:count],
             measured=np.ascontiguousarray(self.measured[:count]),
+            wrench=None if self.wrench is None else np.ascontiguousarray(self.wrench[:count]),
         )
 
     @property

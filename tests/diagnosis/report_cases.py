@@ -25,6 +25,17 @@ RIVAL = {
     "parameters": {"time_constant": {"estimate": 0.1, "ci95": [0.08, 0.12], "unit": "s"}},
 }
 
+_PUSH = {"force_sd": 0.004, "moment_sd": 1e-4, "correlation_s": 0.5, "phase_sd": 0.0}
+RESIDUAL = {
+    "terms": [{
+        "direction": "heave", "depends_on": "w|w|", "coefficient": -0.012, "ci95": [-0.013, -0.011],
+        "unit": "N", "function_rms": 0.02,
+    }],
+    "beside": ["current"],
+    "disturbance": {"without": {**_PUSH, "force_sd": 0.007}, "with": _PUSH},
+    "gain": {"final_runs": ["r01"], "log_likelihood": {"estimate": 40.0, "ci95": [20.0, 60.0]}},
+}  # fmt: skip
+
 
 def answer(verdict: str = "cause", **changes: Any) -> dict[str, Any]:
     """Content of a diagnosis.json with every part in it."""
@@ -67,6 +78,7 @@ def answer(verdict: str = "cause", **changes: Any) -> dict[str, Any]:
         "unexplained": [
             {"depends_on": "depth", "direction": "surge", "rms": 0.01, "log_p": -30.0}
         ] if verdict == "outside_library" else [],
+        "residual_model": RESIDUAL if verdict == "outside_library" else None,
         "next_experiment": {
             "manoeuvre": MENU[0].name, "schedule": [dict(row) for row in MENU[0].schedule],
             "separates": ["wake_memory"], "separation": 30.0,

@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fish_env.diagnosis.adequacy import adequacy, implausible, regressors
+from fish_env.diagnosis.adequacy import adequacy, implausible
+from fish_env.diagnosis.generic_forces import regressors
 from fish_env.effects import catalogue
 from fish_env.identification.filtering import NoiseModel
 from fish_env.identification.free import Linearised

@@ -21,6 +21,7 @@ from fish_env.diagnosis.report.html import (
     table,
     text,
 )
+from fish_env.diagnosis.report.remainder import asked_for, residual_model
 from fish_env.diagnosis.report.series import SETTLED_S, ReportSeries, RunSeries, SteadySeries
 from fish_env.diagnosis.report.units import shown_unit
 from fish_env.plotting.comparison import COMMAND_UNITS
@@ -234,7 +235,7 @@ def where(answer: Answer, series: Series, album: Album) -> str:
             by_regime.setdefault(regime.replace("_", " "), []).append(label)
         rows = [(text(regime), text(", ".join(bins))) for regime, bins in by_regime.items()]
         parts.append(table(("never visited", "bins"), rows))
-    parts += [_farthest(answer), _asked_for(answer)]
+    parts += [_farthest(answer), asked_for(answer), residual_model(answer)]
     return section("Where the misfit sits", *parts, key="where")
 
 
@@ -247,16 +248,6 @@ def _farthest(answer: Answer) -> str:
     ]
     caption = "Farthest from the best explanation"
     return table(("condition", "observation", "off by (noise sd)"), rows, caption)
-
-
-def _asked_for(answer: Answer) -> str:
-    rows = []
-    for item in answer.get("unexplained", []):
-        unit = "N" if item["direction"] in ("surge", "sway", "heave") else "N m"
-        size = f"{number(item['rms'])} {unit}"
-        rows.append((text(item["direction"]), text(item["depends_on"]), size))
-    caption = "What the data still ask for, over and above the best explanation"
-    return table(("force or moment in", "depends on", "rms"), rows, caption)
 
 
 def ranking(answer: Answer, series: Series, album: Album) -> str:

@@ -15,12 +15,12 @@ from scipy.special import fdtrc
 
 from fish_env.data.vocabulary import COMMANDS
 from fish_env.diagnosis.causes import Cause
+from fish_env.diagnosis.generic_forces import DIRECTIONS
 from fish_env.diagnosis.steady.fitting import SteadyFit, lines
 from fish_env.diagnosis.steady.scatter import response
 from fish_env.diagnosis.steady.screening import Projector, Signal, null_threshold
 
 FloatArray = npt.NDArray[np.float64]
-DIRECTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 LEVEL = 0.005
 """Of each of the two tests."""
 FEWEST_REPEATS = 6

@@ -1,0 +1,138 @@
+"""Forces of no particular origin: simple functions of what the fish does, in six directions.
+
+They ask whether anything is left (:mod:`~fish_env.diagnosis.adequacy`), and what is left is
+described by them (:mod:`~fish_env.diagnosis.residual_model`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fish_env.diagnosis.causes import Cause
+from fish_env.diagnosis.screening import LANES_AT_ONCE, Projector, Signal
+from fish_env.identification.estimator import Fit
+from fish_env.identification.filtering import Filtered, Pushes
+from fish_env.identification.runs import RunData
+from fish_env.sensing.channels import channels_from_states
+
+FloatArray = npt.NDArray[np.float64]
+DIRECTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+NOTHING = Cause("generic")
+
+
+def wrench_unit(direction: str) -> str:
+    """Unit of the force or moment in a direction."""
+    return "N" if DIRECTIONS.index(direction) < 3 else "N m"
+
+
+@dataclass(frozen=True, eq=False)
+class GenericForces:
+    """Functions along some runs, each a force or moment in one of six directions.
+
+    Column 6 * function + direction is one such wrench.
+
+    Attributes:
+        names: of the functions (J).
+        scale: (J,) root mean square of each over the runs that define them, in SI units.
+        bases: per run (T, J), divided by the scale.
+    """
+
+    names: tuple[str, ...]
+    scale: FloatArray
+    bases: list[FloatArray]
+
+    @property
+    def columns(self) -> npt.NDArray[np.int64]:
+        """Every wrench there is (6 J,)."""
+        return np.arange(6 * len(self.names))
+
+    def column(self, function: str, direction: str) -> int:
+        """Where a function in a direction is."""
+        return 6 * self.names.index(function) + DIRECTIONS.index(direction)
+
+    def pushes(self, columns: npt.NDArray[np.int64], sizes: FloatArray) -> Pushes:
+        """One wrench for each lane, of sizes (N,) in N or N m."""
+        return Pushes(self.bases, columns, sizes)
+
+
+def generic_forces(
+    runs: Sequence[RunData], filtered: Sequence[Filtered], like: GenericForces | None = None
+) -> GenericForces:
+    """The functions along runs.
+
+    Args:
+        runs: the runs.
+        filtered: their motion.
+        like: functions and scales to take over; default: every one that is not zero throughout.
+    """
+    tables = [regressors(run, result) for run, result in zip(runs, filtered, strict=True)]
+    names = list(tables[0]) if like is None else list(like.names)
+    bases = [np.column_stack([table[name] for name in names]) for table in tables]
+    if like is not None:
+        return GenericForces(like.names, like.scale, [b / like.scale for b in bases])
+    scale = np.sqrt(np.mean(np.concatenate(bases) ** 2, axis=0))
+    kept = np.flatnonzero(scale > 1e-9)
+    scaled = [np.ascontiguousarray(basis[:, kept] / scale[kept]) for basis in bases]
+    return GenericForces(tuple(names[i] for i in kept), scale[kept], scaled)
+
+
+def probes(columns: npt.NDArray[np.int64]) -> FloatArray:
+    """Sizes small enough for a slope: a millinewton, a hundredth of a millinewton metre."""
+    return np.where(columns % 6 < 3, 1e-3, 1e-5)
+
+
+def changes(fit: Fit, forces: GenericForces, columns: npt.NDArray[np.int64]) -> FloatArray:
+    """How :func:`probes` of some wrenches change the residuals of a fit (D, N)."""
+    z = np.repeat(fit.point.z[:, None], len(columns), axis=1)
+    effects = {path: np.full(len(columns), value) for path, value in fit.point.effects.items()}
+    pushes = forces.pushes(columns, probes(columns))
+    out = fit.problem.innovations(z, effects, fit.noise, fit.filtered, pushes)
+    return np.asarray((out - fit.linearised.residuals).T)
+
+
+def generic_signals(
+    fit: Fit, forces: GenericForces, projector: Projector
+) -> Iterator[tuple[int, Signal]]:
+    """Each wrench by its column, as a cause that a refit follows as far as it can."""
+    for first in range(0, len(forces.columns), LANES_AT_ONCE):
+        part = forces.columns[first : first + LANES_AT_ONCE]
+        for column, change in zip(part, changes(fit, forces, part).T, strict=True):
+            signal = projector.signal(NOTHING, 0, change[:, None], strain=False)
+            if signal is not None:
+                yield int(column), signal
+
+
+def regressors(run: RunData, filtered: Filtered) -> dict[str, FloatArray]:
+    """Functions of the filtered motion that a missing force may depend on, each (T,)."""
+    c = channels_from_states(filtered.states.T[:18])
+    row = np.searchsorted(run.command_times, run.clock, side="right") - 1
+    command = run.command_values[np.maximum(row, 0)]
+    offset, amplitude, frequency, stroke, bracket = command.T
+    phase = filtered.states[:, 13]
+    beat = amplitude * frequency
+    u, v, w, p, q, r = (c[name] for name in ("u", "v", "w", "p", "q", "r"))
+    plain: dict[str, FloatArray] = {"constant": np.ones_like(u), "time": run.clock / 30.0}
+    plain |= {"u": u, "v": v, "w": w, "p": p, "q": q, "r": r}
+    plain |= {f"{n}|{n}|": x * np.abs(x) for n, x in zip("uvwpqr", (u, v, w, p, q, r), strict=True)}
+    plain |= {"u v": u * v, "u w": u * w, "u q": u * q, "u r": u * r, "v r": v * r, "w q": w * q}
+    plain |= {"p r": p * r, "u^3": u**3, "v^3": v**3}
+    plain |= {"sin pitch": np.sin(c["pitch"]), "sin roll": np.sin(c["roll"])}
+    plain |= {"cos yaw": np.cos(c["yaw"]), "sin yaw": np.sin(c["yaw"])}
+    depth = c["z"] - np.mean(c["z"])
+    plain |= {"depth": depth, "depth^2": depth**2, "depth^3": depth**3}
+    plain |= {"north": c["x"] - c["x"].mean(), "east": c["y"] - c["y"].mean()}
+    plain |= {"beat speed^2": beat**2, "offset beat^2": offset * beat**2, "u beat": u * beat}
+    plain |= {"frequency": frequency - frequency.mean(), "amplitude": amplitude - amplitude.mean()}
+    plain |= {"block": stroke, "bracket": bracket, "offset": offset}
+    waves: tuple[tuple[str, Callable[[FloatArray], FloatArray]], ...] = (
+        ("sin", np.sin),
+        ("cos", np.cos),
+    )
+    for harmonic in (1, 2, 3):
+        for name, function in waves:
+            plain[f"{name} {harmonic} phase"] = beat**2 * function(harmonic * phase)
+    return plain

@@ -1,0 +1,285 @@
+"""An empirical model of what no known cause explains, judged on runs that did not choose it.
+
+Wrenches of no particular origin are added, whichever the data ask for most beside those that are
+there, as long as chance does not ask as loudly. Their sizes are estimated together while the
+coefficients follow; then everything else is fitted again with the wrench in place, disturbance
+included, and what is still asked for is added. The result says how large what is missing is and
+what it goes with. It does not say what it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from fish_env.diagnosis.gain import by_window
+from fish_env.diagnosis.generic_forces import (
+    DIRECTIONS,
+    NOTHING,
+    GenericForces,
+    changes,
+    generic_forces,
+    generic_signals,
+    probes,
+)
+from fish_env.diagnosis.screening import Projector
+from fish_env.diagnosis.tails import chi2_log_tail
+from fish_env.identification.estimator import Fit, fit
+from fish_env.identification.filtering import Filtered, NoiseModel
+from fish_env.identification.phases import in_step
+from fish_env.identification.problem import Problem
+from fish_env.identification.runs import RunData
+
+FloatArray = npt.NDArray[np.float64]
+Columns = npt.NDArray[np.int64]
+POOL = 32
+"""Wrenches to choose from: those that the data ask for most, each alone."""
+MOST = 8
+APART = 1e-3
+"""Share of a wrench that those already chosen must leave."""
+RESTING = 0.3
+"""Standard errors by which sizes may still move at the end."""
+
+
+@dataclass(frozen=True)
+class Term:
+    """One wrench: coefficient times function over its scale.
+
+    Attributes:
+        function: what it depends on, see :func:`~fish_env.diagnosis.generic_forces.regressors`.
+        direction: which force or moment of the hull.
+        scale: root mean square of the function over the fitted runs, in SI units (angles in rad,
+            frequencies in Hz).
+        coefficient: N or N m, signed.
+        error: its standard error, widened for coloured residuals.
+    """
+
+    function: str
+    direction: str
+    scale: float
+    coefficient: float
+    error: float
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One-step predictions of runs that did not choose the terms.
+
+    Attributes:
+        runs: their ids.
+        gain: what the log likelihood gains by the terms and by the smaller disturbance they leave.
+        gain_ci95: its interval over windows of three seconds.
+    """
+
+    runs: tuple[str, ...]
+    gain: float
+    gain_ci95: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class ResidualModel:
+    """A sum of wrenches.
+
+    Attributes:
+        terms: in the order in which they were added.
+        beside: effects of the catalogue that are in the model too.
+        noise: noise model without and with them.
+        judged: how they do on other runs; None without any.
+    """
+
+    terms: tuple[Term, ...]
+    beside: tuple[str, ...]
+    noise: tuple[NoiseModel, NoiseModel]
+    judged: Judged | None
+
+
+@dataclass(frozen=True, eq=False)
+class _State:
+    """Wrenches so far.
+
+    Attributes:
+        fit: everything else fitted with them in place.
+        columns: which they are (k,).
+        sizes: N or N m (k,).
+        errors: of the sizes (k,).
+    """
+
+    fit: Fit
+    columns: Columns
+    sizes: FloatArray
+    errors: FloatArray
+
+
+def residual_model(
+    explanation: Fit, threshold: float, final: Problem | None, rounds: int = 4
+) -> ResidualModel | None:
+    """What an explanation leaves, as a sum of simple wrenches.
+
+    Args:
+        explanation: the best one there is.
+        threshold: log p-value of a wrench that chance passes rarely enough.
+        final: runs that chose nothing.
+        rounds: most rounds of choosing and fitting.
+
+    Returns:
+        None where the data ask for no wrench beyond chance, or where they are not explained better
+        with those that they ask for: then no sum of simple functions is what is missing.
+    """
+    like = generic_forces(explanation.problem.runs, explanation.filtered)
+    state = _State(explanation, np.zeros(0, np.int64), np.zeros(0), np.zeros(0))
+    for _ in range(rounds):
+        chosen = _enlarged(state, like, threshold)
+        if not len(chosen.columns):
+            return None
+        rests = len(chosen.columns) == len(state.columns) and bool(
+            np.all(np.abs(chosen.sizes - state.sizes) < RESTING * chosen.errors)
+        )
+        if rests:
+            state = replace(chosen, fit=state.fit)
+            break
+        again = _refitted(chosen, like)
+        if again is None:
+            break
+        state = replace(chosen, fit=again)
+    if not len(state.columns):
+        return None
+    terms = tuple(
+        Term(like.names[c // 6], DIRECTIONS[c % 6], float(like.scale[c // 6]), float(a), float(e))
+        for c, a, e in zip(state.columns, state.sizes, state.errors, strict=True)
+    )
+    judged = None if final is None else _judged(explanation, state, like, final)
+    return ResidualModel(terms, explanation.effects, (explanation.noise, state.fit.noise), judged)
+
+
+def _enlarged(state: _State, like: GenericForces, threshold: float) -> _State:
+    """With the wrenches that are still asked for, without those no longer needed."""
+    own, present = state.fit, list(state.columns)
+    forces = generic_forces(own.problem.runs, own.filtered, like)
+    projector = Projector(own)
+    asked = sorted(generic_signals(own, forces, projector), key=lambda signal: signal[1].log_p)
+    others = [column for column, _ in asked[:POOL] if column not in present]
+    pool = np.array([*present, *others], np.int64)
+    before = np.r_[state.sizes, np.zeros(len(others))] / probes(pool)
+    chooser = _Chooser(own, projector, changes(own, forces, pool), before, threshold)
+    chosen = chooser.chosen(list(range(len(present))))
+    sizes, errors = chooser.sizes(chosen)
+    unit = probes(pool[chosen])
+    return replace(state, columns=pool[chosen], sizes=unit * sizes, errors=unit * errors)
+
+
+class _Chooser:
+    """Chooses among wrenches by what they change in the residuals.
+
+    Args:
+        own: fit with some of them in place already.
+        projector: of that fit.
+        change: (D, N) change of its residuals.
+        before: (N,) sizes in place.
+        threshold: log p-value that each must pass beside all others.
+    """
+
+    def __init__(
+        self, own: Fit, projector: Projector, change: FloatArray, before: FloatArray,
+        threshold: float,
+    ) -> None:  # fmt: skip
+        self.residuals, self.projector = own.linearised.residuals, projector
+        self.before, self.threshold = before, threshold
+        self.all = projector.signal(NOTHING, 0, change) if change.size else None
+
+    def chosen(self, present: list[int]) -> list[int]:
+        """Those worth having: the present ones and more, in the order they were added."""
+        chosen = present
+        while self.all is not None and len(chosen) < MOST:
+            log_p = {i: self._log_p([*chosen, i])[-1] for i in self._apart(chosen)}
+            best = min(log_p, key=lambda i: log_p[i], default=None)
+            if best is None or log_p[best] > self.threshold:
+                break
+            chosen = [*chosen, best]
+        while chosen:
+            every = self._log_p(chosen)
+            weakest = int(np.argmax(every))
+            if every[weakest] < self.threshold:
+                break
+            chosen = [*chosen[:weakest], *chosen[weakest + 1 :]]
+        return chosen
+
+    def sizes(self, chosen: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+        """Sizes of some wrenches together, and their standard errors (k,) each."""
+        if self.all is None or not chosen:
+            return np.zeros(0), np.zeros(0)
+        own = list(chosen)
+        inverse = np.linalg.inv(self.all.projected[np.ix_(own, own)])
+        more = inverse @ self.all.score[own]
+        left = self.all.left[:, own]
+        inflation = self.projector.inflation(left, self.residuals + left @ more)
+        return self.before[own] + more, np.sqrt(inflation * np.diag(inverse))
+
+    def _log_p(self, chosen: Sequence[int]) -> FloatArray:
+        """Logarithm of the p-value of each beside all others (k,)."""
+        sizes, errors = self.sizes(chosen)
+        return np.asarray(chi2_log_tail((sizes / errors) ** 2, np.ones(len(sizes))))
+
+    def _apart(self, chosen: Sequence[int]) -> list[int]:
+        """Wrenches of which the chosen ones leave something."""
+        assert self.all is not None
+        whole, own = self.all.projected, list(chosen)
+        shared = whole[:, own]
+        swallowed = shared * np.linalg.solve(whole[np.ix_(own, own)], shared.T).T
+        left = 1.0 - swallowed.sum(axis=1) / np.diag(whole)
+        return [i for i in range(len(whole)) if i not in own and left[i] > APART]
+
+
+def _refitted(state: _State, like: GenericForces) -> Fit | None:
+    """All else fitted with the wrenches in place; None where that is no better.
+
+    The objective is comparable, as it counts the disturbance that each needs.
+    """
+    own = state.fit
+    forces = generic_forces(own.problem.runs, own.filtered, like)
+    problem = own.problem.with_runs(_carrying(own.problem.runs, forces, state))
+    try:
+        again = fit(problem, own.effects, own.point, own.noise, own.released, rounds=2)
+    except np.linalg.LinAlgError:
+        return None
+    return again if again.objective < own.objective else None
+
+
+def _carrying(runs: Sequence[RunData], forces: GenericForces, state: _State) -> list[RunData]:
+    """The runs with the wrenches as known ones, from the motion that `forces` saw."""
+    result = []
+    for run, basis in zip(runs, forces.bases, strict=True):
+        wrench = np.zeros((len(basis), 6))
+        for column, size in zip(state.columns, state.sizes, strict=True):
+            wrench[:, column % 6] += size * basis[:, column // 6]
+        result.append(replace(run, wrench=wrench))
+    return result
+
+
+def _judged(explanation: Fit, state: _State, like: GenericForces, final: Problem) -> Judged:
+    """One-step predictions of other runs without and with the wrenches.
+
+    The wrench follows from the motion, and the filtered motion from the wrench: filtered twice,
+    both agree.
+    """
+    before = in_step(final, explanation.point, explanation.noise)
+    own, after = state.fit, before
+    for _ in range(2):
+        forces = generic_forces(final.runs, after, like)
+        carrying = final.with_runs(_carrying(final.runs, forces, state))
+        after = in_step(carrying, own.point, own.noise)
+    scores = [
+        np.concatenate(by_window(final.runs, [log_likelihoods(f) for f in filtered], np.nansum))
+        for filtered in (before, after)
+    ]
+    gains = scores[1] - scores[0]
+    gain, spread = float(gains.sum()), 1.96 * float(np.std(gains) * np.sqrt(len(gains)))
+    return Judged(tuple(r.id for r in final.runs), gain, (gain - spread, gain + spread))
+
+
+def log_likelihoods(filtered: Filtered) -> FloatArray:
+    """Log likelihood of each sample and channel given all before (T, C), without the constant."""
+    scale = np.einsum("tii->ti", filtered.whitening)
+    return np.asarray(np.log(np.where(scale > 0.0, scale, 1.0)) - 0.5 * filtered.innovations**2)

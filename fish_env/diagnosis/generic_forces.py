@@ -107,7 +107,12 @@ def generic_signals(
 
 
 def regressors(run: RunData, filtered: Filtered) -> dict[str, FloatArray]:
-    """Functions of the filtered motion that a missing force may depend on, each (T,)."""
+    """Functions of the filtered motion that a missing force may depend on, each (T,).
+
+    In SI units, but time in units of 30 s; angles in rad, frequencies in Hz. ``beat`` is amplitude
+    times frequency as commanded; depth, north, east, frequency and amplitude count from their mean
+    over the run; what goes with the tail's phase is multiplied by the square of the beat.
+    """
     c = channels_from_states(filtered.states.T[:18])
     row = np.searchsorted(run.command_times, run.clock, side="right") - 1
     command = run.command_values[np.maximum(row, 0)]

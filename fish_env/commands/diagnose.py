@@ -11,7 +11,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from fish_env.diagnosis.answer import words
+from fish_env.diagnosis.answer import holds_elsewhere, words
 from fish_env.diagnosis.generic_forces import wrench_unit
 from fish_env.diagnosis.pipeline import diagnose
 
@@ -71,7 +71,7 @@ def print_answer(console: Console, answer: dict[str, Any]) -> None:
     if answer["causes"]:
         console.print(_causes(answer))
     console.print(_misfit(answer))
-    if answer.get("residual_model"):
+    if holds_elsewhere(answer):
         console.print(_residual_model(answer["residual_model"]))
     elif answer["unexplained"]:
         console.print(_unexplained(answer))

@@ -174,12 +174,16 @@ def _blind(answer: Plain) -> str:
 def _asked(answer: Plain) -> str:
     if not answer["unexplained"]:
         return ""
-    model = answer.get("residual_model")
-    first = model["terms"][0] if model else answer["unexplained"][0]
-    gain = model and model["gain"]
-    elsewhere = gain and gain["log_likelihood"]["ci95"][0] > 0.0
+    holds = holds_elsewhere(answer)
+    first = answer["residual_model"]["terms"][0] if holds else answer["unexplained"][0]
     kind = "force" if wrench_unit(first["direction"]) == "N" else "moment"
     return (
         f"What is left looks most like a {kind} in {first['direction']} that depends on "
-        f"{first['depends_on']}{', on runs kept for judging too' if elsewhere else ''}."
+        f"{first['depends_on']}{', on runs kept for judging too' if holds else ''}."
     )
+
+
+def holds_elsewhere(answer: Plain) -> bool:
+    """Whether the empirical model of what is left foretells runs that did not choose it."""
+    gain = (answer.get("residual_model") or {}).get("gain")
+    return bool(gain and gain["log_likelihood"]["ci95"][0] > 0.0)

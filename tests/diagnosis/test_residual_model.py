@@ -137,4 +137,6 @@ def test_the_report_and_the_verdict_tell_it():
     model = RESIDUAL | {"gain": RESIDUAL["gain"] | {"log_likelihood": doubtful}}
     weak = full | {"residual_model": model}
     assert "not shown to foretell" in shown(weak)
-    assert "too." not in words(weak)
+    assert "in surge that depends on depth." in words(weak)
+    bad = RESIDUAL["gain"] | {"log_likelihood": {"estimate": -40.0, "ci95": [-60.0, -20.0]}}
+    assert "worse" in shown(full | {"residual_model": RESIDUAL | {"gain": bad}})

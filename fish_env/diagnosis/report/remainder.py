@@ -55,8 +55,9 @@ def _elsewhere(gain: Answer | None) -> str:
         return ""
     score, runs = gain["log_likelihood"], ", ".join(gain["final_runs"])
     low, high = score["ci95"]
-    holds = "It foretells" if low > 0.0 else "It is not shown to foretell"
+    worse = "It foretells worse what happens in" if high < 0.0 else "It is not shown to foretell"
+    holds = "It foretells" if low > 0.0 else worse
     return (
         f" {holds} {runs}, which did not choose it: one sample ahead, their log likelihood changes "
-        f"by {number(score['estimate'])} ({number(low)} to {number(high)})."
+        f"by {score['estimate']:.0f} ({low:.0f} to {high:.0f})."
     )

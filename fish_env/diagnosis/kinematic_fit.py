@@ -172,7 +172,7 @@ def _linearised(run: Prepared, relation: Relation, values: FloatArray) -> Linear
     slopes = np.empty((*centre.left.shape, len(values)))
     for i, setting in enumerate(relation.settings):
         step = setting.size * np.eye(len(values))[i]
-        up, down = (relation.increments(run, values + s).left for s in (step, -step))
+        up, down = (relation.left(run, values + s) for s in (step, -step))
         slopes[:, :, i] = (up - down) / (2.0 * setting.size)
     return Linear(centre, slopes)
 

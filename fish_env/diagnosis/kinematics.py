@@ -139,6 +139,21 @@ class Relation:
             run: as `prepared` reads it.
             values: one for each setting.
         """
+        left, matrix = self._left(run, values)
+        flat = matrix.reshape(len(run.t_in), -1)
+        gain = _on(run.t_in, flat, run.t_out).reshape(-1, *matrix.shape[1:])
+        middle, span = 0.5 * (run.t_out[1:] + run.t_out[:-1]), np.diff(run.t_out)
+        joined = np.append(False, run.keep[:-1])[run.keep]
+        step = float(np.median(np.diff(run.t_in)))
+        keep = run.keep
+        return Increments(middle[keep], span[keep], left, joined, gain[1:][keep], step)
+
+    def left(self, run: Prepared, values: FloatArray) -> FloatArray:
+        """What is left of the increments alone (n, outputs)."""
+        return self._left(run, values)[0]
+
+    def _left(self, run: Prepared, values: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """What is left, and the matrices that take the inputs to rates of the outputs."""
         given = dict(zip((s.name for s in self.settings), values, strict=True))
         bias = np.array([given.get(f"bias_{name}", 0.0) for name in self.inputs])
         names = ("yaw",) if self.level else ANGLES
@@ -158,14 +173,7 @@ class Relation:
             arm = np.array([given.get(f"arm_{a}", 0.0) for a in "xyz"])[: len(self.outputs)]
             at = _on(run.t_angle, run.angles, run.t_out) - offset
             grown = grown + np.diff(np.einsum("nij,j->ni", self._matrix(at, given), arm), axis=0)
-        left = np.diff(run.outputs, axis=0) - grown
-        flat = matrix.reshape(len(run.t_in), -1)
-        gain = _on(run.t_in, flat, run.t_out).reshape(-1, *matrix.shape[1:])
-        middle, span = 0.5 * (run.t_out[1:] + run.t_out[:-1]), np.diff(run.t_out)
-        joined = np.append(False, run.keep[:-1])[run.keep]
-        step = float(np.median(np.diff(run.t_in)))
-        keep = run.keep
-        return Increments(middle[keep], span[keep], left[keep], joined, gain[1:][keep], step)
+        return (np.diff(run.outputs, axis=0) - grown)[run.keep], matrix
 
     def _matrix(self, euler: FloatArray, given: dict[str, float]) -> FloatArray:
         """Inputs to rates of the outputs, (n, outputs, inputs)."""

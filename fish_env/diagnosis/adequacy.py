@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from fish_env.diagnosis.generic_forces import (
-    DIRECTIONS,
     GenericForces,
     generic_forces,
     generic_signals,
@@ -136,13 +135,11 @@ def adequacy(fit: Fit, rng: np.random.Generator, tolerated: float = 0.0) -> Adeq
     """
     forces, signals = _asked(fit)
     threshold = null_threshold([s for _, s in signals], rng, LEVEL)
+    unit = probes(forces.columns)
     found = []
     for column, signal in signals:
-        function, direction = divmod(column, 6)
-        unit = probes(np.array([column]))[0]
-        amount = float(abs(signal.score[0] / signal.projected[0, 0]) * unit)
-        name = forces.names[function]
-        found.append(Misfit(name, DIRECTIONS[direction], signal.log_p, amount))
+        amount = float(abs(signal.score[0] / signal.projected[0, 0]) * unit[column])
+        found.append(Misfit(*forces.words(column), signal.log_p, amount))
     found.sort(key=lambda m: m.log_p)
     strongest = max((signal.statistic for _, signal in signals), default=0.0)
     reached = not found or found[0].log_p >= threshold or strongest < tolerated

@@ -50,13 +50,9 @@ class GenericForces:
         """Every wrench there is (6 J,)."""
         return np.arange(6 * len(self.names))
 
-    def column(self, function: str, direction: str) -> int:
-        """Where a function in a direction is."""
-        return 6 * self.names.index(function) + DIRECTIONS.index(direction)
-
-    def pushes(self, columns: npt.NDArray[np.int64], sizes: FloatArray) -> Pushes:
-        """One wrench for each lane, of sizes (N,) in N or N m."""
-        return Pushes(self.bases, columns, sizes)
+    def words(self, column: int) -> tuple[str, str]:
+        """Function and direction of a wrench."""
+        return self.names[column // 6], DIRECTIONS[column % 6]
 
 
 def generic_forces(
@@ -89,7 +85,7 @@ def changes(fit: Fit, forces: GenericForces, columns: npt.NDArray[np.int64]) -> 
     """How :func:`probes` of some wrenches change the residuals of a fit (D, N)."""
     z = np.repeat(fit.point.z[:, None], len(columns), axis=1)
     effects = {path: np.full(len(columns), value) for path, value in fit.point.effects.items()}
-    pushes = forces.pushes(columns, probes(columns))
+    pushes = Pushes(forces.bases, columns, probes(columns))
     out = fit.problem.innovations(z, effects, fit.noise, fit.filtered, pushes)
     return np.asarray((out - fit.linearised.residuals).T)
 

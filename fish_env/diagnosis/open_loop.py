@@ -63,13 +63,9 @@ def windows(run: RunData, filtered: Filtered, length_s: float) -> list[RunData]:
 def _cut(run: RunData, state: FloatArray, first: int, last: int) -> RunData:
     held = np.searchsorted(run.command_times, run.clock[first], side="right") - 1
     return replace(
-        run,
-        clock=np.ascontiguousarray(run.clock[first:last]),
-        substeps=np.ascontiguousarray(run.substeps[first:last]),
+        run.cut(first, last),
         command_times=np.ascontiguousarray(run.command_times[max(held, 0) :]),
         command_values=np.ascontiguousarray(run.command_values[max(held, 0) :]),
-        measured=np.ascontiguousarray(run.measured[first:last]),
-        wrench=None if run.wrench is None else np.ascontiguousarray(run.wrench[first:last]),
         state0=np.ascontiguousarray(state),
         swimming=run.swimming or first > 0,
         as_measured=False,

@@ -17,7 +17,6 @@ import numpy.typing as npt
 
 from fish_env.diagnosis.gain import by_window
 from fish_env.diagnosis.generic_forces import (
-    DIRECTIONS,
     NOTHING,
     GenericForces,
     changes,
@@ -128,36 +127,36 @@ def residual_model(
         None where the data ask for no wrench beyond chance, or where they are not explained better
         with those that they ask for: then no sum of simple functions is what is missing.
     """
-    like = generic_forces(explanation.problem.runs, explanation.filtered)
+    like = forces = generic_forces(explanation.problem.runs, explanation.filtered)
     state = _State(explanation, np.zeros(0, np.int64), np.zeros(0), np.zeros(0))
     for _ in range(rounds):
-        chosen = _enlarged(state, like, threshold)
+        chosen = _enlarged(state, forces, threshold)
         if not len(chosen.columns):
             return None
         rests = len(chosen.columns) == len(state.columns) and bool(
             np.all(np.abs(chosen.sizes - state.sizes) < RESTING * chosen.errors)
         )
         if rests:
-            state = replace(chosen, fit=state.fit)
+            state = chosen
             break
-        again = _refitted(chosen, like)
+        again = _refitted(chosen, forces)
         if again is None:
             break
         state = replace(chosen, fit=again)
+        forces = generic_forces(again.problem.runs, again.filtered, like)
     if not len(state.columns):
         return None
     terms = tuple(
-        Term(like.names[c // 6], DIRECTIONS[c % 6], float(like.scale[c // 6]), float(a), float(e))
+        Term(*like.words(c), float(like.scale[c // 6]), float(a), float(e))
         for c, a, e in zip(state.columns, state.sizes, state.errors, strict=True)
     )
     judged = None if final is None else _judged(explanation, state, like, final)
     return ResidualModel(terms, explanation.effects, (explanation.noise, state.fit.noise), judged)
 
 
-def _enlarged(state: _State, like: GenericForces, threshold: float) -> _State:
+def _enlarged(state: _State, forces: GenericForces, threshold: float) -> _State:
     """With the wrenches that are still asked for, without those no longer needed."""
     own, present = state.fit, list(state.columns)
-    forces = generic_forces(own.problem.runs, own.filtered, like)
     projector = Projector(own)
     asked = sorted(generic_signals(own, forces, projector), key=lambda signal: signal[1].log_p)
     others = [column for column, _ in asked[:POOL] if column not in present]
@@ -232,13 +231,12 @@ class _Chooser:
         return [i for i in range(len(whole)) if i not in own and left[i] > APART]
 
 
-def _refitted(state: _State, like: GenericForces) -> Fit | None:
+def _refitted(state: _State, forces: GenericForces) -> Fit | None:
     """All else fitted with the wrenches in place; None where that is no better.
 
     The objective is comparable, as it counts the disturbance that each needs.
     """
     own = state.fit
-    forces = generic_forces(own.problem.runs, own.filtered, like)
     problem = own.problem.with_runs(_carrying(own.problem.runs, forces, state))
     try:
         again = fit(problem, own.effects, own.point, own.noise, own.released, rounds=2)

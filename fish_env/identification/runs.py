@@ -109,13 +109,17 @@ class RunData:
 
     def until(self, end_s: float) -> RunData:
         """The beginning of the run, at least two samples of it."""
-        count = max(2, int(np.searchsorted(self.clock, end_s, side="right")))
+        return self.cut(0, max(2, int(np.searchsorted(self.clock, end_s, side="right"))))
+
+    def cut(self, first: int, last: int) -> RunData:
+        """The same run with some of its samples, ``first`` to before ``last``."""
+        own = slice(first, last)
         return replace(
             self,
-            clock=self.clock[:count],
-            substeps=self.substeps[:count],
-            measured=np.ascontiguousarray(self.measured[:count]),
-            wrench=None if self.wrench is None else np.ascontiguousarray(self.wrench[:count]),
+            clock=np.ascontiguousarray(self.clock[own]),
+            substeps=np.ascontiguousarray(self.substeps[own]),
+            measured=np.ascontiguousarray(self.measured[own]),
+            wrench=None if self.wrench is None else np.ascontiguousarray(self.wrench[own]),
         )
 
     @property

@@ -64,16 +64,16 @@ def test_a_model_that_does_not_hold_elsewhere_says_so(swirled):
     """The same judgement of runs in which the moment acts the other way round."""
     *_, own, final, _ = swirled
     _, left, *_ = swirled
-    mirror = {"roll", "p", "yaw", "r", "y", "sway"}
-    turned = [
-        replace(run, measured=run.measured * [-1.0 if c in mirror else 1.0 for c in final.channels])
+    signs = [-1.0 if c in {"roll", "p", "yaw", "r", "y", "v"} else 1.0 for c in final.channels]
+    other = [
+        replace(
+            run,
+            measured=run.measured * signs,
+            command_values=run.command_values * [-1.0, 1.0, 1.0, 1.0, -1.0],
+        )
         for run in final.runs
     ]
-    commands = [
-        replace(run, command_values=run.command_values * [-1.0, 1.0, 1.0, 1.0, -1.0])
-        for run in turned
-    ]
-    model = residual_model(own, left.threshold, final.with_runs(commands))
+    model = residual_model(own, left.threshold, final.with_runs(other))
     assert model.judged.gain_ci95[1] < 0.0
 
 
@@ -101,7 +101,7 @@ def test_a_known_wrench_does_what_the_same_push_does():
     problem = Problem(simulate(setup), paths=PATHS)
     own = fit(problem, iterations=1, refit_noise=False, noise=setup.noise)
     forces = generic_forces(problem.runs, own.filtered)
-    column = forces.column("u|u|", "yaw")
+    [column] = [c for c in forces.columns if forces.words(c) == ("u|u|", "yaw")]
     push = changes(own, forces, np.array([column]))[:, 0]
     wrenches = [np.zeros((len(basis), 6)) for basis in forces.bases]
     for wrench, basis in zip(wrenches, forces.bases, strict=True):

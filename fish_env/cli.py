@@ -7,6 +7,7 @@ functions that take the typer app.
 
 from __future__ import annotations
 
+import gc
 import warnings
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -260,7 +261,12 @@ def main() -> None:
     """Runs `robofish`. An error that we raise on purpose is one red line, exit status 2."""
     with warnings.catch_warnings():
         warnings.showwarning = lambda message, *_: _complain("yellow", f"robofish: {message}")
-        _run()
+        try:
+            _run()
+        finally:
+            # On its way out the interpreter would look for garbage among all that the compiler
+            # made, which takes most of a second; it goes with the process.
+            gc.freeze()
 
 
 def _run() -> None:

@@ -12,6 +12,7 @@ class Effort:
     Attributes:
         runs: most runs that are fitted.
         seconds: longest stretch of each, from its beginning.
+        step_s: longest step of the simulation (s), but where it has to be finer.
         shortlist: effects tried at each step.
         finalists: of these, fitted in full.
         retries: whether what was found is questioned: other starts from where the winner is,
@@ -22,6 +23,7 @@ class Effort:
 
     runs: int
     seconds: float
+    step_s: float
     shortlist: int
     finalists: int
     retries: bool
@@ -29,10 +31,13 @@ class Effort:
 
 
 PICTURES = "figures as PNG"
-FULL = Effort(runs=10_000, seconds=float("inf"), shortlist=6, finalists=4, retries=True)
+FULL = Effort(
+    runs=10_000, seconds=float("inf"), step_s=0.01, shortlist=6, finalists=4, retries=True
+)
 QUICK = Effort(
     runs=2,
     seconds=20.0,
+    step_s=0.04 / 3,
     shortlist=3,
     finalists=1,
     retries=False,

@@ -173,6 +173,7 @@ def _blank(problem: Problem, manoeuvre: Manoeuvre) -> RunData:
         id=manoeuvre.name,
         clock=clock,
         substeps=substeps,
+        fresh=np.zeros(len(clock), bool),
         command_times=manoeuvre.times_s,
         command_values=manoeuvre.values,
         measured=np.zeros((len(clock), len(problem.channels))),

@@ -191,7 +191,8 @@ def _diagnose_runs(
     agreed = check_consistency(dataset, np.random.default_rng([seed, 2]), floors)
     fitted, final = fitted_and_final(dataset, seed)
     progress("refitting the baseline")
-    problem = Problem(dataset, fish, fitted).subset(effort.runs).until(effort.seconds)
+    problem = Problem(dataset, fish, fitted, dt=effort.step_s)
+    problem = problem.subset(effort.runs).until(effort.seconds)
     baseline = _refitted(problem)
     problem = baseline.problem  # with the tail phases settled
     causes = causes_of(problem)
@@ -208,7 +209,8 @@ def _diagnose_runs(
     gain = None
     if verdict.name in EXTENDING and final:
         progress("measuring the gain on final runs")
-        gain = measure_gain(Problem(dataset, fish, final), baseline, accepted, rng)
+        judging = Problem(dataset, fish, final, dt=effort.step_s)
+        gain = measure_gain(judging, baseline, accepted, rng)
     residual = None
     if verdict.name == "outside_library" and effort.retries:
         progress("describing what is left")

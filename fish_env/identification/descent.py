@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from itertools import tee
+from collections.abc import Callable, Iterator
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -59,7 +58,6 @@ def descend(
     within: Within,
     iterations: int,
     tolerance: float,
-    at_once: Callable[[Sequence[FloatArray]], Iterable[tuple[float, T]]] | None = None,
 ) -> tuple[FloatArray, float, T]:
     """Minimise a sum of squares, or what is nearly one.
 
@@ -72,8 +70,6 @@ def descend(
         iterations: most steps.
         tolerance: stop when no combination of parameters would move by more of its standard
             deviation, the objective being -2 log likelihood.
-        at_once: ``evaluate`` for several vectors, where it is quicker to ask for all trials of a
-            step at once than to stop at the first that is better.
 
     Returns:
         The vector reached, the objective there, and what else was computed.
@@ -92,10 +88,9 @@ def descend(
         if promise < tolerance**2:
             break
         before, tried = value, 0
-        trials, same = tee(_trials(hessian, gradient, vector, whole, within))
-        seen = map(evaluate, same) if at_once is None else at_once(list(same))
-        for trial, (trial_value, trial_known) in zip(trials, seen, strict=True):
+        for trial in _trials(hessian, gradient, vector, whole, within):
             tried += 1
+            trial_value, trial_known = evaluate(trial)
             if trial_value < value:
                 vector, value, known = trial, trial_value, trial_known
                 break

@@ -147,23 +147,16 @@ def gauss_newton(
     return descend(
         vector,
         partial(objective, problem, free, noise=noise),
-        lambda at, filtered: quadratic(problem, free, at, noise, filtered),
+        lambda at, filtered: quadratic(free, at, linearise(problem, free, at, noise, filtered)),
         free.within, iterations, tolerance,
     )  # fmt: skip
 
 
-def quadratic(
-    problem: Problem,
-    free: Free,
-    vector: FloatArray,
-    noise: NoiseModel,
-    filtered: Sequence[Filtered],
-) -> tuple[FloatArray, FloatArray]:
+def quadratic(free: Free, vector: FloatArray, lin: Linearised) -> tuple[FloatArray, FloatArray]:
     """Half the Hessian (n, n) and half the gradient (n,) of the objective, for Gauss-Newton.
 
     The steps of later slopes are suited to this Hessian.
     """
-    lin = linearise(problem, free, vector, noise, filtered)
     hessian = information(lin.slopes, free.prior)
     free.suit_steps(hessian)
     return hessian, gradient(lin.slopes, lin.residuals, free.prior, vector)

@@ -20,6 +20,8 @@ FloatArray = npt.NDArray[np.float64]
 ORDER = 4
 WINDOW = 30
 QUANTILE = 0.15
+GAIN = 0.1
+"""The disturbance is found when a step gains no more log likelihood."""
 
 
 def white_noise_sd(dataset: Dataset, channel: str) -> float:
@@ -112,24 +114,24 @@ def fit_noise(
         largest_sensor_sd: (C,) bound on each channel's noise; the noise is then fitted too.
             Without it the sensors keep theirs: a misfit of the model must not pass for noise.
     """
+    bounds = np.log([within.force, within.moment, within.correlation])
 
     def model(x: FloatArray, sensor: FloatArray) -> NoiseModel:
         force, moment, correlation = within.nearest(*np.exp(x))
         return NoiseModel(sensor, force, moment, correlation, start.phase_sd)
 
-    def start_of(noise: NoiseModel) -> FloatArray:
-        return np.log([noise.force_sd, noise.moment_sd, noise.correlation_s])
-
     def disturbance(noise: NoiseModel, effort: int) -> NoiseModel:
-        simplex = start_of(noise) + np.vstack([np.zeros(3), 0.7 * np.eye(3)])
+        known = np.log([noise.force_sd, noise.moment_sd, noise.correlation_s])
         found = minimize(
             lambda x: -log_likelihood(model(x, noise.sensor_sd)),
-            start_of(noise),
-            method="Nelder-Mead",
-            options={"maxfev": effort, "initial_simplex": simplex, "xatol": 0.05, "fatol": 0.5},
+            np.clip(known, *bounds.T),
+            method="L-BFGS-B",
+            bounds=bounds,
+            options={"maxfun": effort, "eps": 1e-3, "ftol": GAIN / scale},
         )
         return model(found.x, noise.sensor_sd)
 
+    scale = max(abs(log_likelihood(start)), 1.0)
     noise = disturbance(start, evaluations)
     if largest_sensor_sd is None:
         return noise

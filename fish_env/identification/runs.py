@@ -45,11 +45,12 @@ JUMPS = {
 }
 """Larger changes (rad, Hz, m) are jumps. Smaller ones, as of commands that glide and are logged
 with every sample, leave plain steps wrong by less than a fifth of usual sensor noise."""
-FINE_STEP_S = 0.0025
+FINER = 4
+"""How many times finer those are than the others."""
 CORNER_STEP_S = 0.0025
 CORNER_FINE_STEP_S = 0.000625
-"""The same two where the tail's rate may jump at any time; just after a switch of the commands it
-may do so twice within a few milliseconds."""
+"""Usual and fine steps where the tail's rate may jump at any time; just after a switch of the
+commands it may do so twice within a few milliseconds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +62,7 @@ class RunData:
         condition: repeats share it.
         clock: (T,) sample times from the first (s).
         substeps: (T,) RK4 steps up to each sample.
+        fresh: (T,) whether a jump of the commands came so shortly before that steps are fine.
         command_times: (m,) switch times on the same clock (s); the first may be long before it.
         command_values: (m, 5).
         measured: (T, C), NaN where missing.
@@ -78,6 +80,7 @@ class RunData:
     condition: str | None
     clock: FloatArray
     substeps: npt.NDArray[np.int64]
+    fresh: npt.NDArray[np.bool_]
     command_times: FloatArray
     command_values: FloatArray
     measured: FloatArray
@@ -96,9 +99,7 @@ class RunData:
     @property
     def corner_substeps(self) -> npt.NDArray[np.int64]:
         """(T,) steps for motion with corners: finer everywhere, and most where they are fine."""
-        spans = np.diff(self.clock, prepend=0.0)
-        fresh = spans <= self.substeps * FINE_STEP_S * (1.0 + 1e-6)
-        corner = _steps(self.clock, np.where(fresh, CORNER_FINE_STEP_S, CORNER_STEP_S))
+        corner = _steps(self.clock, np.where(self.fresh, CORNER_FINE_STEP_S, CORNER_STEP_S))
         return np.maximum(self.substeps, corner)
 
     @property
@@ -118,6 +119,7 @@ class RunData:
             self,
             clock=np.ascontiguousarray(self.clock[own]),
             substeps=np.ascontiguousarray(self.substeps[own]),
+            fresh=self.fresh[own],
             measured=np.ascontiguousarray(self.measured[own]),
             wrench=None if self.wrench is None else np.ascontiguousarray(self.wrench[own]),
         )
@@ -142,7 +144,7 @@ def prepare_run(
         run: measured run.
         channels: channels to use.
         noise_sd: (C,) white noise of each channel, for the spread of the initial state.
-        dt: longest RK4 step (s), but for a moment after each switch of the commands.
+        dt: longest RK4 step (s), but for a moment after each jump of the commands.
 
     Raises:
         DatasetError: the run has none of the channels.
@@ -153,8 +155,8 @@ def prepare_run(
         run.time_s - run.time_s[0], np.column_stack([run.channels[name] for name in channels])
     )
     switches = run.commands.times_s - run.time_s[0]
-    quick = _after(switches[_jumped(run.commands.values)], clock)
-    substeps = _steps(clock, np.where(quick, min(dt, FINE_STEP_S), dt))
+    fresh = _after(switches[_jumped(run.commands.values)], clock)
+    substeps = _steps(clock, np.where(fresh, dt / FINER, dt))
     state0, covariance0 = _initial(run, channels, measured, clock, noise_sd)
     if run.start == "rest":
         measured[clock < UNTOLD_S] = np.nan
@@ -163,6 +165,7 @@ def prepare_run(
         run.condition,
         clock,
         substeps,
+        fresh,
         *_commands(run, switches),
         np.ascontiguousarray(measured),
         state0,

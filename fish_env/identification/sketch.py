@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import numpy.typing as npt
 
 from fish_env.identification.descent import descend
 from fish_env.identification.estimator import Fit, quadratic
-from fish_env.identification.free import Free, objectives_with_gains
+from fish_env.identification.free import Free, linearise, objectives_with_gains
 from fish_env.identification.phases import settle_phases
 from fish_env.identification.problem import Point, Problem
 
@@ -80,16 +80,10 @@ class Sketcher:
         free = Free(self.few, effects, released)
         vectors = [free.clip(free.pack(start)) for start in starts]
         few, vector = self._best(free, vectors)
-
-        def evaluate(several: Sequence[FloatArray]) -> list[tuple[float, None]]:
-            return [(value, None) for value in self._objectives(few, free, several)]
-
+        survey = partial(self._surveyed, few, free)
         vector, value, _ = descend(
-            vector,
-            lambda at: evaluate([at])[0],
-            lambda at, _: quadratic(few, free, at, self.fit.noise, self.filtered),
-            free.within, STEPS, TOLERANCE, evaluate,
-        )  # fmt: skip
+            vector, survey, lambda _, known: known, free.within, STEPS, TOLERANCE
+        )
         return Sketch(tuple(effects), tuple(released), free.unpack(vector), value)
 
     def _best(self, free: Free, vectors: Sequence[FloatArray]) -> tuple[Problem, FloatArray]:
@@ -101,6 +95,18 @@ class Sketcher:
         settled = [settle_phases(few, free.unpack(v), noise) for v in vectors]
         pairs = zip(settled, vectors, strict=True)
         return min(pairs, key=lambda pair: self._objectives(pair[0], free, [pair[1]])[0])
+
+    def _surveyed(
+        self, problem: Problem, free: Free, vector: FloatArray
+    ) -> tuple[float, tuple[FloatArray, FloatArray]]:
+        """The objective with its half Hessian and gradient, which the next step asks for.
+
+        A whole step is hardly ever refused, and the slopes' lanes hold the objective's.
+        """
+        lin = linearise(problem, free, vector, self.fit.noise, self.filtered)
+        value = float(lin.residuals @ lin.residuals + free.prior @ (vector * vector))
+        able = np.isfinite(value) and problem.baseline.possible(vector[: free.count])
+        return (value if able else np.inf), quadratic(free, vector, lin)
 
     def _objectives(
         self, problem: Problem, free: Free, vectors: Sequence[FloatArray]

@@ -51,6 +51,7 @@ def run_of(seconds=10.0, rate=10.0):
     clock = np.arange(0.0, seconds + 1e-9, 1.0 / rate)
     return RunData(
         id="r", condition=None, clock=clock, substeps=np.ones(len(clock), np.int64),
+        fresh=np.zeros(len(clock), bool),
         command_times=np.array([0.0, 4.0, 7.0]), command_values=np.arange(15.0).reshape(3, 5),
         measured=np.arange(len(clock), dtype=float)[:, None], state0=np.zeros(18),
         covariance0=np.eye(19), phase_known=True,

@@ -67,20 +67,6 @@ def test_two_that_act_alike_do_not_keep_it_going(likeness):
     assert problem.count == 1
 
 
-@pytest.mark.parametrize("likeness", [0.0, 0.9])
-def test_trials_at_once_lead_where_trials_in_turn_do(likeness):
-    mixed = np.array([[1.0, likeness], [likeness, 1.0]])
-    residuals, slopes = (lambda x: VALLEY[0](mixed @ x)), (lambda x: VALLEY[1](mixed @ x) @ mixed)
-    problem, within = Counted(residuals, slopes), box([-9, -9], [9, 9])
-    asked = (np.array([-1.2, 1.0]), problem.evaluate, problem.linearise, within, 60, 1e-4)
-    in_turn, together = (
-        descend(*asked),
-        descend(*asked, lambda xs: [problem.evaluate(x) for x in xs]),
-    )
-    np.testing.assert_array_equal(in_turn[0], together[0])
-    assert in_turn[1] == together[1]
-
-
 @pytest.mark.parametrize(("promise", "counted"), [(0.7, 6), (7.0, 101)])
 def test_it_does_not_follow_roughness(promise, counted):
     """Slopes across corners are a little wrong: only the shortest step gains, and hardly."""

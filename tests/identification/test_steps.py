@@ -9,7 +9,7 @@ from fish_env.data import CommandSteps
 from fish_env.diagnosis.open_loop import errors
 from fish_env.identification.free import Free, linearise
 from fish_env.identification.problem import Point, Problem
-from fish_env.identification.runs import FINE_STEP_S, SWITCH_S
+from fish_env.identification.runs import FINER, SWITCH_S
 from tests.identification.synthetic import Setup, simulate
 
 LAG = {"effects.servo_lag.time_constant": 0.013}
@@ -48,7 +48,7 @@ def test_steps_are_fine_after_a_switch_and_plain_elsewhere(dataset):
     span = np.diff(run.clock) / run.substeps[1:]
     since = run.clock[:-1, None] - run.command_times
     fresh = ((since > -0.04 + 1e-9) & (since < SWITCH_S - 1e-6)).any(axis=1)
-    np.testing.assert_array_equal(span <= FINE_STEP_S + 1e-9, fresh)
+    np.testing.assert_array_equal(span <= 0.01 / FINER + 1e-9, fresh)
     assert span.max() <= 0.01 + 1e-9
     assert 0.0 < fresh.mean() < 0.2
 

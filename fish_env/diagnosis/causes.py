@@ -21,6 +21,8 @@ ALIKE = ({"body.plane_xz.drag.c0", "body.plane_xy.drag.c0"},)
 """Coefficients that act alike: both planes' drags at zero incidence brake along the fish."""
 MOST_FREQUENCIES = 96
 QUARTER = (0.0, np.pi / 2)
+MANY = 4
+"""Settings that are also tested one by one."""
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Sizes tried between small and large."""
 
@@ -115,7 +117,7 @@ def causes_of(problem: Problem) -> tuple[Cause, ...]:
     step = problem.longest_step
     length = max(run.duration for run in problem.runs)
     effects = [
-        Cause(effect.name, probes_of(effect, step, length))
+        Cause(effect.name, each_alone(probes_of(effect, step, length)))
         for effect in problem.known.values()
         if effect.acts_on_motion or effect.sample_time or effect.measure
     ]
@@ -150,7 +152,25 @@ def probes_of(
             slow = [c for c in candidates if all(effect.is_followed(p, step) for p in c)]
             if slow and slow[0] not in alternatives:
                 alternatives.append(slow[0])
+    if effect.detunes:
+        alternatives.insert(0, tuple(_milder(effect, probe) for probe in alternatives[0]))
     return tuple(alternatives)
+
+
+def each_alone(probes: tuple[tuple[Probe, ...], ...]) -> tuple[tuple[Probe, ...], ...]:
+    """The alternatives and, where many settings are tested together, each by itself as well.
+
+    With every setting that is tested too, one of them has to be larger to be found: six together
+    ask for a quarter more of each than one alone.
+    """
+    mildest = probes[0] if probes else ()
+    return (*probes, *((probe,) for probe in mildest)) if len(mildest) >= MANY else probes
+
+
+def _milder(effect: Effect, probe: Probe) -> Probe:
+    """A third of the setting: with more of it the tail is out of step before a run ends."""
+    third = {p.name: p.neutral + (probe[p.name] - p.neutral) / 3.0 for p in effect.switching}
+    return {**probe, **third}
 
 
 def phase_of(effect: Effect) -> str | None:

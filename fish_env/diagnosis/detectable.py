@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from fish_env.diagnosis import tails
 from fish_env.diagnosis.causes import Probe
 from fish_env.diagnosis.screening import (
     Projector,
@@ -35,6 +36,7 @@ SMOOTH = 2.0
 FADING = 1.5
 """One that grows by a smaller power has a part that does not fade with the size: an error of the
 simulation's step, or a limit on something that jumps."""
+POWER = 0.8
 ALIKE = 0.1
 REFITS = 2
 NEAR = 0.2
@@ -56,6 +58,11 @@ class Setting:
     index: int
     parameter: str
     neutral: float
+
+    @property
+    def freedom(self) -> int:
+        """Degrees of freedom of its test."""
+        return self.signal.freedom
 
     @property
     def effect(self) -> str:
@@ -164,7 +171,7 @@ def _energies(
     if which:
         jobs = [(settings[i].effect, settings[i].probe(multiples[i])) for i in which]
         for i, change in zip(which, changes(fit, jobs), strict=True):
-            energy[i] = noncentrality(screen, settings[i].effect, change)
+            energy[i] = noncentrality(screen, settings[i].effect, settings[i].freedom, change)
     return energy
 
 
@@ -197,12 +204,21 @@ def changes(fit: Fit, jobs: Jobs) -> FloatArray:
     return seen
 
 
-def noncentrality(screen: Screen, effect: str, change: FloatArray) -> float:
-    """What a change (D,) of the residuals adds to the screen's test of an effect, at its best."""
+def noncentrality(screen: Screen, effect: str, freedom: int, change: FloatArray) -> float:
+    """What a change (D,) of the residuals adds to the screen's tests of an effect, at its best.
+
+    In terms of a test of so many degrees of freedom: one of more has to see more for the same
+    power.
+    """
     found = 0.0
     for signal in screen.signals:
         if signal.cause.name == effect:
             score = signal.left.T @ change
-            energy = float(score @ np.linalg.solve(signal.projected, score))
-            found = max(found, energy / signal.inflation)
+            energy = float(score @ np.linalg.solve(signal.projected, score)) / signal.inflation
+            found = max(found, energy * _needed(screen, freedom) / _needed(screen, signal.freedom))
     return found
+
+
+def _needed(screen: Screen, freedom: int) -> float:
+    """Noncentrality that takes a test over the screen's threshold with power 0.8."""
+    return tails.noncentrality(screen.threshold, freedom, POWER)

@@ -78,13 +78,18 @@ def _representative(problem: Problem, screen: Screen) -> dict[str, Signal]:
     """One alternative of each cause, to speak for it.
 
     A cause with shapes is judged by the shape that shows best. Without shapes the alternatives are
-    sizes, and the one nearest to what can just be detected is the truest: effects saturate.
+    sizes, and the one nearest to what can just be detected is the truest: effects saturate. One of
+    its settings alone does not speak for all.
     """
+    whole = {
+        name: [s for s in signals if s.freedom == max(other.freedom for other in signals)]
+        for name, signals in _alternatives(screen).items()
+    }
     return {
         name: max(signals, key=lambda s: float(np.trace(s.projected)))
         if any(p.shapes for p in problem.known[name].parameters)
         else min(signals, key=lambda s: abs(np.log(_multiple(s, screen.threshold))))
-        for name, signals in _alternatives(screen).items()
+        for name, signals in whole.items()
     }
 
 
@@ -118,21 +123,26 @@ def _sizes(
 
 
 def _settings(problem: Problem, screen: Screen, signal: Signal) -> list[Setting]:
-    """The switching parameters of an effect, each from the mildest probe of the same shape."""
+    """The switching parameters of an effect, each from the mildest probe of the same shape.
+
+    From the test of that probe alone where there is one.
+    """
     effect = problem.known[signal.cause.name]
+    alternatives = _alternatives(screen)[effect.name]
     shapes = [p.name for p in effect.parameters if p.shapes]
-    switches = effect.switching
     mildest = next(
         other
-        for other in _alternatives(screen)[effect.name]
+        for other in alternatives
         if all(_probe(other)[name] == _probe(signal)[name] for name in shapes)
     )
-    first: dict[str, int] = {}  # no setting of what the channels do not show
-    for i, setting in enumerate(mildest.cause.probes[mildest.probe]):
-        for p in switches:
-            if setting[p.name] != p.neutral:
-                first.setdefault(p.name, i)
-    return [Setting(mildest, first[p.name], p.name, p.neutral) for p in switches if p.name in first]
+    alone = [s for s in alternatives if s.freedom == 1]
+    found: dict[str, Setting] = {}  # no setting of what the channels do not show
+    for i, probe in enumerate(mildest.cause.probes[mildest.probe]):
+        test, at = next(((s, 0) for s in alone if _probe(s) == probe), (mildest, i))
+        for p in effect.switching:
+            if probe[p.name] != p.neutral:
+                found.setdefault(p.name, Setting(test, at, p.name, p.neutral))
+    return [found[p.name] for p in effect.switching if p.name in found]
 
 
 def _probe(signal: Signal) -> Probe:

@@ -323,7 +323,8 @@ def _probed(problem: Problem, signal: Signal, every: bool = False) -> list[dict[
     cause, effect = signal.cause, problem.known[signal.cause.name]
     shaped = len(effect.switching) < len(effect.parameters)
     alternatives = (cause.probes[signal.probe],) if shaped and not every else cause.probes
-    settings = [p for probes in alternatives for p in probes]
+    every_one = [p for probes in alternatives for p in probes]
+    settings = [p for i, p in enumerate(every_one) if p not in every_one[:i]]
     opposite = [o for o in (mirrored(effect, p) for p in settings) if o not in settings]
     settings += [o for o in opposite if any(o[p.name] != p.neutral for p in effect.switching)]
     return [effect_values(problem, cause.name, p) for p in settings]

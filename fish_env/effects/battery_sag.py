@@ -31,6 +31,7 @@ EFFECT = Effect(
         ),
     ),
     hooks={"inputs": slow_down},
+    detunes=True,
     confusable_with=(
         "clock_scale",
         "frequency_scale",

@@ -115,6 +115,8 @@ class Effect:
         step_error: share of its effect that steps of 2.5 ms get wrong, and finer ones just after a
             command, for an effect that makes the tail's rate jump. Above zero, the identification
             takes such steps.
+        detunes: whether the tail runs ever further out of step with its command, so that what a
+            large size does says little of what a small one does.
         equals: baseline coefficients (paths) other values of which do exactly the same.
         confusable_with: names of effects with a similar signature.
         file: source file, for effects that users bring.
@@ -136,6 +138,7 @@ class Effect:
     measure: Callable[..., Any] | None = None
     time_scale: Callable[[Mapping[str, float]], float] | None = None
     step_error: float = 0.0
+    detunes: bool = False
     equals: tuple[str, ...] = ()
     confusable_with: tuple[str, ...] = ()
     file: Path | None = None

@@ -159,7 +159,7 @@ def test_a_probe_that_looks_elsewhere_finds_less():
     fit, screen, setting = prepared(turning, 2.0)
     (multiple,) = simulated(fit, screen, [setting])
     (change,) = changes(fit, [("extra", setting.probe(multiple))])
-    assert noncentrality(screen, "extra", change) == pytest.approx(needed(turning), rel=0.1)
+    assert noncentrality(screen, "extra", setting.freedom, change) == pytest.approx(needed(turning), rel=0.1)
     ideal = least_energy(turning, setting.size(multiple))
     assert ideal > 1.5 * needed(turning)
 

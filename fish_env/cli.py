@@ -7,6 +7,7 @@ functions that take the typer app.
 
 from __future__ import annotations
 
+import atexit
 import gc
 import warnings
 from importlib.metadata import entry_points
@@ -261,12 +262,10 @@ def main() -> None:
     """Runs `robofish`. An error that we raise on purpose is one red line, exit status 2."""
     with warnings.catch_warnings():
         warnings.showwarning = lambda message, *_: _complain("yellow", f"robofish: {message}")
-        try:
-            _run()
-        finally:
-            # On its way out the interpreter would look for garbage among all that the compiler
-            # made, which takes most of a second; it goes with the process.
-            gc.freeze()
+        # On its way out the interpreter would look for garbage among all that the compiler made,
+        # which takes most of a second; it goes with the process.
+        atexit.register(gc.freeze)
+        _run()
 
 
 def _run() -> None:

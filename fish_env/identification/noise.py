@@ -21,7 +21,8 @@ ORDER = 4
 WINDOW = 30
 QUANTILE = 0.15
 GAIN = 0.1
-"""The disturbance is found when a step gains no more log likelihood."""
+"""The disturbance is found when a step gains no more log likelihood, or e times as much of one of
+its numbers would not."""
 
 
 def white_noise_sd(dataset: Dataset, channel: str) -> float:
@@ -127,7 +128,7 @@ def fit_noise(
             np.clip(known, *bounds.T),
             method="L-BFGS-B",
             bounds=bounds,
-            options={"maxfun": effort, "eps": 1e-3, "ftol": GAIN / scale},
+            options={"maxfun": effort, "eps": 1e-4, "gtol": GAIN, "ftol": GAIN / scale},
         )
         return model(found.x, noise.sensor_sd)
 

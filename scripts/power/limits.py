@@ -51,8 +51,9 @@ def oracle(problem: Problem, truth: Truth) -> Any:
     filtered = objective(problem, free, vector, noise)[1]
     lines = linearise(problem, free, vector, noise, filtered)
     return SimpleNamespace(
-        problem=problem, point=point, noise=noise, filtered=filtered, linearised=lines, released=()
-    )
+        problem=problem, point=point, noise=noise, filtered=filtered, linearised=lines, released=(),
+        held=np.zeros((0, len(vector))),
+    )  # fmt: skip
 
 
 def limits(

@@ -159,7 +159,9 @@ def test_a_probe_that_looks_elsewhere_finds_less():
     fit, screen, setting = prepared(turning, 2.0)
     (multiple,) = simulated(fit, screen, [setting])
     (change,) = changes(fit, [("extra", setting.probe(multiple))])
-    assert noncentrality(screen, "extra", setting.freedom, change) == pytest.approx(needed(turning), rel=0.1)
+    assert noncentrality(screen, "extra", setting.freedom, change) == pytest.approx(
+        needed(turning), rel=0.1
+    )
     ideal = least_energy(turning, setting.size(multiple))
     assert ideal > 1.5 * needed(turning)
 
@@ -201,3 +203,23 @@ def test_settings_keep_the_shape_of_their_probe_and_turn_round_at_infinity():
     assert setting.size(0.25) == 16.0
     fit, _, _ = prepared(straight)
     assert effect_values(fit.problem, "extra", {}) == {PATH: 0.0}
+
+
+def test_a_setting_tested_alone_is_found_sooner_than_among_six():
+    """The best of both tests counts, each by what its degrees of freedom ask for."""
+    fit, _, setting = prepared(straight)
+    others = 3.0 * np.random.default_rng(5).standard_normal((SIZE, 5))
+    probes = ({"size": 1.0},) * 6
+    cause = Cause("extra", (probes, (probes[0],)))
+    columns = np.column_stack([setting.signal.left, others])
+    joint = Projector(fit).signal(cause, 0, columns)
+    (change,) = changes(fit, [("extra", {"size": 1.0})])
+    among, alone = (
+        noncentrality(Screen(signals, THRESHOLD, 0.05), "extra", 1, change)
+        for signals in ((joint,), (joint, setting.signal))
+    )
+    ratio = np.sqrt(alone / among)
+    assert 1.15 < ratio < 1.35
+    sizes = [in_proportion([Setting(s, 0, "size", 0.0)], THRESHOLD)[0]
+             for s in (joint, setting.signal)]  # fmt: skip
+    assert sizes[0] / sizes[1] == pytest.approx(ratio, rel=0.03)

@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from fish_env.diagnosis.causes import Cause, combined, finer, mirrored, of_visible, probes_of
+from fish_env.diagnosis.causes import (
+    Cause,
+    combined,
+    each_alone,
+    finer,
+    mirrored,
+    of_visible,
+    probes_of,
+)
 from fish_env.effects import catalogue
 from fish_env.model.effect import Effect, EffectParameter
 
@@ -144,3 +152,24 @@ def test_a_mirrored_probe_is_as_far_on_the_other_side_or_at_its_bound(name):
             else:
                 wanted = np.clip(2.0 * neutral - value, parameter.lower, parameter.upper)
                 assert other[parameter.name] == pytest.approx(wanted)
+
+
+def test_each_of_many_settings_is_tested_alone_too():
+    together = probes_of(catalogue()["added_mass"])
+    both = each_alone(together)
+    assert both[: len(together)] == together
+    assert [probe for (probe,) in both[len(together) :]] == list(together[0])
+    few = probes_of(catalogue()["current"])
+    assert each_alone(few) == few
+    assert each_alone(()) == ()
+
+
+@pytest.mark.parametrize("name", ["frequency_scale", "battery_sag"])
+def test_a_tail_that_runs_out_of_step_is_probed_within_a_beat(name):
+    """Its signal has to point where that of what can just be found does: a beat lasts 2 pi."""
+    (neutral,) = catalogue()[name].neutral.values()
+    (first,), (second,) = probes_of(catalogue()[name])[:2]
+    mildest, next_one = (value - neutral for (value,) in (first.values(), second.values()))
+    assert mildest == pytest.approx(next_one / 3.0)
+    beats = 2.0 * 30.0 * mildest * (1.0 if name == "frequency_scale" else 0.5 * 30.0)
+    assert 2.0 * np.pi * beats < 1.0

@@ -37,6 +37,20 @@ def test_the_search_climbs_to_the_largest_likelihood():
     np.testing.assert_array_equal(found.sensor_sd, start.sensor_sd)
 
 
+def test_where_nothing_is_to_be_gained_it_ends_soon():
+    asked = []
+
+    def flat_top(noise):
+        asked.append(noise)
+        x = np.log([noise.force_sd / 3e-3, noise.moment_sd / 1e-4, noise.correlation_s])
+        return -9000.0 - float(x @ x)
+
+    start = NoiseModel(np.array([0.001]), 3e-3, 1e-4, 1.0)
+    found = fit_noise(flat_top, start, WIDE, 80)
+    assert found.force_sd == pytest.approx(3e-3, rel=0.01)
+    assert len(asked) <= 20
+
+
 def test_sensor_noise_only_goes_down_from_its_bound():
     def wants(size):
         return lambda noise: -50.0 * float(np.log(noise.sensor_sd[0] / size) ** 2)

@@ -61,3 +61,14 @@ def test_a_sketch_comes_near_what_a_fit_finds(baseline):
     i = found.names.index(LAG)
     error = sketch.point.effects[LAG] - found.estimates[i]
     assert abs(error) < 2.0 * np.sqrt(found.covariance[i, i])
+
+
+def test_the_objective_that_comes_with_the_slopes_is_that_of_the_same_gains(baseline):
+    problem, free = baseline.problem, Free(baseline.problem, ["servo_lag"], ())
+    sketcher, tried = Sketcher(baseline), vectors(free, baseline)
+    alone = objectives_with_gains(problem, free, tried, baseline.noise, baseline.filtered)
+    with_slopes = [sketcher._surveyed(problem, free, vector)[0] for vector in tried]
+    np.testing.assert_allclose(with_slopes, alone, rtol=1e-9)
+    impossible = tried[0].copy()
+    impossible[problem.baseline.paths.index("mass.total")] = -1e4
+    assert np.isinf(sketcher._surveyed(problem, free, impossible)[0])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fish_env.data import CommandSteps
+from fish_env.diagnosis.effort import QUICK
 from fish_env.diagnosis.open_loop import errors
 from fish_env.identification.free import Free, linearise
 from fish_env.identification.problem import Point, Problem
@@ -61,6 +62,13 @@ def test_the_steps_get_less_wrong_than_the_sensors(dataset, effects):
 @pytest.mark.parametrize("effects", [LAG, LIMIT], ids=["lag", "rate limit"])
 def test_plain_steps_would_not_do(dataset, effects):
     assert off(dataset, effects, without_fine_steps) > 2.0 * off(dataset, effects)
+
+
+def test_the_longer_steps_of_a_first_look_will_do(dataset):
+    exact, coarse = Problem(dataset, dt=2e-4), Problem(dataset, dt=QUICK.step_s)
+    assert coarse.longest_step > 1.3 * Problem(dataset).longest_step
+    difference = predicted(coarse, {}) - predicted(exact, {})
+    assert np.nanmax(np.abs(difference / exact.sensor_sd)) < 1.0
 
 
 def gliding(dataset):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -36,7 +37,6 @@ SMOOTH = 2.0
 FADING = 1.5
 """One that grows by a smaller power has a part that does not fade with the size: an error of the
 simulation's step, or a limit on something that jumps."""
-POWER = 0.8
 ALIKE = 0.1
 REFITS = 2
 NEAR = 0.2
@@ -58,11 +58,6 @@ class Setting:
     index: int
     parameter: str
     neutral: float
-
-    @property
-    def freedom(self) -> int:
-        """Degrees of freedom of its test."""
-        return self.signal.freedom
 
     @property
     def effect(self) -> str:
@@ -171,7 +166,7 @@ def _energies(
     if which:
         jobs = [(settings[i].effect, settings[i].probe(multiples[i])) for i in which]
         for i, change in zip(which, changes(fit, jobs), strict=True):
-            energy[i] = noncentrality(screen, settings[i].effect, settings[i].freedom, change)
+            energy[i] = noncentrality(screen, settings[i], change)
     return energy
 
 
@@ -204,21 +199,17 @@ def changes(fit: Fit, jobs: Jobs) -> FloatArray:
     return seen
 
 
-def noncentrality(screen: Screen, effect: str, freedom: int, change: FloatArray) -> float:
+def noncentrality(screen: Screen, setting: Setting, change: FloatArray) -> float:
     """What a change (D,) of the residuals adds to the screen's tests of an effect, at its best.
 
-    In terms of a test of so many degrees of freedom: one of more has to see more for the same
+    In terms of the setting's own test: one of more degrees of freedom has to see more for the same
     power.
     """
-    found = 0.0
+    needed = partial(tails.noncentrality, screen.threshold, power=tails.POWER)
+    own, found = needed(setting.signal.freedom), 0.0
     for signal in screen.signals:
-        if signal.cause.name == effect:
+        if signal.cause.name == setting.effect:
             score = signal.left.T @ change
             energy = float(score @ np.linalg.solve(signal.projected, score)) / signal.inflation
-            found = max(found, energy * _needed(screen, freedom) / _needed(screen, signal.freedom))
+            found = max(found, energy * own / needed(signal.freedom))
     return found
-
-
-def _needed(screen: Screen, freedom: int) -> float:
-    """Noncentrality that takes a test over the screen's threshold with power 0.8."""
-    return tails.noncentrality(screen.threshold, freedom, POWER)

@@ -207,17 +207,16 @@ def _diagnose_runs(
     accepted = attribution.accepted.fit
     verdict = decide(attribution, left, shown)
     gain = None
-    if verdict.name in EXTENDING and final:
+    judging = Problem(dataset, fish, final, dt=effort.step_s) if final else None
+    if verdict.name in EXTENDING and judging is not None:
         progress("measuring the gain on final runs")
-        judging = Problem(dataset, fish, final, dt=effort.step_s)
         gain = measure_gain(judging, baseline, accepted, rng)
     residual = None
     if verdict.name == "outside_library" and effort.retries:
         progress("describing what is left")
         # Numbers that nobody believes would bend what is left.
         basis = baseline if implausible(accepted) else accepted
-        elsewhere = Problem(dataset, fish, final) if final else None
-        residual = residual_model(basis, left.threshold, elsewhere)
+        residual = residual_model(basis, left.threshold, judging)
     progress("locating the misfit")
     judged = one_step(problem, baseline, accepted)
     place = localise_fits(problem, judged, np.random.default_rng([seed, 3]))

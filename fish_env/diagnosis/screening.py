@@ -16,7 +16,7 @@ import numpy.typing as npt
 from scipy.special import chdtrc
 
 from fish_env.diagnosis.causes import Cause, Probe, best_of_each, effect_values, finer, of_visible
-from fish_env.diagnosis.tails import chi2_log_tail, noncentrality
+from fish_env.diagnosis.tails import POWER, chi2_log_tail, noncentrality
 from fish_env.effects.extended import PREFIX
 from fish_env.identification.estimator import Fit
 from fish_env.identification.information import (
@@ -354,7 +354,7 @@ def null_threshold(signals: Sequence[Signal], rng: np.random.Generator, level: f
 
 
 def smallest_detectable(
-    signal: Signal, setting: int, threshold: float, power: float = 0.8
+    signal: Signal, setting: int, threshold: float, power: float = POWER
 ) -> float:
     """Multiple of one probed setting that would be found with this power.
 

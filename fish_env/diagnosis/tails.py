@@ -14,6 +14,8 @@ FloatArray = npt.NDArray[np.float64]
 SMALL = -600.0
 """Logarithm of what scipy still has in full precision."""
 TERMS = 8
+POWER = 0.8
+"""Chance to be found of an effect of the smallest detectable size."""
 
 
 def chi2_log_tail(statistic: npt.ArrayLike, freedom: npt.ArrayLike) -> FloatArray:

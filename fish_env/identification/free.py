@@ -216,7 +216,12 @@ def objectives_with_gains(
     columns = np.column_stack(vectors)
     effects = {f.path: columns[free.count + i] for i, f in enumerate(free.freedoms)}
     innovations = problem.innovations(columns[: free.count], effects, noise, filtered)
-    values = np.einsum("nd,nd->n", innovations, innovations) + free.prior @ (columns * columns)
-    possible = [problem.baseline.possible(vector[: free.count]) for vector in vectors]
-    kept = zip(possible, values.tolist(), strict=True)
-    return [value if able and np.isfinite(value) else np.inf for able, value in kept]
+    pairs = zip(vectors, innovations, strict=True)
+    return [objective_of(problem, free, vector, residuals) for vector, residuals in pairs]
+
+
+def objective_of(problem: Problem, free: Free, vector: FloatArray, residuals: FloatArray) -> float:
+    """The same of a vector whose whitened residuals (D,) are known."""
+    value = float(residuals @ residuals + free.prior @ (vector * vector))
+    able = np.isfinite(value) and problem.baseline.possible(vector[: free.count])
+    return value if able else np.inf

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from fish_env.identification.descent import descend
 from fish_env.identification.estimator import Fit, quadratic
-from fish_env.identification.free import Free, linearise, objectives_with_gains
+from fish_env.identification.free import Free, linearise, objective_of, objectives_with_gains
 from fish_env.identification.phases import settle_phases
 from fish_env.identification.problem import Point, Problem
 
@@ -104,9 +104,7 @@ class Sketcher:
         A whole step is hardly ever refused, and the slopes' lanes hold the objective's.
         """
         lin = linearise(problem, free, vector, self.fit.noise, self.filtered)
-        value = float(lin.residuals @ lin.residuals + free.prior @ (vector * vector))
-        able = np.isfinite(value) and problem.baseline.possible(vector[: free.count])
-        return (value if able else np.inf), quadratic(free, vector, lin)
+        return objective_of(problem, free, vector, lin.residuals), quadratic(free, vector, lin)
 
     def _objectives(
         self, problem: Problem, free: Free, vectors: Sequence[FloatArray]

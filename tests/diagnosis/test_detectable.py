@@ -159,9 +159,7 @@ def test_a_probe_that_looks_elsewhere_finds_less():
     fit, screen, setting = prepared(turning, 2.0)
     (multiple,) = simulated(fit, screen, [setting])
     (change,) = changes(fit, [("extra", setting.probe(multiple))])
-    assert noncentrality(screen, "extra", setting.freedom, change) == pytest.approx(
-        needed(turning), rel=0.1
-    )
+    assert noncentrality(screen, setting, change) == pytest.approx(needed(turning), rel=0.1)
     ideal = least_energy(turning, setting.size(multiple))
     assert ideal > 1.5 * needed(turning)
 
@@ -215,7 +213,7 @@ def test_a_setting_tested_alone_is_found_sooner_than_among_six():
     joint = Projector(fit).signal(cause, 0, columns)
     (change,) = changes(fit, [("extra", {"size": 1.0})])
     among, alone = (
-        noncentrality(Screen(signals, THRESHOLD, 0.05), "extra", 1, change)
+        noncentrality(Screen(signals, THRESHOLD, 0.05), setting, change)
         for signals in ((joint,), (joint, setting.signal))
     )
     ratio = np.sqrt(alone / among)

@@ -27,7 +27,7 @@ from fish_env.diagnosis.causes import (
 from fish_env.diagnosis.steady.fitting import SteadyFit, lines
 from fish_env.diagnosis.steady.orbit import coordinates
 from fish_env.diagnosis.steady.problem import SteadyProblem
-from fish_env.diagnosis.tails import chi2_log_tail, noncentrality
+from fish_env.diagnosis.tails import POWER, chi2_log_tail, noncentrality
 from fish_env.effects.extended import PREFIX
 from fish_env.identification.problem import Point
 from fish_env.model.effect import Effect
@@ -36,7 +36,6 @@ FloatArray = npt.NDArray[np.float64]
 DRAWS = 4000
 LEVEL = 0.02
 """Share of tables without an effect in which some cause passes the threshold."""
-POWER = 0.8
 LEAST_INFORMATION = 1e-3
 """A probe whose projected signal is smaller than this many noise standard deviations squared
 cannot be told from rounding."""

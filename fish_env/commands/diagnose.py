@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from pathlib import Path
 from typing import Any
 
@@ -39,6 +40,7 @@ def diagnose_dataset(
     Raises:
         RoboticFishError: The data or the fish cannot be used.
     """
+    gc.freeze()  # what is loaded by now stays; no need to look there for garbage again and again
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as progress:
         task = progress.add_task("reading", total=None)

@@ -8,15 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
 from fish_env.diagnosis.causes import Cause
-from fish_env.diagnosis.screening import LANES_AT_ONCE, Projector, Signal
+from fish_env.diagnosis.screening import SETTINGS_AT_ONCE, Projector, Signal
 from fish_env.identification.estimator import Fit
 from fish_env.identification.filtering import Filtered, Pushes
 from fish_env.identification.runs import RunData
+from fish_env.identification.side_by_side import side_by_side
 from fish_env.sensing.channels import channels_from_states
 
 FloatArray = npt.NDArray[np.float64]
@@ -83,23 +85,28 @@ def probes(columns: npt.NDArray[np.int64]) -> FloatArray:
 
 def changes(fit: Fit, forces: GenericForces, columns: npt.NDArray[np.int64]) -> FloatArray:
     """How :func:`probes` of some wrenches change the residuals of a fit (D, N)."""
-    z = np.repeat(fit.point.z[:, None], len(columns), axis=1)
-    effects = {path: np.full(len(columns), value) for path, value in fit.point.effects.items()}
-    pushes = Pushes(forces.bases, columns, probes(columns))
-    out = fit.problem.innovations(z, effects, fit.noise, fit.filtered, pushes)
-    return np.asarray((out - fit.linearised.residuals).T)
+    count = 1 + len(columns)  # the first is pushed by nothing
+    z = np.repeat(fit.point.z[:, None], count, axis=1)
+    effects = {path: np.full(count, value) for path, value in fit.point.effects.items()}
+    pushes = Pushes(forces.bases, np.r_[0, columns], np.r_[0.0, probes(columns)])
+    problem = fit.problem.with_long_steps()
+    out = problem.innovations(z, effects, fit.noise, fit.filtered, pushes)
+    return np.asarray((out[1:] - out[0]).T)
 
 
 def generic_signals(
     fit: Fit, forces: GenericForces, projector: Projector
 ) -> Iterator[tuple[int, Signal]]:
     """Each wrench by its column, as a cause that a refit follows as far as it can."""
-    for first in range(0, len(forces.columns), LANES_AT_ONCE):
-        part = forces.columns[first : first + LANES_AT_ONCE]
-        for column, change in zip(part, changes(fit, forces, part).T, strict=True):
-            signal = projector.signal(NOTHING, 0, change[:, None], strain=False)
+    for first in range(0, len(forces.columns), SETTINGS_AT_ONCE):
+        part = forces.columns[first : first + SETTINGS_AT_ONCE]
+        tasks = [
+            partial(projector.signal, NOTHING, 0, change[:, None], strain=False)
+            for change in changes(fit, forces, part).T
+        ]
+        for column, signal in zip(part.tolist(), side_by_side(tasks), strict=True):
             if signal is not None:
-                yield int(column), signal
+                yield column, signal
 
 
 def regressors(run: RunData, filtered: Filtered) -> dict[str, FloatArray]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import numpy.typing as npt
@@ -28,11 +28,15 @@ from fish_env.identification.information import (
     prior_precision,
     sums_over,
 )
+from fish_env.identification.problem import Problem
 from fish_env.identification.products import inner
+from fish_env.identification.side_by_side import side_by_side
 
 FloatArray = npt.NDArray[np.float64]
 DRAWS = 4000
 LANES_AT_ONCE = 96
+SETTINGS_AT_ONCE = LANES_AT_ONCE - 1
+"""One lane is that of the fit itself."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,14 +251,16 @@ def _effect_signals(fit: Fit, projector: Projector, causes: Sequence[Cause]) -> 
     ]
     start = np.repeat(fit.point.z[:, None], len(jobs), axis=1)
     columns = residual_changes(fit, [(cause.name, probe) for cause, _, probe in jobs], start)
-    signals = []
-    names = [(cause.name, index) for cause, index, _ in jobs]
-    for key in dict.fromkeys(names):
-        chosen = [i for i, name in enumerate(names) if name == key]
-        signal = of_visible(projector.signal, jobs[chosen[0]][0], key[1], columns[:, chosen])
-        if signal is not None:
-            signals.append(signal)
-    return signals
+    alternatives: dict[tuple[str, int], list[int]] = {}
+    for i, (cause, index, _) in enumerate(jobs):
+        alternatives.setdefault((cause.name, index), []).append(i)
+
+    def projected(chosen: list[int]) -> Signal | None:
+        cause, index, _ = jobs[chosen[0]]
+        return of_visible(projector.signal, cause, index, columns[:, chosen])
+
+    found = side_by_side(partial(projected, chosen) for chosen in alternatives.values())
+    return [signal for signal in found if signal is not None]
 
 
 def residual_changes(fit: Fit, jobs: Sequence[tuple[str, Probe]], z: FloatArray) -> FloatArray:
@@ -265,12 +271,13 @@ def residual_changes(fit: Fit, jobs: Sequence[tuple[str, Probe]], z: FloatArray)
         jobs: effect and setting, n of them.
         z: (coefficients, n) where to simulate each.
     """
-    columns = np.empty((len(fit.linearised.residuals), len(jobs)))
+    rows = np.empty((len(jobs), len(fit.linearised.residuals)))
+    problem = fit.problem.with_long_steps()
     for alike in _kinds(fit, jobs):
-        for first in range(0, len(alike), LANES_AT_ONCE):
-            part = alike[first : first + LANES_AT_ONCE]
-            columns[:, part] = _changes_at_once(fit, [jobs[i] for i in part], z[:, part])
-    return columns
+        for first in range(0, len(alike), SETTINGS_AT_ONCE):
+            part = alike[first : first + SETTINGS_AT_ONCE]
+            rows[part] = _changes_at_once(fit, problem, [jobs[i] for i in part], z[:, part])
+    return rows.T
 
 
 def _kinds(fit: Fit, jobs: Sequence[tuple[str, Probe]]) -> list[list[int]]:
@@ -278,7 +285,7 @@ def _kinds(fit: Fit, jobs: Sequence[tuple[str, Probe]]) -> list[list[int]]:
 
     A few jobs stay together: kernels take whole blocks of lanes, however few are filled.
     """
-    if len(jobs) <= LANES_AT_ONCE:
+    if len(jobs) <= SETTINGS_AT_ONCE:
         return [list(range(len(jobs)))]
     kinds: dict[frozenset[str], list[int]] = {}
     for i, (name, _) in enumerate(jobs):
@@ -287,13 +294,15 @@ def _kinds(fit: Fit, jobs: Sequence[tuple[str, Probe]]) -> list[list[int]]:
     return list(kinds.values())
 
 
-def _changes_at_once(fit: Fit, jobs: Sequence[tuple[str, Probe]], z: FloatArray) -> FloatArray:
-    problem = fit.problem
+def _changes_at_once(
+    fit: Fit, problem: Problem, jobs: Sequence[tuple[str, Probe]], z: FloatArray
+) -> FloatArray:
     base = {**problem.neutral(dict.fromkeys(name for name, _ in jobs)), **fit.point.effects}
-    values = [effect_values(problem, name, probe) for name, probe in jobs]
+    values = [base, *(effect_values(problem, name, probe) for name, probe in jobs)]
     lanes = {path: np.array([own.get(path, base[path]) for own in values]) for path in base}
-    out = problem.innovations(z, lanes, fit.noise, fit.filtered)
-    return np.asarray((out - fit.linearised.residuals).T)
+    start = np.column_stack([fit.point.z, z])
+    out = problem.innovations(start, lanes, fit.noise, fit.filtered)
+    return np.asarray(out[1:] - out[0])
 
 
 def _coefficient_signals(projector: Projector, causes: Sequence[Cause], fit: Fit) -> list[Signal]:

@@ -108,6 +108,7 @@ class Problem:
         dt: float = 0.01,
     ) -> None:
         self.dataset = dataset
+        self.dt = dt
         self.fish = fish or load_fish(dataset.fish)
         self.known = {**catalogue(), **{e.name: e for e in user_effects}}
         own = tuple(effect for effect in self.known.values() if effect.name not in catalogue())
@@ -201,7 +202,7 @@ class Problem:
 
     def freedoms(self, names: Iterable[str]) -> tuple[EffectFreedom, ...]:
         """Free parameters of effects."""
-        step = self.longest_step
+        step = min(self.dt, self.longest_step)
         return tuple(f for name in names for f in freedoms(self.known[name], step))
 
     def innovations(
@@ -239,6 +240,10 @@ class Problem:
         other = copy(self)
         other.plain_steps = True
         return other
+
+    def with_long_steps(self) -> Problem:
+        """The same problem in steps that will do to compare causes, with the same freedoms."""
+        return self.with_runs([run.in_long_steps() for run in self.runs])
 
     def has_corners(self, effects: Iterable[str]) -> bool:
         """Whether one of these effect parameters makes the tail's rate jump."""

@@ -47,6 +47,10 @@ JUMPS = {
 with every sample, leave plain steps wrong by less than a fifth of usual sensor noise."""
 FINER = 4
 """How many times finer those are than the others."""
+LONG_STEP_S = 0.02
+"""Longest step where causes are only compared: what most of them change comes out the same within
+a thousandth, what the quickest lags change within a tenth, and within a quarter where the tail's
+rate jumps. Twice as long, a lag that the usual steps follow diverges."""
 CORNER_STEP_S = 0.0025
 CORNER_FINE_STEP_S = 0.000625
 """Usual and fine steps where the tail's rate may jump at any time; just after a switch of the
@@ -101,6 +105,11 @@ class RunData:
         """(T,) steps for motion with corners: finer everywhere, and most where they are fine."""
         corner = _steps(self.clock, np.where(self.fresh, CORNER_FINE_STEP_S, CORNER_STEP_S))
         return np.maximum(self.substeps, corner)
+
+    def in_long_steps(self) -> RunData:
+        """The same run, simulated no finer than a comparison needs."""
+        longest = np.where(self.fresh, LONG_STEP_S / FINER, LONG_STEP_S)
+        return replace(self, substeps=np.minimum(self.substeps, _steps(self.clock, longest)))
 
     @property
     def commands(self) -> tuple[FloatArray, FloatArray]:

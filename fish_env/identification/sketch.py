@@ -52,9 +52,10 @@ class Sketcher:
 
     def __init__(self, fit: Fit, runs: int = 2) -> None:
         self.fit = fit
-        problem, chosen = fit.problem, fit.problem.spread(runs)
+        # Steps that are good enough to see who leads, and much quicker.
+        problem, chosen = fit.problem.with_long_steps(), fit.problem.spread(runs)
         if not problem.has_corners(fit.point.effects):
-            problem = problem.with_plain_steps()  # good enough to see who leads, and much quicker
+            problem = problem.with_plain_steps()
         self.few: Problem = problem.with_runs([problem.runs[i] for i in chosen])
         self.filtered = [fit.filtered[i] for i in chosen]
 

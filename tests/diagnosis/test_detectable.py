@@ -60,6 +60,9 @@ class Bending:
     def freedoms(self, names) -> tuple:
         return ()
 
+    def with_long_steps(self) -> "Bending":
+        return self
+
     def innovations(self, z, lanes, noise, filtered) -> np.ndarray:
         return np.array([self.change(*pair) for pair in zip(z.T, lanes[PATH], strict=True)])
 

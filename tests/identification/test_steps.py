@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fish_env.data import CommandSteps
+from fish_env.diagnosis.causes import causes_of, effect_values
 from fish_env.diagnosis.effort import QUICK
 from fish_env.diagnosis.open_loop import errors
 from fish_env.identification.free import Free, linearise
@@ -69,6 +70,63 @@ def test_the_longer_steps_of_a_first_look_will_do(dataset):
     assert coarse.longest_step > 1.3 * Problem(dataset).longest_step
     difference = predicted(coarse, {}) - predicted(exact, {})
     assert np.nanmax(np.abs(difference / exact.sensor_sd)) < 1.0
+
+
+def told(problem, filtered, settings):
+    """What settings of effects change in the whitened innovations (n, D)."""
+    noise, count = noise_of(problem), len(problem.baseline)
+    rows = []
+    for name, setting in settings:
+        neutral = problem.neutral([name])
+        values = {**neutral, **effect_values(problem, name, setting)}
+        lanes = {path: np.array([neutral[path], values[path]]) for path in neutral}
+        before, after = problem.innovations(np.zeros((count, 2)), lanes, noise, filtered)
+        rows.append(after - before)
+    return np.array(rows)
+
+
+def unlikeness_in_long_steps(dataset):
+    """Effect -> largest error of what it changes, as a share, for steps to compare causes with."""
+    problem, exact = Problem(dataset), Problem(dataset, dt=1e-3)
+    filtered = problem.filtered(problem.start, noise_of(problem))
+    settings = [
+        (cause.name, setting)
+        for cause in causes_of(problem) if cause.is_effect
+        for alternative in cause.probes for setting in alternative
+    ]  # fmt: skip
+    long, fine = (told(p, filtered, settings) for p in (problem.with_long_steps(), exact))
+    visible = np.linalg.norm(fine, axis=1)
+    shares = np.linalg.norm(long - fine, axis=1) / np.maximum(visible, 1e-9)
+    worst = {}
+    for (name, _), share, size in zip(settings, shares, visible, strict=True):
+        if size > 0.1:  # of a sensor's noise, all samples together
+            worst[name] = max(worst.get(name, 0.0), float(share))
+    return problem, worst
+
+
+def test_causes_look_the_same_in_long_steps(dataset):
+    problem, worst = unlikeness_in_long_steps(dataset)
+    cornered = {name for name in worst if problem.known[name].step_error > 0.0}
+    assert len(worst) > 20
+    assert len(cornered) >= 2
+    smooth = [worst[name] for name in worst if name not in cornered]
+    assert np.median(smooth) < 1e-3
+    assert max(smooth) < 0.1
+    assert max(worst[name] for name in cornered) < 0.25
+
+
+def test_still_longer_steps_would_not_do(dataset, monkeypatch):
+    monkeypatch.setattr("fish_env.identification.runs.LONG_STEP_S", 0.04)
+    assert not max(unlikeness_in_long_steps(dataset)[1].values()) < 1.0
+
+
+def test_long_steps_are_those_of_the_usual_freedoms_and_never_finer(dataset):
+    usual, coarse = Problem(dataset), Problem(dataset, dt=0.04)
+    long = usual.with_long_steps()
+    assert long.longest_step == pytest.approx(2.0 * usual.longest_step)
+    assert long.freedoms(["servo_lag"]) == usual.freedoms(["servo_lag"])
+    pairs = zip(coarse.with_long_steps().runs, coarse.runs, strict=True)
+    assert all((a.substeps <= b.substeps).all() for a, b in pairs)
 
 
 def gliding(dataset):

@@ -71,8 +71,8 @@ def _saved(figure: Figure, album: Album, name: str) -> Path:
     vector = album.folder / f"{name}.svg"
     figure.savefig(vector)
     if album.bitmaps:
-        # What was laid out stays; finding it again takes as long as drawing.
-        figure.set_layout_engine("none")
+        # What was laid out stays. With an engine, even one that does nothing, it is drawn twice.
+        figure.set_layout_engine(None)
         figure.savefig(vector.with_suffix(".png"), dpi=DOTS_PER_INCH)
     return vector
 

@@ -134,9 +134,10 @@ def extended(
         for name in current.causes if chosen and effort.retries else ():
             # What looks like an accepted cause may be in its numbers, and shows no more.
             chosen += _like(name, screens[-1], chosen, problem)
+        hiding = _detuning(current, screens[-1], chosen)
         loose = _with_wandering_phase(current, chosen, causes, rng) if effort.retries else None
-        like = partial(_like, before=screens[-1], chosen=chosen, problem=problem)
-        tried, base = refits(current, chosen, report, loose, effort, like)
+        like = partial(_like, before=screens[-1], chosen=[*chosen, *hiding], problem=problem)
+        tried, base = refits(current, [*chosen, *hiding], report, loose, effort, like)
         if base is None:
             break
         if not ranking:
@@ -242,6 +243,18 @@ def _with_wandering_phase(
     effects = sorted((s for s in shown.best() if s.cause.is_effect), key=lambda s: -s.unwidened)
     first = [s for s in effects[:MOST_LOOSE] if s.unwidened > WORTH_A_SKETCH]
     return loose, first + [s for s in effects if s.cause.name in OUT_OF_STEP and s not in first]
+
+
+def _detuning(current: Explanation, screen: Screen, chosen: Sequence[Signal]) -> list[Signal]:
+    """Effects that detune the tail, where no plausible disturbance is left.
+
+    After many beats out of step the screen shows them no more than it shows others.
+    """
+    if current.causes or not chosen or not strains(current.fit):
+        return []
+    known = current.fit.problem.known
+    effects = [s for s in screen.best() if s.cause.is_effect and s not in chosen]
+    return [s for s in effects if known[s.cause.name].detunes]
 
 
 def _new(after: Screen, chosen: Sequence[Signal]) -> list[Signal]:

@@ -23,6 +23,7 @@ MOST_FREQUENCIES = 96
 QUARTER = (0.0, np.pi / 2)
 MANY = 4
 """Settings that are also tested one by one."""
+MOST_TEETH = 96
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Sizes tried between small and large."""
 
@@ -227,9 +228,10 @@ def combined(
     phase = phase_of(effect)
     if phase:
         (amplitude,) = (p.name for p in effect.switching)
-        sine, cosine = (n * setting[amplitude] for n, setting in zip(size, settings, strict=True))
-        angle = float(np.arctan2(cosine, sine))
-        return {**settings[0], amplitude: float(np.hypot(sine, cosine)), phase: angle}
+        # One of sine and cosine may be left out: a planar record may hold nothing of it.
+        pairs = zip(size, settings, strict=True)
+        whole = sum(n * setting[amplitude] * np.exp(1j * setting[phase]) for n, setting in pairs)
+        return {**settings[0], amplitude: float(np.abs(whole)), phase: float(np.angle(whole))}
     values = {**start, **{p.name: settings[0][p.name] for p in effect.parameters if p.shapes}}
     for factor, setting in zip(size, settings, strict=True):
         for name in (p.name for p in effect.switching):
@@ -247,6 +249,25 @@ def mirrored(effect: Effect, probe: Probe) -> Probe:
         if np.isfinite(p.neutral):
             other[p.name] = float(np.clip(2.0 * p.neutral - probe[p.name], p.lower, p.upper))
     return other
+
+
+def comb(effect: Effect, beats: float) -> tuple[Probe, ...]:
+    """Sizes of an effect that detunes the tail, on both sides of neutral; none of any other.
+
+    So close that with one of them no beat of a run is more than a small part of a cycle out of
+    step, or nearly none: from further away no slope leads to the right one.
+
+    Args:
+        effect: the effect.
+        beats: of the run that has most.
+    """
+    if not effect.detunes or len(effect.switching) != 1:
+        return ()
+    (size,) = effect.switching
+    reach = max(abs(end - size.neutral) for end in size.plausible)
+    low, high = max(size.neutral - reach, size.lower), min(size.neutral + reach, size.upper)
+    count = 2 * int(np.clip(0.5 * beats, 2, MOST_TEETH // 2))  # none of them neutral
+    return tuple({size.name: float(value)} for value in np.linspace(low, high, count))
 
 
 def finer(effect: Effect, probe: Probe, length: float) -> tuple[tuple[Probe, ...], ...]:

@@ -10,9 +10,9 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from fish_env.diagnosis.causes import combined, effect_values, mirrored
 from fish_env.diagnosis.effort import FULL, Effort
-from fish_env.diagnosis.screening import Signal, zoomed
+from fish_env.diagnosis.screening import Signal
+from fish_env.diagnosis.starts import baselines, probed, starts
 from fish_env.effects.extended import PREFIX
 from fish_env.identification.estimator import Fit, fit
 from fish_env.identification.filtering import NoiseModel
@@ -27,8 +27,6 @@ Report = Callable[[str], None]
 T = TypeVar("T")
 WANDER = 0.3
 """rad/s^0.5. Enough to stay in step with a beat that is a tenth off."""
-FAR = 2.0
-"""A baseline coefficient this many prior deviations off may be so to make up for a cause."""
 BEHIND = 0.25
 """A sketch that gains less by more than this share of the best one's gain is not fitted in full."""
 LEEWAY = 100.0
@@ -228,8 +226,8 @@ def _exchange(sketcher: Sketcher, own: Fit, name: str, signal: Signal) -> Sketch
     """
     kept = {p: v for p, v in own.point.effects.items() if p.split(".")[1] != name}
     effects = tuple(signal.cause.name if e == name else e for e in own.effects)
-    sizes = _probed(own.problem, signal, every=True)
-    begin = [Point(z, {**kept, **values}) for z in _baselines(own) for values in sizes]
+    sizes = probed(own.problem, signal, every=True)
+    begin = [Point(z, {**kept, **values}) for z in baselines(own) for values in sizes]
     sketches = [reached(partial(sketcher.sketch, effects, own.released, begin))]
     if sketches[0] is None or _off(own.problem, sketches[0].point, signal.cause.name):
         sketches += [reached(partial(sketcher.sketch, effects, own.released, [b])) for b in begin]
@@ -279,55 +277,6 @@ def _off(problem: Problem, point: Point, name: str) -> bool:
     """Whether an effect does nothing at a point."""
     switching = problem.known[name].switching
     return all(point.effects[f"{PREFIX}{name}.{p.name}"] == p.neutral for p in switching)
-
-
-def starts(base: Fit, signal: Signal, z: FloatArray | None = None) -> list[Point]:
-    """Where to begin: the linear estimate and every probe, with baselines near and far.
-
-    With ``z`` given, that is the only baseline.
-    """
-    problem, cause = base.problem, signal.cause
-    if not cause.is_effect:
-        return [base.point]
-    signal = zoomed(base, signal)
-    size = np.linalg.solve(signal.projected, signal.score)
-    settings = signal.cause.probes[signal.probe]
-    start = {p.rsplit(".", 1)[1]: v for p, v in problem.neutral([cause.name]).items()}
-    estimate = combined(problem.known[cause.name], settings, size.tolist(), start)
-    linear = effect_values(problem, cause.name, estimate)
-    bounds = {f.path: (f.lower, f.upper) for f in problem.freedoms([cause.name])}
-    clipped = [
-        {path: float(np.clip(value, *bounds[path])) for path, value in values.items()}
-        for values in (linear, *_probed(problem, signal))
-    ]
-    baselines = _baselines(base) if z is None else (z,)
-    return [Point(z, {**base.point.effects, **values}) for z in baselines for values in clipped]
-
-
-def _baselines(base: Fit) -> tuple[FloatArray, ...]:
-    """Coefficients to begin from.
-
-    Those refitted without a cause may have gone far to make up for it, so the nominal ones are a
-    start of their own.
-    """
-    far = np.abs(base.point.z).max() > FAR
-    return (base.point.z, np.zeros_like(base.point.z)) if far else (base.point.z,)
-
-
-def _probed(problem: Problem, signal: Signal, every: bool = False) -> list[dict[str, float]]:
-    """Settings to begin from: of the best shape at every size, or of every alternative.
-
-    On either side of neutral where there are two: of a strong effect no linear estimate tells the
-    sign. Never from neutral itself, where many an effect begins too flat to be left again.
-    """
-    cause, effect = signal.cause, problem.known[signal.cause.name]
-    shaped = len(effect.switching) < len(effect.parameters)
-    alternatives = (cause.probes[signal.probe],) if shaped and not every else cause.probes
-    every_one = [p for probes in alternatives for p in probes]
-    settings = [p for i, p in enumerate(every_one) if p not in every_one[:i]]
-    opposite = [o for o in (mirrored(effect, p) for p in settings) if o not in settings]
-    settings += [o for o in opposite if any(o[p.name] != p.neutral for p in effect.switching)]
-    return [effect_values(problem, cause.name, p) for p in settings]
 
 
 def _finalists(

@@ -117,6 +117,13 @@ class RunData:
         first = int(self.command_times[0] <= -0.5 * BEFORE_S)
         return self.command_times[first:], self.command_values[first:]
 
+    @property
+    def beats(self) -> float:
+        """How often the tail beats, as commanded."""
+        times, values = self.commands
+        spans = np.diff(np.clip([*times, self.duration], 0.0, self.duration))
+        return float(spans @ values[:, FREQUENCY])
+
     def until(self, end_s: float) -> RunData:
         """The beginning of the run, at least two samples of it."""
         return self.cut(0, max(2, int(np.searchsorted(self.clock, end_s, side="right"))))

@@ -71,6 +71,19 @@ def test_sine_and_cosine_together_are_the_wave():
     np.testing.assert_allclose(both["amplitude"] * np.sin(turn + both["phase"]), parts, atol=1e-12)
 
 
+@pytest.mark.parametrize("seen", [0, 1], ids=["sine", "cosine"])
+def test_half_a_wave_is_a_wave(seen):
+    """The other half may change nothing of what is measured, and is then left out."""
+    effect = catalogue()["wave"]
+    setting = probes_of(effect, length=10.0)[0][seen]
+    half = combined(effect, (setting,), (-3.0,), effect.neutral)
+    both = [0.0, 0.0]
+    both[seen] = -3.0
+    whole = combined(effect, probes_of(effect, length=10.0)[0], both, effect.neutral)
+    assert half == pytest.approx(whole)
+    assert half["amplitude"] == pytest.approx(3.0 * setting["amplitude"])
+
+
 def test_an_oscillation_is_looked_at_more_closely_and_nothing_else_is():
     effect = catalogue()["wave"]
     coarse = sorted({a[0]["frequency"] for a in probes_of(effect, length=30.0)})

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from fish_env.diagnosis.causes import Cause, causes_of
-from fish_env.diagnosis.search import _probed, _sketches
+from fish_env.diagnosis.search import _sketches
+from fish_env.diagnosis.starts import probed
 from fish_env.effects import catalogue
 from fish_env.identification import Problem
 from fish_env.identification.problem import Point
@@ -21,16 +22,16 @@ GAIN, DEPTH = "effects.surface_drag.gain", "effects.surface_drag.depth"
 @pytest.mark.parametrize("name", sorted(CAUSES))
 def test_no_sketch_begins_where_the_effect_is_off(name):
     switches = [p for p in catalogue()[name].parameters if not p.shapes]
-    begun = _probed(PROBLEM, SimpleNamespace(cause=CAUSES[name], probe=0))
+    begun = probed(PROBLEM, SimpleNamespace(cause=CAUSES[name], probe=0))
     for values in begun:
         assert any(values[f"effects.{name}.{p.name}"] != p.neutral for p in switches)
 
 
 def test_a_clock_that_may_be_fast_or_slow_is_tried_both_ways():
-    begun = _probed(PROBLEM, SimpleNamespace(cause=CAUSES["clock_scale"], probe=0))
+    begun = probed(PROBLEM, SimpleNamespace(cause=CAUSES["clock_scale"], probe=0))
     scales = [values["effects.clock_scale.scale"] for values in begun]
     assert min(scales) < 1.0 < max(scales)
-    late = _probed(PROBLEM, SimpleNamespace(cause=CAUSES["servo_lag"], probe=0))
+    late = probed(PROBLEM, SimpleNamespace(cause=CAUSES["servo_lag"], probe=0))
     assert all(values["effects.servo_lag.time_constant"] > 0.0 for values in late)
 
 

@@ -89,8 +89,7 @@ def changes(fit: Fit, forces: GenericForces, columns: npt.NDArray[np.int64]) -> 
     z = np.repeat(fit.point.z[:, None], count, axis=1)
     effects = {path: np.full(count, value) for path, value in fit.point.effects.items()}
     pushes = Pushes(forces.bases, np.r_[0, columns], np.r_[0.0, probes(columns)])
-    problem = fit.problem.with_long_steps()
-    out = problem.innovations(z, effects, fit.noise, fit.filtered, pushes)
+    out = fit.comparing.innovations(z, effects, fit.noise, fit.filtered, pushes)
     return np.asarray((out[1:] - out[0]).T)
 
 

@@ -272,12 +272,25 @@ def residual_changes(fit: Fit, jobs: Sequence[tuple[str, Probe]], z: FloatArray)
         z: (coefficients, n) where to simulate each.
     """
     rows = np.empty((len(jobs), len(fit.linearised.residuals)))
-    problem = fit.problem.with_long_steps()
-    for alike in _kinds(fit, jobs):
-        for first in range(0, len(alike), SETTINGS_AT_ONCE):
-            part = alike[first : first + SETTINGS_AT_ONCE]
-            rows[part] = _changes_at_once(fit, problem, [jobs[i] for i in part], z[:, part])
+    _fill(rows, fit, fit.comparing, jobs, z, _kinds(fit, jobs))
+    diverged = np.flatnonzero(~np.isfinite(rows).all(axis=1)).tolist()
+    if diverged and fit.comparing is not fit.problem:
+        _fill(rows, fit, fit.problem, jobs, z, [diverged])
     return rows.T
+
+
+def _fill(
+    rows: FloatArray,
+    fit: Fit,
+    problem: Problem,
+    jobs: Sequence[tuple[str, Probe]],
+    z: FloatArray,
+    kinds: Sequence[Sequence[int]],
+) -> None:
+    for alike in kinds:
+        for first in range(0, len(alike), SETTINGS_AT_ONCE):
+            part = list(alike[first : first + SETTINGS_AT_ONCE])
+            rows[part] = _changes_at_once(fit, problem, [jobs[i] for i in part], z[:, part])
 
 
 def _kinds(fit: Fit, jobs: Sequence[tuple[str, Probe]]) -> list[list[int]]:

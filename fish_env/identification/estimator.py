@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,8 @@ from fish_env.identification.phases import settle_phases
 from fish_env.identification.problem import Point, Problem
 
 FloatArray = npt.NDArray[np.float64]
+SAME = 0.01
+"""Root mean square of the difference between whitened residuals below which they are the same."""
 MORE = 3
 RESTING = 0.25
 """A fit rests when no combination of parameters would move by the root of this, in deviations."""
@@ -62,6 +64,18 @@ class Fit:
     condition: float
     filtered: Sequence[Filtered] = field(repr=False)
     linearised: Linearised = field(repr=False)
+
+    @cached_property
+    def comparing(self) -> Problem:
+        """The problem to compare causes with: in long steps, where this fit looks the same in them.
+
+        A fish that turns more quickly, or coefficients far off, may need the usual ones.
+        """
+        long = self.problem.with_long_steps()
+        effects = {path: np.array([value]) for path, value in self.point.effects.items()}
+        (seen,) = long.innovations(self.point.z[:, None], effects, self.noise, self.filtered)
+        off = np.sqrt(np.mean((seen - self.linearised.residuals) ** 2))
+        return long if off < SAME else self.problem
 
     def interval(self, name: str, level: float = 0.95) -> tuple[float, float]:
         """Normal interval of one parameter."""

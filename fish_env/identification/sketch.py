@@ -53,7 +53,7 @@ class Sketcher:
     def __init__(self, fit: Fit, runs: int = 2) -> None:
         self.fit = fit
         # Steps that are good enough to see who leads, and much quicker.
-        problem, chosen = fit.problem.with_long_steps(), fit.problem.spread(runs)
+        problem, chosen = fit.comparing, fit.problem.spread(runs)
         if not problem.has_corners(fit.point.effects):
             problem = problem.with_plain_steps()
         self.few: Problem = problem.with_runs([problem.runs[i] for i in chosen])

@@ -40,9 +40,6 @@ class Answering:
         self.runs, self.residuals, self.baseline, self.known = (run,), residuals, Sized(()), {}
         self.fish = load_fish("zheng-2021-a")
 
-    def with_long_steps(self):
-        return self
-
     def innovations(self, z, effects, noise, filtered, pushes):
         out = np.tile(self.residuals, (len(pushes.column), 1)).reshape(-1, SAMPLES, 6)
         for lane, (column, size) in enumerate(zip(pushes.column, pushes.size, strict=True)):
@@ -67,7 +64,8 @@ def fit_with(missing, seed=0, noise=QUIET):
                      np.repeat(run.clock, 6))  # fmt: skip
     problem = Answering(run, flat)
     return SimpleNamespace(
-        problem=problem, filtered=[filtered], linearised=lin, released=(), effects=(), noise=noise,
+        problem=problem, comparing=problem, filtered=[filtered], linearised=lin, released=(),
+        effects=(), noise=noise,
         held=np.zeros((0, 0)),
         point=SimpleNamespace(z=np.zeros(0), effects={}),
     )  # fmt: skip

@@ -60,9 +60,6 @@ class Bending:
     def freedoms(self, names) -> tuple:
         return ()
 
-    def with_long_steps(self) -> "Bending":
-        return self
-
     def innovations(self, z, lanes, noise, filtered) -> np.ndarray:
         return np.array([self.change(*pair) for pair in zip(z.T, lanes[PATH], strict=True)])
 
@@ -79,6 +76,7 @@ def prepared(change: Callable, probe: float = 1.0, fastest: Callable | None = No
     lines = Linearised(residuals, slopes, np.zeros(SIZE, np.int64), np.linspace(0.0, 90.0, SIZE))
     fit = SimpleNamespace(
         problem=problem,
+        comparing=problem,
         linearised=lines,
         released=(),
         held=np.zeros((0, 2)),

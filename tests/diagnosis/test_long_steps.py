@@ -1,0 +1,61 @@
+"""Causes are compared in long steps where those tell the same, and nowhere else."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fish_env.diagnosis.screening import residual_changes
+from fish_env.identification import Problem, fit
+from tests.identification.synthetic import PATHS, Setup, simulate
+
+QUICK_LAG = ("servo_lag", {"time_constant": 0.01})
+SLOW_LAG = ("servo_lag", {"time_constant": 0.1})
+
+
+@pytest.fixture
+def fitted():
+    setup = Setup(runs=1, duration=4.0)
+    problem = Problem(simulate(setup), paths=PATHS)
+    return fit(problem, iterations=1, refit_noise=False, noise=setup.noise)
+
+
+def changes(own, *jobs):
+    return residual_changes(own, jobs, np.repeat(own.point.z[:, None], len(jobs), axis=1)).T
+
+
+def test_a_usual_fit_looks_the_same_in_long_steps(fitted):
+    assert fitted.comparing.longest_step == pytest.approx(2.0 * fitted.problem.longest_step)
+
+
+@pytest.mark.parametrize("wrong", [0.02, np.nan])
+def test_one_that_does_not_is_compared_in_its_own(fitted, wrong):
+    lin = fitted.linearised
+    other = replace(fitted, linearised=replace(lin, residuals=lin.residuals + wrong))
+    assert other.comparing is other.problem
+
+
+class Diverging:
+    """A problem in whose steps the first setting diverges."""
+
+    def __init__(self, problem):
+        self.problem = problem
+
+    def __getattr__(self, name):
+        return getattr(self.problem, name)
+
+    def innovations(self, *given):
+        out = self.problem.innovations(*given)
+        out[1, 100:] = np.nan
+        return out
+
+
+def test_a_setting_that_long_steps_do_not_follow_takes_the_usual_ones(fitted):
+    own = replace(fitted)
+    object.__setattr__(own, "comparing", Diverging(fitted.comparing))
+    quick, slow = changes(own, QUICK_LAG, SLOW_LAG)
+    object.__setattr__(own, "comparing", own.problem)
+    usual = changes(own, QUICK_LAG, SLOW_LAG)
+    np.testing.assert_array_equal(quick, usual[0])
+    assert np.linalg.norm(slow - usual[1]) < 0.01 * np.linalg.norm(usual[1])
+    assert not np.array_equal(slow, usual[1])

@@ -52,18 +52,27 @@ class Sketcher:
 
     def __init__(self, fit: Fit, runs: int = 2) -> None:
         self.fit = fit
-        # Steps that are good enough to see who leads, and much quicker.
-        problem, chosen = fit.comparing, fit.problem.spread(runs)
-        if not problem.has_corners(fit.point.effects):
-            problem = problem.with_plain_steps()
-        self.few: Problem = problem.with_runs([problem.runs[i] for i in chosen])
-        self.filtered = [fit.filtered[i] for i in chosen]
+        self._usual = self._few(fit.problem, runs)
+        self._long = self._few(fit.comparing, runs)
+        self.filtered = [fit.filtered[i] for i in fit.problem.spread(runs)]
+
+    def _few(self, problem: Problem, runs: int) -> Problem:
+        if not problem.has_corners(self.fit.point.effects):
+            problem = problem.with_plain_steps()  # good enough to see who leads, and much quicker
+        return problem.subset(runs)
+
+    def _problem_for(self, effects: Sequence[str]) -> Problem:
+        """In long steps, but for effects that make the tail's rate jump: those would be blurred."""
+        known = self.fit.problem.known
+        jumps = any(known[name].step_error > 0.0 for name in effects)
+        return self._usual if jumps else self._long
 
     @cached_property
     def base(self) -> float:
         """Objective of the fit itself on these runs."""
-        own = Free(self.few, self.fit.effects, self.fit.released)
-        return self._objectives(self.few, own, [own.pack(self.fit.point)])[0]
+        few = self._problem_for(self.fit.effects)
+        own = Free(few, self.fit.effects, self.fit.released)
+        return self._objectives(few, own, [own.pack(self.fit.point)])[0]
 
     def sketch(
         self, effects: Sequence[str], released: Sequence[str], starts: Sequence[Point]
@@ -78,18 +87,21 @@ class Sketcher:
         Raises:
             LinAlgError: the simulation diverges from every start.
         """
-        free = Free(self.few, effects, released)
+        few = self._problem_for(effects)
+        free = Free(few, effects, released)
         vectors = [free.clip(free.pack(start)) for start in starts]
-        few, vector = self._best(free, vectors)
+        few, vector = self._best(few, free, vectors)
         survey = partial(self._surveyed, few, free)
         vector, value, _ = descend(
             vector, survey, lambda _, known: known, free.within, STEPS, TOLERANCE
         )
         return Sketch(tuple(effects), tuple(released), free.unpack(vector), value)
 
-    def _best(self, free: Free, vectors: Sequence[FloatArray]) -> tuple[Problem, FloatArray]:
+    def _best(
+        self, few: Problem, free: Free, vectors: Sequence[FloatArray]
+    ) -> tuple[Problem, FloatArray]:
         """The best of some vectors, and the problem with the tail phases that it asks for."""
-        few, noise = self.few, self.fit.noise
+        noise = self.fit.noise
         if all(run.phase_known for run in few.runs):
             values = self._objectives(few, free, vectors)
             return few, vectors[int(np.argmin(values))]

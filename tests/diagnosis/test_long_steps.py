@@ -7,6 +7,8 @@ import pytest
 
 from fish_env.diagnosis.screening import residual_changes
 from fish_env.identification import Problem, fit
+from fish_env.identification.problem import Point
+from fish_env.identification.sketch import Sketcher
 from tests.identification.synthetic import PATHS, Setup, simulate
 
 QUICK_LAG = ("servo_lag", {"time_constant": 0.01})
@@ -59,3 +61,20 @@ def test_a_setting_that_long_steps_do_not_follow_takes_the_usual_ones(fitted):
     np.testing.assert_array_equal(quick, usual[0])
     assert np.linalg.norm(slow - usual[1]) < 0.01 * np.linalg.norm(usual[1])
     assert not np.array_equal(slow, usual[1])
+
+
+def test_only_what_jumps_is_sketched_in_the_usual_steps(fitted, monkeypatch):
+    seen = []
+    settled = Sketcher._surveyed
+
+    def surveyed(self, problem, free, vector):
+        seen.append(problem.longest_step)
+        return settled(self, problem, free, vector)
+
+    monkeypatch.setattr(Sketcher, "_surveyed", surveyed)
+    for effect, value in (("servo_lag.time_constant", 0.05), ("servo_backlash.gap", 0.05)):
+        start = Point(fitted.point.z, {f"effects.{effect}": value})
+        Sketcher(fitted).sketch((effect.split(".")[0],), (), [start])
+    usual = fitted.problem.longest_step
+    assert sorted(set(seen)) == pytest.approx([usual, 2.0 * usual])
+    assert seen[0] == pytest.approx(2.0 * usual)

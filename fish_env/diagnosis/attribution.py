@@ -230,11 +230,8 @@ def _with_wandering_phase(
     causes: Sequence[Cause],
     rng: np.random.Generator,
 ) -> tuple[Fit, Sequence[Signal]] | None:
-    """What shows when the tail's phase may wander: asked where no plausible disturbance is left.
-
-    A beat out of step hides everything else, so it is the first cause to be found or none.
-    """
-    if current.causes or not chosen or not strains(current.fit):
+    """What shows when the tail's phase may wander."""
+    if not _may_be_out_of_step(current, chosen):
         return None
     loose = loosened(current)
     if loose is None:
@@ -246,15 +243,23 @@ def _with_wandering_phase(
 
 
 def _detuning(current: Explanation, screen: Screen, chosen: Sequence[Signal]) -> list[Signal]:
-    """Effects that detune the tail, where no plausible disturbance is left.
+    """Effects that detune the tail.
 
     After many beats out of step the screen shows them no more than it shows others.
     """
-    if current.causes or not chosen or not strains(current.fit):
+    if not _may_be_out_of_step(current, chosen):
         return []
     known = current.fit.problem.known
     effects = [s for s in screen.best() if s.cause.is_effect and s not in chosen]
     return [s for s in effects if known[s.cause.name].detunes]
+
+
+def _may_be_out_of_step(current: Explanation, chosen: Sequence[Signal]) -> bool:
+    """Whether a tail may be out of step with its beat: no plausible disturbance is left.
+
+    A beat out of step hides everything else, so it is the first cause to be found or none.
+    """
+    return not current.causes and bool(chosen) and bool(strains(current.fit))
 
 
 def _new(after: Screen, chosen: Sequence[Signal]) -> list[Signal]:

@@ -271,26 +271,24 @@ def residual_changes(fit: Fit, jobs: Sequence[tuple[str, Probe]], z: FloatArray)
         jobs: effect and setting, n of them.
         z: (coefficients, n) where to simulate each.
     """
-    rows = np.empty((len(jobs), len(fit.linearised.residuals)))
-    _fill(rows, fit, fit.comparing, jobs, z, _kinds(fit, jobs))
+    rows = _changes_of_kinds(fit, fit.comparing, jobs, z)
     diverged = np.flatnonzero(~np.isfinite(rows).all(axis=1)).tolist()
     if diverged and fit.comparing is not fit.problem:
-        _fill(rows, fit, fit.problem, jobs, z, [diverged])
+        again = [jobs[i] for i in diverged]
+        rows[diverged] = _changes_of_kinds(fit, fit.problem, again, z[:, diverged])
     return rows.T
 
 
-def _fill(
-    rows: FloatArray,
-    fit: Fit,
-    problem: Problem,
-    jobs: Sequence[tuple[str, Probe]],
-    z: FloatArray,
-    kinds: Sequence[Sequence[int]],
-) -> None:
-    for alike in kinds:
+def _changes_of_kinds(
+    fit: Fit, problem: Problem, jobs: Sequence[tuple[str, Probe]], z: FloatArray
+) -> FloatArray:
+    """The changes (n, D) of all jobs, each computed by the quickest kernel that can."""
+    rows = np.empty((len(jobs), len(fit.linearised.residuals)))
+    for alike in _kinds(fit, jobs):
         for first in range(0, len(alike), SETTINGS_AT_ONCE):
-            part = list(alike[first : first + SETTINGS_AT_ONCE])
+            part = alike[first : first + SETTINGS_AT_ONCE]
             rows[part] = _changes_at_once(fit, problem, [jobs[i] for i in part], z[:, part])
+    return rows
 
 
 def _kinds(fit: Fit, jobs: Sequence[tuple[str, Probe]]) -> list[list[int]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -80,6 +80,11 @@ class Attribution:
     def tolerated(self) -> float:
         """What the simulation of the accepted causes may get wrong itself, in the same unit."""
         return roughness(self.accepted) * self.gain
+
+    def in_finer_steps(self) -> Attribution:
+        """The same, with estimates as finer steps put them where the tail's rate jumps."""
+        rivals = tuple(e.in_finer_steps() for e in self.rivals)
+        return replace(self, accepted=self.accepted.in_finer_steps(), rivals=rivals)
 
 
 def attribute(

@@ -204,8 +204,9 @@ def _diagnose_runs(
     left = adequacy(attribution.accepted.fit, rng, attribution.tolerated)
     if effort.retries and not left.reached:
         attribution, left = _with_weaker_causes(attribution, left, causes, rng, progress)
-    accepted = attribution.accepted.fit
     verdict = decide(attribution, left, shown)
+    attribution = attribution.in_finer_steps()
+    accepted = attribution.accepted.fit
     gain = None
     judging = Problem(dataset, fish, final, dt=effort.step_s) if final else None
     if verdict.name in EXTENDING and judging is not None:

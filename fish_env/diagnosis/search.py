@@ -14,7 +14,7 @@ from fish_env.diagnosis.effort import FULL, Effort
 from fish_env.diagnosis.screening import Signal
 from fish_env.diagnosis.starts import baselines, probed, starts
 from fish_env.effects.extended import PREFIX
-from fish_env.identification.estimator import Fit, fit
+from fish_env.identification.estimator import Fit, fit, in_finer_steps
 from fish_env.identification.filtering import NoiseModel
 from fish_env.identification.free import REACH
 from fish_env.identification.information import information, prior_precision
@@ -44,6 +44,10 @@ class Explanation:
 
     causes: tuple[str, ...]
     fit: Fit
+
+    def in_finer_steps(self) -> Explanation:
+        """The same causes, with estimates as finer steps put them where the tail's rate jumps."""
+        return Explanation(self.causes, in_finer_steps(self.fit))
 
     @cached_property
     def score(self) -> float:

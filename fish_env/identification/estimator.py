@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -12,7 +12,14 @@ from scipy.special import ndtri
 
 from fish_env.identification.descent import descend, promised
 from fish_env.identification.filtering import Filtered, NoiseModel
-from fish_env.identification.free import Free, Linearised, linearise, objective
+from fish_env.identification.free import (
+    Free,
+    Linearised,
+    linearise,
+    objective,
+    objective_of,
+    residuals_at,
+)
 from fish_env.identification.information import block_sums, gradient, information
 from fish_env.identification.noise import disturbance_range, fit_noise
 from fish_env.identification.phases import settle_phases
@@ -197,6 +204,36 @@ def finished(own: Fit) -> Fit:
     return own
 
 
+def in_finer_steps(own: Fit) -> Fit:
+    """A fit, its estimates moved to where finer steps put them.
+
+    Where the tail's rate jumps, what the usual steps get wrong of it is a small share of an effect
+    but may be several of its standard deviations. Slopes are as good in the usual steps, so one
+    Gauss-Newton step on the residuals of finer ones will do. All else stays that of the usual
+    steps, and so does a fit whose tail moves without jumps.
+    """
+    if not own.problem.has_corners(own.point.effects):
+        return own
+    problem = own.problem.with_finer_steps()
+    free = Free(problem, own.effects, own.released)
+    vector, lin = free.pack(own.point), own.linearised
+
+    (before,) = residuals_at(problem, free, [vector], own.noise, own.filtered)
+    pull = gradient(lin.slopes, before, free.prior, vector)
+    moved = free.clip(vector + free.within.step(information(lin.slopes, free.prior), pull, vector))
+    (after,) = residuals_at(problem, free, [moved], own.noise, own.filtered)
+    if objective_of(problem, free, moved, after) >= objective_of(problem, free, vector, before):
+        return own
+    return replace(own, point=free.unpack(moved), estimates=_physical(problem, moved))
+
+
+def _physical(problem: Problem, vector: FloatArray) -> FloatArray:
+    """Estimates (n,) in physical units."""
+    count = len(problem.baseline)
+    values = problem.baseline.values(vector[:count, None])[:, 0]
+    return np.asarray(np.r_[values, vector[count:]], float)
+
+
 def _settled(before: NoiseModel, after: NoiseModel, share: float = 0.1) -> bool:
     """Whether the disturbance changed by less than a share of itself."""
     pairs = [
@@ -266,7 +303,7 @@ def _finish(
     scale = free.scale()
     physical = scale @ covariance @ scale.T
     point = free.unpack(vector)
-    estimates = np.r_[problem.baseline.values(point.z[:, None])[:, 0], vector[free.count :]]
+    estimates = _physical(problem, vector)
     bounds = (*free.coefficients_at_bounds(estimates), *free.effects_at_bounds(vector))
     diagonal = np.sqrt(np.diag(hessian))
     condition = float(np.linalg.cond(hessian / np.outer(diagonal, diagonal)))

@@ -200,6 +200,19 @@ def objective(
     return float(value), results
 
 
+def residuals_at(
+    problem: Problem,
+    free: Free,
+    vectors: Sequence[FloatArray],
+    noise: NoiseModel,
+    filtered: Sequence[Filtered],
+) -> FloatArray:
+    """Whitened residuals (N, D) of vectors with the gains of a filter that has run."""
+    columns = np.column_stack(vectors)
+    effects = {f.path: columns[free.count + i] for i, f in enumerate(free.freedoms)}
+    return problem.innovations(columns[: free.count], effects, noise, filtered)
+
+
 def objectives_with_gains(
     problem: Problem,
     free: Free,
@@ -213,10 +226,7 @@ def objectives_with_gains(
     together take no longer than one filter. Infinite where no fish can have the coefficients, or
     the simulation diverges.
     """
-    columns = np.column_stack(vectors)
-    effects = {f.path: columns[free.count + i] for i, f in enumerate(free.freedoms)}
-    innovations = problem.innovations(columns[: free.count], effects, noise, filtered)
-    pairs = zip(vectors, innovations, strict=True)
+    pairs = zip(vectors, residuals_at(problem, free, vectors, noise, filtered), strict=True)
     return [objective_of(problem, free, vector, residuals) for vector, residuals in pairs]
 
 

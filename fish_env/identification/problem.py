@@ -245,6 +245,10 @@ class Problem:
         """The same problem in steps that will do to compare causes, with the same freedoms."""
         return self.with_runs([run.in_long_steps() for run in self.runs])
 
+    def with_finer_steps(self) -> Problem:
+        """The same problem in steps finer than those for effects that make the tail's rate jump."""
+        return self.with_runs([run.in_finer_steps() for run in self.runs])
+
     def has_corners(self, effects: Iterable[str]) -> bool:
         """Whether one of these effect parameters makes the tail's rate jump."""
         if self.plain_steps:

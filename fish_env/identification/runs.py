@@ -111,6 +111,10 @@ class RunData:
         longest = np.where(self.fresh, LONG_STEP_S / FINER, LONG_STEP_S)
         return replace(self, substeps=np.minimum(self.substeps, _steps(self.clock, longest)))
 
+    def in_finer_steps(self) -> RunData:
+        """The same run in steps finer than those of motion with corners."""
+        return replace(self, substeps=FINER * self.corner_substeps)
+
     @property
     def commands(self) -> tuple[FloatArray, FloatArray]:
         """Switch times (m,) and commands (m, 5) of the run itself."""

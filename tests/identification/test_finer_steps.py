@@ -1,0 +1,57 @@
+"""What the usual steps get wrong of a tail whose rate jumps does not stay in its estimate."""
+
+import numpy as np
+import pytest
+
+from fish_env.data import load_dataset
+from fish_env.identification import Problem, fit, in_finer_steps
+from tests.hidden.cases import make_case
+
+LIMIT = "servo_rate_limit"
+
+
+@pytest.fixture(scope="module")
+def case(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("finer") / "case"
+    truth = make_case("rich", 3, folder, effects={LIMIT: 1.0})
+    return load_dataset(folder), truth.effects[LIMIT]["rate"]
+
+
+@pytest.fixture(scope="module")
+def fitted(case):
+    data = case[0]
+    return fit(Problem(data, run_ids=data.ids[:4]), (LIMIT,), rounds=2)
+
+
+def distances(own, other):
+    """How far two fits are apart, in standard deviations of each parameter."""
+    return np.abs(own.estimates - other.estimates) / np.sqrt(np.diag(own.covariance))
+
+
+def test_one_step_leads_to_where_a_fit_in_finer_steps_ends(fitted):
+    problem, held = fitted.problem.with_finer_steps(), {"refit_noise": False}
+    whole = fit(problem, (LIMIT,), fitted.point, fitted.noise, iterations=2, **held)
+    assert distances(in_finer_steps(fitted), whole).max() < 0.3
+    assert distances(fitted, whole).max() > 1.0
+
+
+def test_it_leads_towards_the_truth(case, fitted):
+    def off(found):
+        at = found.names.index(f"effects.{LIMIT}.rate")
+        return (found.estimates[at] - case[1]) / np.sqrt(found.covariance[at, at])
+
+    assert abs(off(fitted)) > abs(off(in_finer_steps(fitted))) + 1.0
+
+
+def test_everything_else_stays(fitted):
+    moved = in_finer_steps(fitted)
+    assert moved.linearised is fitted.linearised
+    np.testing.assert_array_equal(moved.covariance, fitted.covariance)
+    index = len(moved.problem.baseline)
+    assert moved.point.effects[f"effects.{LIMIT}.rate"] == moved.estimates[index]
+
+
+def test_a_tail_without_jumps_needs_no_finer_steps(case):
+    data = case[0]
+    plain = fit(Problem(data, run_ids=data.ids[:1]), (), rounds=1, iterations=1)
+    assert in_finer_steps(plain) is plain

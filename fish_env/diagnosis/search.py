@@ -31,6 +31,8 @@ BEHIND = 0.25
 """A sketch that gains less by more than this share of the best one's gain is not fitted in full."""
 LEEWAY = 100.0
 """... unless the difference in -2 log likelihood is smaller than this: sketches are not fits."""
+HOPELESS = 1000.0
+"""A fit that cannot come this near to the leader's is no rival, however coloured what is left."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -300,11 +302,12 @@ def _finalists(
 def _rest(
     current: Explanation, finalists: list[tuple[str, Sketch]], leader: Fit, report: Report
 ) -> list[Explanation]:
-    """Full fits under the leader's noise."""
+    """Full fits under the leader's noise, as far as they may come near the leader's."""
+    hopeless = leader.objective + HOPELESS
 
     def fitted(name: str, sketch: Sketch) -> Explanation | None:
         report(f"fitting {name}")
-        found = _at_noise(leader.problem, sketch, leader.noise, 4)
+        found = _at_noise(leader.problem, sketch, leader.noise, 4, hopeless)
         return None if found is None else Explanation((*current.causes, name), found)
 
     tasks = [partial(fitted, name, sketch) for name, sketch in finalists]
@@ -335,9 +338,19 @@ def _in_full(problem: Problem, sketch: Sketch, noise: NoiseModel) -> Fit | None:
     return first if first is None or few is problem else _noise_too(problem, first)
 
 
-def _at_noise(problem: Problem, at: Sketch | Fit, noise: NoiseModel, iterations: int) -> Fit | None:
-    free = (at.effects, at.point, noise, at.released)
-    return reached(lambda: fit(problem, *free, refit_noise=False, iterations=iterations))
+def _at_noise(
+    problem: Problem,
+    at: Sketch | Fit,
+    noise: NoiseModel,
+    iterations: int,
+    hopeless: float = np.inf,
+) -> Fit | None:
+    return reached(
+        lambda: fit(
+            problem, at.effects, at.point, noise, at.released, refit_noise=False,
+            iterations=iterations, hopeless=hopeless,
+        )
+    )  # fmt: skip
 
 
 def _noise_too(problem: Problem, own: Fit) -> Fit | None:

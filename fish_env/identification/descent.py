@@ -58,6 +58,7 @@ def descend(
     within: Within,
     iterations: int,
     tolerance: float,
+    hopeless: float = np.inf,
 ) -> tuple[FloatArray, float, T]:
     """Minimise a sum of squares, or what is nearly one.
 
@@ -70,6 +71,8 @@ def descend(
         iterations: most steps.
         tolerance: stop when no combination of parameters would move by more of its standard
             deviation, the objective being -2 log likelihood.
+        hopeless: stop when the objective would stay above this if every step that is left gained
+            what the next one promises.
 
     Returns:
         The vector reached, the objective there, and what else was computed.
@@ -81,11 +84,11 @@ def descend(
     value, known = evaluate(vector)
     if not np.isfinite(value):
         raise np.linalg.LinAlgError("the simulation diverges at the start of the fit")
-    for _ in range(iterations):
+    for left in range(iterations, 0, -1):
         hessian, gradient = linearise(vector, known)
         whole = within.step(hessian, gradient, vector)
         promise = promised(hessian, gradient, whole)
-        if promise < tolerance**2:
+        if promise < tolerance**2 or value - left * promise > hopeless:
             break
         before, tried = value, 0
         for trial in _trials(hessian, gradient, vector, whole, within):

@@ -101,6 +101,7 @@ def fit(
     iterations: int = 5,
     tolerance: float = 0.1,
     rounds: int = 4,
+    hopeless: float = np.inf,
     report: Callable[[str], None] = lambda step: None,
 ) -> Fit:
     """Estimate baseline coefficients and effect parameters.
@@ -116,6 +117,7 @@ def fit(
         tolerance: stop when no combination of parameters would move by more of its standard
             deviation.
         rounds: most alternations between parameters and disturbance.
+        hopeless: stop early where the objective, the noise model kept, will not get below this.
         report: told what is being done.
     """
     names = problem.effects if effects is None else tuple(effects)
@@ -127,7 +129,9 @@ def fit(
     for round_ in range(rounds if refit_noise else 1):
         problem = settle_phases(problem, free.unpack(vector), noise)
         report(f"fitting parameters, round {round_ + 1}")
-        vector, value, filtered = gauss_newton(problem, free, vector, noise, iterations, tolerance)
+        vector, value, filtered = gauss_newton(
+            problem, free, vector, noise, iterations, tolerance, hopeless
+        )
         if not refit_noise:
             break
         report(f"fitting the noise, round {round_ + 1}")
@@ -147,6 +151,7 @@ def gauss_newton(
     noise: NoiseModel,
     iterations: int,
     tolerance: float,
+    hopeless: float = np.inf,
 ) -> tuple[FloatArray, float, list[Filtered]]:
     """Gauss-Newton steps with the noise model held.
 
@@ -158,6 +163,7 @@ def gauss_newton(
         iterations: most steps.
         tolerance: stop when no combination of parameters would move by more of its standard
             deviation.
+        hopeless: stop where the objective will not get below this.
 
     Returns:
         The vector reached, the objective there, and the filter results.
@@ -169,7 +175,7 @@ def gauss_newton(
         vector,
         partial(objective, problem, free, noise=noise),
         lambda at, filtered: quadratic(free, at, linearise(problem, free, at, noise, filtered)),
-        free.within, iterations, tolerance,
+        free.within, iterations, tolerance, hopeless,
     )  # fmt: skip
 
 

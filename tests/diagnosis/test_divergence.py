@@ -17,7 +17,7 @@ def fake(name="fit"):
     problem = SimpleNamespace(baseline=(), known={})
     problem.subset = lambda count: problem
     return SimpleNamespace(
-        problem=problem, effects=("a", "b"), released=(), noise=None, name=name,
+        problem=problem, effects=("a", "b"), released=(), noise=None, name=name, objective=0.0,
         point=SimpleNamespace(z=np.zeros(0), effects={"effects.a.x": 1.0, "effects.b.x": 1.0}),
     )  # fmt: skip
 
@@ -46,7 +46,9 @@ def contest(monkeypatch, results, shown="abc"):
     )
     monkeypatch.setattr(search, "_in_full", lambda problem, s, noise: results[s.name])
     monkeypatch.setattr(
-        search, "_at_noise", lambda problem, at, noise, n: results.get(getattr(at, "name", None))
+        search,
+        "_at_noise",
+        lambda problem, at, noise, *spent: results.get(getattr(at, "name", None)),
     )
     monkeypatch.setattr(search, "_best_first", lambda tried: (tried, None))
     monkeypatch.setattr(

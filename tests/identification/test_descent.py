@@ -84,6 +84,18 @@ def test_it_does_not_follow_roughness(promise, counted):
     assert len(asked) == counted
 
 
+@pytest.mark.parametrize(
+    ("hopeless", "iterations", "counted"), [(101.0, 1, 2), (99.0, 1, 1), (99.0, 2, 2)]
+)
+def test_it_stops_where_the_steps_left_do_not_promise_enough(hopeless, iterations, counted):
+    """A step promises 25 of 125: enough for less than 101, or for less than 99 if two are left."""
+    problem = Counted(lambda x: np.array([10.0, x[0] - 5.0]), lambda x: np.array([[0.0], [1.0]]))
+    within = box([-9.0], [9.0])
+    start = np.zeros(1)
+    descend(start, problem.evaluate, problem.linearise, within, iterations, 0.1, hopeless)
+    assert problem.count == counted
+
+
 def test_a_start_without_an_objective_is_an_error():
     within = box([-1.0], [1.0])
     with pytest.raises(np.linalg.LinAlgError, match="diverges"):

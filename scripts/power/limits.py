@@ -9,7 +9,6 @@ parameter alone has power 0.8.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -19,8 +18,8 @@ from scipy.stats import chi2, ncx2
 from fish_env.diagnosis.causes import Cause, probes_of
 from fish_env.diagnosis.detectable import changes
 from fish_env.diagnosis.screening import Projector
+from fish_env.identification.estimator import Fit, fit
 from fish_env.identification.filtering import NoiseModel
-from fish_env.identification.free import Free, linearise, objective
 from fish_env.identification.problem import Point, Problem
 from fish_env.model.effect import Effect
 from tests.hidden.disturbances import MOMENT_PER_FORCE
@@ -38,22 +37,15 @@ def noncentrality(level: float, freedom: int = 1, power: float = 0.8) -> float:
     return float(brentq(lambda nc: ncx2.sf(bound, freedom, nc) - power, 1e-3, 4.0 * bound + 100.0))
 
 
-def oracle(problem: Problem, truth: Truth) -> Any:
-    """The filter at the true coefficients and the true noise, as a projector reads a fit."""
+def oracle(problem: Problem, truth: Truth) -> Fit:
+    """The filter at the true coefficients and the true noise, as a fit that takes no step."""
     baseline = problem.baseline
     values = np.array([truth.coefficients[path] for path in baseline.paths])
     point = Point(np.linalg.solve(baseline.factor, values - baseline.mean), {})
     force, memory = truth.disturbance["force"], truth.disturbance["time_constant"]
     sensors = np.array([truth.noise[name] for name in problem.channels])
     noise = NoiseModel(sensors, force, MOMENT_PER_FORCE * force, memory)
-    free = Free(problem, (), ())
-    vector = free.pack(point)
-    filtered = objective(problem, free, vector, noise)[1]
-    lines = linearise(problem, free, vector, noise, filtered)
-    return SimpleNamespace(
-        problem=problem, point=point, noise=noise, filtered=filtered, linearised=lines, released=(),
-        held=np.zeros((0, len(vector))),
-    )  # fmt: skip
+    return fit(problem, (), point, noise, refit_noise=False, iterations=0)
 
 
 def limits(

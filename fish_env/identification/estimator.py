@@ -223,11 +223,10 @@ def in_finer_steps(own: Fit) -> Fit:
     problem = own.problem.with_finer_steps()
     free = Free(problem, own.effects, own.released)
     vector, lin = free.pack(own.point), own.linearised
-
-    (before,) = residuals_at(problem, free, [vector], own.noise, own.filtered)
+    (before,) = residuals_at(problem, free, vector[:, None], own.noise, own.filtered)
     pull = gradient(lin.slopes, before, free.prior, vector)
     moved = free.clip(vector + free.within.step(information(lin.slopes, free.prior), pull, vector))
-    (after,) = residuals_at(problem, free, [moved], own.noise, own.filtered)
+    (after,) = residuals_at(problem, free, moved[:, None], own.noise, own.filtered)
     if objective_of(problem, free, moved, after) >= objective_of(problem, free, vector, before):
         return own
     return replace(own, point=free.unpack(moved), estimates=_physical(problem, moved))

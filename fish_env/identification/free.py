@@ -164,6 +164,18 @@ class Free:
         return matrix
 
 
+def residuals_at(
+    problem: Problem,
+    free: Free,
+    vectors: FloatArray,
+    noise: NoiseModel,
+    filtered: Sequence[Filtered],
+) -> FloatArray:
+    """Whitened residuals (N, D) of vectors (n, N) with the gains of a filter that has run."""
+    effects = {f.path: vectors[free.count + i] for i, f in enumerate(free.freedoms)}
+    return problem.innovations(vectors[: free.count], effects, noise, filtered)
+
+
 def linearise(
     problem: Problem,
     free: Free,
@@ -176,8 +188,7 @@ def linearise(
     A parameter that cannot be moved without the simulation diverging gets no slope: it stays.
     """
     lanes, steps = free.lanes(vector)
-    effects = {f.path: lanes[free.count + i] for i, f in enumerate(free.freedoms)}
-    innovations = problem.innovations(lanes[: free.count], effects, noise, filtered)
+    innovations = residuals_at(problem, free, lanes, noise, filtered)
     slopes = (innovations[1:] - innovations[0]).T / steps
     slopes[:, ~np.all(np.abs(slopes) < LARGEST_SLOPE, axis=0)] = 0.0
     channels = len(problem.channels)
@@ -200,19 +211,6 @@ def objective(
     return float(value), results
 
 
-def residuals_at(
-    problem: Problem,
-    free: Free,
-    vectors: Sequence[FloatArray],
-    noise: NoiseModel,
-    filtered: Sequence[Filtered],
-) -> FloatArray:
-    """Whitened residuals (N, D) of vectors with the gains of a filter that has run."""
-    columns = np.column_stack(vectors)
-    effects = {f.path: columns[free.count + i] for i, f in enumerate(free.freedoms)}
-    return problem.innovations(columns[: free.count], effects, noise, filtered)
-
-
 def objectives_with_gains(
     problem: Problem,
     free: Free,
@@ -226,7 +224,8 @@ def objectives_with_gains(
     together take no longer than one filter. Infinite where no fish can have the coefficients, or
     the simulation diverges.
     """
-    pairs = zip(vectors, residuals_at(problem, free, vectors, noise, filtered), strict=True)
+    rows = residuals_at(problem, free, np.column_stack(vectors), noise, filtered)
+    pairs = zip(vectors, rows, strict=True)
     return [objective_of(problem, free, vector, residuals) for vector, residuals in pairs]
 
 

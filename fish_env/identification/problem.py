@@ -251,10 +251,12 @@ class Problem:
 
     def has_corners(self, effects: Iterable[str]) -> bool:
         """Whether one of these effect parameters makes the tail's rate jump."""
-        if self.plain_steps:
-            return False
-        names = effects_of(effects)
-        return any(self.known[n].step_error > 0.0 for n in (*names, *self.model.effects))
+        names = (*effects_of(effects), *self.model.effects)
+        return not self.plain_steps and self.any_jumps(names)
+
+    def any_jumps(self, names: Iterable[str]) -> bool:
+        """Whether one of these effects makes the tail's rate jump, whatever the steps."""
+        return any(self.known[name].step_error > 0.0 for name in names)
 
     def lane(self, point: Point) -> tuple[FloatArray, Measurement]:
         """Parameter record (parameters, 1) of a point, and what its sensors do."""

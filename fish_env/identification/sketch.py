@@ -63,9 +63,7 @@ class Sketcher:
 
     def _problem_for(self, effects: Sequence[str]) -> Problem:
         """In long steps, but for effects that make the tail's rate jump: those would be blurred."""
-        known = self.fit.problem.known
-        jumps = any(known[name].step_error > 0.0 for name in effects)
-        return self._usual if jumps else self._long
+        return self._usual if self.fit.problem.any_jumps(effects) else self._long
 
     @cached_property
     def base(self) -> float:

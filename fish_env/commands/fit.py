@@ -11,7 +11,7 @@ from rich.table import Table
 
 from fish_env.diagnosis.suitability import check_runs, divergence, load_runs
 from fish_env.effects.extended import PREFIX
-from fish_env.identification import Fit, Problem, fit, in_finer_steps
+from fish_env.identification import Fit, Problem, fit
 from fish_env.identification.starts import likely_start
 from fish_env.identification.writing import identified_fish
 from fish_env.params import load_fish, save_fish
@@ -39,7 +39,7 @@ def fit_dataset(
         status.update("looking for a start")
         start = likely_start(problem, problem.effects)
         try:
-            result = in_finer_steps(fit(problem, start=start, report=status.update))
+            result = fit(problem, start=start, report=status.update).extrapolated
         except np.linalg.LinAlgError:
             raise divergence(problem) from None
     out.parent.mkdir(parents=True, exist_ok=True)

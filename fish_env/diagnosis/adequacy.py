@@ -155,5 +155,6 @@ def strongest_alarm(fit: Fit, rng: np.random.Generator) -> tuple[float, float]:
 
 def _asked(fit: Fit) -> tuple[GenericForces, list[tuple[int, Signal]]]:
     """Forces along the fitted runs, and what the data say of each."""
+    fit = fit.extrapolated
     forces = generic_forces(fit.problem.runs, fit.filtered)
     return forces, list(generic_signals(fit, forces, Projector(fit)))

@@ -81,10 +81,10 @@ class Attribution:
         """What the simulation of the accepted causes may get wrong itself, in the same unit."""
         return roughness(self.accepted) * self.gain
 
-    def in_finer_steps(self) -> Attribution:
-        """The same, with estimates as finer steps put them where the tail's rate jumps."""
-        rivals = tuple(e.in_finer_steps() for e in self.rivals)
-        return replace(self, accepted=self.accepted.in_finer_steps(), rivals=rivals)
+    def extrapolated(self) -> Attribution:
+        """The same, with estimates as ever finer steps put them."""
+        rivals = tuple(e.extrapolated() for e in self.rivals)
+        return replace(self, accepted=self.accepted.extrapolated(), rivals=rivals)
 
 
 def attribute(

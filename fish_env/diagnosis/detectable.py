@@ -29,7 +29,12 @@ from fish_env.identification.problem import Problem
 
 FloatArray = npt.NDArray[np.float64]
 Jobs = Sequence[tuple[str, Probe]]
-ROUNDS = 3
+ROUNDS, MORE_ROUNDS = 3, 5
+"""The further ones are for effects that do nothing at first: a limit that is never met."""
+SILENT = 1e-9
+"""Share of the energy wanted below which an effect does nothing."""
+STEEP, STEEPEST = 4.0, 100.0
+"""Largest power that is believed, and that just above a size that does nothing."""
 TOLERANCE = 0.05
 """Sizes are corrected until they change by less than this share."""
 SMOOTH = 2.0
@@ -91,7 +96,8 @@ def simulated(fit: Fit, screen: Screen, settings: Sequence[Setting]) -> FloatArr
 
     No size is published that the simulation is too coarse for. Where a signal does not fade with
     the size, the size is taken in proportion from the probe; where it does not fade there either,
-    every size shows that can be simulated, and the probe itself is the answer.
+    every size shows that can be simulated, and the probe itself is the answer. Where an effect does
+    nothing yet, its size is sought halfway to one that shows.
 
     Args:
         fit: what the screen was made against.
@@ -105,19 +111,29 @@ def simulated(fit: Fit, screen: Screen, settings: Sequence[Setting]) -> FloatArr
     last, last_energy = probe, np.array([_information(s) for s in settings])
     target = last_energy * wanted**2
     at: FloatArray = np.maximum(wanted, least)
-    moving, endless = np.ones(len(settings), bool), np.zeros(len(settings), bool)
-    for turn in range(ROUNDS):
+    moving = np.ones(len(settings), bool)
+    endless, sought = ~moving, ~moving
+    for turn in range(ROUNDS + MORE_ROUNDS):
+        moving &= sought | (turn < ROUNDS)
         energy = _energies(fit, screen, settings, at, moving)
         moving &= np.isfinite(energy)
+        silent = moving & (energy < SILENT * target) & (at < last)
+        sought |= silent
         power = _power(at, energy, last, last_energy)
         suspect = moving & (at <= probe) & (power < FADING)
         halved = _energies(fit, screen, settings, 0.5 * at, suspect)
         endless |= suspect & ~(_power(at, energy, 0.5 * at, halved) >= FADING)
         moving &= ~endless
-        steps = np.log(target / energy) / (np.clip(power, 1.0, 4.0) if turn else SMOOTH)
-        last, last_energy = at.copy(), energy
+        believed = np.clip(power, 1.0, np.where(sought, STEEPEST, STEEP))
+        with np.errstate(divide="ignore"):
+            steps = np.log(target / energy) / (believed if turn else SMOOTH)
+        steps = np.where(silent, 0.5 * np.log(last / at), steps)
+        before = at.copy()
+        last, last_energy = (
+            np.where(silent, *pair) for pair in ((last, at), (last_energy, energy))
+        )
         at[moving] = np.maximum(at * np.exp(steps), least)[moving]
-        moving &= np.abs(np.log(at / last)) > TOLERANCE
+        moving &= np.abs(np.log(at / before)) > TOLERANCE
     energy = _energies(fit, screen, settings, probe, endless)
     twice = _energies(fit, screen, settings, 2.0 * probe, endless)
     fades = _power(probe, energy, 2.0 * probe, twice) >= FADING

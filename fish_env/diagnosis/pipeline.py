@@ -205,7 +205,7 @@ def _diagnose_runs(
     if effort.retries and not left.reached:
         attribution, left = _with_weaker_causes(attribution, left, causes, rng, progress)
     verdict = decide(attribution, left, shown)
-    attribution = attribution.in_finer_steps()
+    attribution = attribution.extrapolated()
     accepted = attribution.accepted.fit
     gain = None
     judging = Problem(dataset, fish, final, dt=effort.step_s) if final else None
@@ -249,7 +249,7 @@ def _with_weaker_causes(
 def _refitted(problem: Problem) -> Fit:
     """The refitted baseline; at rest unless a misfit drives it, which then is what comes next."""
     try:
-        own = fit(problem, rounds=2)
+        own = fit(problem, rounds=2, iterations=3)
         return own if strains(own) else finished(own)
     except np.linalg.LinAlgError:
         raise divergence(problem) from None

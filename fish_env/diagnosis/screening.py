@@ -220,6 +220,7 @@ def screen(
         rng: for the null distribution of the smallest p-value.
         level: family-wise error rate.
     """
+    fit = fit.extrapolated
     projector = Projector(fit)
     taken = {*fit.effects, *fit.released}
     tested = [c for c in causes if c.name not in taken and c.path not in taken]

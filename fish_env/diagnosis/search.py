@@ -14,7 +14,7 @@ from fish_env.diagnosis.effort import FULL, Effort
 from fish_env.diagnosis.screening import Signal
 from fish_env.diagnosis.starts import baselines, probed, starts
 from fish_env.effects.extended import PREFIX
-from fish_env.identification.estimator import Fit, fit, in_finer_steps
+from fish_env.identification.estimator import Fit, fit
 from fish_env.identification.filtering import NoiseModel
 from fish_env.identification.free import REACH
 from fish_env.identification.information import information, prior_precision
@@ -47,9 +47,9 @@ class Explanation:
     causes: tuple[str, ...]
     fit: Fit
 
-    def in_finer_steps(self) -> Explanation:
-        """The same causes, with estimates as finer steps put them where the tail's rate jumps."""
-        return Explanation(self.causes, in_finer_steps(self.fit))
+    def extrapolated(self) -> Explanation:
+        """The same causes, with estimates as ever finer steps put them."""
+        return Explanation(self.causes, self.fit.extrapolated)
 
     @cached_property
     def score(self) -> float:
@@ -333,7 +333,7 @@ def _best_first(tried: list[Explanation]) -> tuple[list[Explanation], NoiseModel
 def _in_full(problem: Problem, sketch: Sketch, noise: NoiseModel) -> Fit | None:
     few = problem.subset(3)
     first = reached(
-        lambda: fit(few, sketch.effects, sketch.point, noise, sketch.released, rounds=2)
+        lambda: fit(few, sketch.effects, sketch.point, noise, sketch.released, rounds=1)
     )
     return first if first is None or few is problem else _noise_too(problem, first)
 

@@ -95,7 +95,7 @@ EFFECT = Effect(
     initial_states=start_in_contact,
     time_scale=fastest,
     order=6,
-    step_error=0.01,
+    step_error=0.003,
     confusable_with=(
         "servo_delay",
         "servo_rate_limit",

@@ -21,7 +21,7 @@ EFFECT = Effect(
     ),
     command_delay="delay",
     order=3,
-    step_error=0.002,
+    step_error=0.001,
     confusable_with=(
         "clock_scale",
         "sensor_delay",

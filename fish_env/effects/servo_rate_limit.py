@@ -87,7 +87,7 @@ EFFECT = Effect(
     initial_states=start_at_command,
     time_scale=fastest,
     order=4,
-    step_error=0.01,
+    step_error=0.002,
     confusable_with=(
         "servo_backlash",
         "servo_lag",

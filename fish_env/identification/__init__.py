@@ -4,9 +4,9 @@ Usable on its own: build a :class:`Problem`, call :func:`fit`, read the :class:`
 a fish with :func:`identified_fish`.
 """
 
-from fish_env.identification.estimator import Fit, fit, in_finer_steps
+from fish_env.identification.estimator import Fit, fit
 from fish_env.identification.problem import Problem
 from fish_env.identification.starts import likely_start
 from fish_env.identification.writing import identified_fish
 
-__all__ = ["Fit", "Problem", "fit", "identified_fish", "in_finer_steps", "likely_start"]
+__all__ = ["Fit", "Problem", "fit", "identified_fish", "likely_start"]

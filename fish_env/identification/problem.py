@@ -246,7 +246,7 @@ class Problem:
         return self.with_runs([run.in_long_steps() for run in self.runs])
 
     def with_finer_steps(self) -> Problem:
-        """The same problem in steps finer than those for effects that make the tail's rate jump."""
+        """The same problem in finer steps, to tell what those of motion with corners get wrong."""
         return self.with_runs([run.in_finer_steps() for run in self.runs])
 
     def has_corners(self, effects: Iterable[str]) -> bool:

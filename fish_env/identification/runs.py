@@ -51,10 +51,9 @@ LONG_STEP_S = 0.02
 """Longest step where causes are only compared: what most of them change comes out the same within
 a thousandth, what the quickest lags change within a tenth, and within a quarter where the tail's
 rate jumps. Twice as long, a lag that the usual steps follow diverges."""
-CORNER_STEP_S = 0.0025
-CORNER_FINE_STEP_S = 0.000625
-"""Usual and fine steps where the tail's rate may jump at any time; just after a switch of the
-commands it may do so twice within a few milliseconds."""
+CORNERS = 2
+"""How many times finer steps are where the tail's rate may jump at any time. What they get wrong is
+a hundredth of an effect or two, and :attr:`Fit.extrapolated` puts that right."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,9 +101,8 @@ class RunData:
 
     @property
     def corner_substeps(self) -> npt.NDArray[np.int64]:
-        """(T,) steps for motion with corners: finer everywhere, and most where they are fine."""
-        corner = _steps(self.clock, np.where(self.fresh, CORNER_FINE_STEP_S, CORNER_STEP_S))
-        return np.maximum(self.substeps, corner)
+        """(T,) steps for motion with corners: finer everywhere."""
+        return CORNERS * self.substeps
 
     def in_long_steps(self) -> RunData:
         """The same run, simulated no finer than a comparison needs."""
@@ -112,8 +110,8 @@ class RunData:
         return replace(self, substeps=np.minimum(self.substeps, _steps(self.clock, longest)))
 
     def in_finer_steps(self) -> RunData:
-        """The same run in steps finer than those of motion with corners."""
-        return replace(self, substeps=FINER * self.corner_substeps)
+        """The same run in finer steps."""
+        return replace(self, substeps=FINER * self.substeps)
 
     @property
     def commands(self) -> tuple[FloatArray, FloatArray]:

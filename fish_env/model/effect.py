@@ -112,9 +112,8 @@ class Effect:
         sample_time: (recorded time array, parameters) -> true time array (measurement).
         measure: (channel arrays by name, parameters) -> channel arrays (measurement).
         time_scale: parameters -> its fastest time constant (s); a physics step must not be longer.
-        step_error: share of its effect that steps of 2.5 ms get wrong, and finer ones just after a
-            command, for an effect that makes the tail's rate jump. Above zero, the identification
-            takes such steps.
+        step_error: share of its effect that the identification gets wrong, in its finer steps and
+            extrapolated, for an effect that makes the tail's rate jump. Above zero, it takes those.
         detunes: whether the tail runs ever further out of step with its command, so that what a
             large size does says little of what a small one does.
         equals: baseline coefficients (paths) other values of which do exactly the same.

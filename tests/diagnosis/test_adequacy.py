@@ -63,12 +63,14 @@ def fit_with(missing, seed=0, noise=QUIET):
     lin = Linearised(flat, np.zeros((len(flat), 0)), np.zeros(len(flat), np.int64),
                      np.repeat(run.clock, 6))  # fmt: skip
     problem = Answering(run, flat)
-    return SimpleNamespace(
+    own = SimpleNamespace(
         problem=problem, comparing=problem, filtered=[filtered], linearised=lin, released=(),
         effects=(), noise=noise,
         held=np.zeros((0, 0)),
         point=SimpleNamespace(z=np.zeros(0), effects={}),
     )  # fmt: skip
+    own.extrapolated = own
+    return own
 
 
 def test_noise_alone_reaches_the_floor():

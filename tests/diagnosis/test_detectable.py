@@ -141,6 +141,10 @@ def fading_late(z, d):
     return followed(z) + (0.5 * d * ALONG + 0.1 * ACROSS if d > 0 else 0.0)
 
 
+def hidden_below(z, d):
+    return followed(z) + 0.5 * max(d - 0.4, 0.0) * ALONG
+
+
 def test_a_signal_in_proportion_is_found_at_the_size_in_proportion():
     by_simulation, by_proportion = published(straight)
     assert by_simulation == pytest.approx(by_proportion, rel=1e-3)
@@ -185,6 +189,15 @@ def test_a_signal_that_does_not_fade_is_published_from_its_probe():
     assert published(never_fading)[0] == pytest.approx(1.0)
     by_simulation, by_proportion = published(fading_late)
     assert by_simulation == pytest.approx(by_proportion, rel=0.1)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("probe", [0.6, 1.0, 5.0])
+def test_an_effect_that_does_nothing_at_first_is_published_where_it_begins_to(probe):
+    by_simulation, by_proportion = published(hidden_below, probe)
+    assert by_proportion < 0.4
+    found = least_energy(hidden_below, by_simulation) / needed(hidden_below)
+    assert 0.5 < found < 2.0
 
 
 def test_no_size_is_published_that_the_simulation_is_too_coarse_for():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fish_env.data import load_dataset
-from fish_env.identification import Problem, fit, in_finer_steps
+from fish_env.identification import Problem, fit
 from tests.hidden.cases import make_case
 
 LIMIT = "servo_rate_limit"
@@ -28,11 +28,23 @@ def distances(own, other):
     return np.abs(own.estimates - other.estimates) / np.sqrt(np.diag(own.covariance))
 
 
-def test_one_step_leads_to_where_a_fit_in_finer_steps_ends(fitted):
-    problem, held = fitted.problem.with_finer_steps(), {"refit_noise": False}
+def test_what_steps_get_wrong_goes_with_their_length(fitted):
+    """As extrapolating needs: what is left of it is what does not."""
+    usual, finer = fitted.problem, fitted.problem.with_finer_steps()
+    finest = finer.with_finer_steps()
+    effects = {path: np.array([value]) for path, value in fitted.point.effects.items()}
+    at = fitted.point.z[:, None], effects, fitted.noise, fitted.filtered
+    exact = finest.innovations(*at)
+    wrong = [np.linalg.norm(p.innovations(*at) - exact) for p in (usual, finer)]
+    expected = (1.0 - 1.0 / 16.0) / (1.0 / 4.0 - 1.0 / 16.0)
+    assert wrong[0] / wrong[1] == pytest.approx(expected, rel=0.25)
+
+
+def test_one_step_leads_to_where_a_fit_in_much_finer_steps_ends(fitted):
+    problem, held = fitted.problem.with_finer_steps().with_finer_steps(), {"refit_noise": False}
     whole = fit(problem, (LIMIT,), fitted.point, fitted.noise, iterations=2, **held)
-    assert distances(in_finer_steps(fitted), whole).max() < 0.3
-    assert distances(fitted, whole).max() > 1.0
+    assert distances(fitted.extrapolated, whole).max() < 0.5
+    assert distances(fitted, whole).max() > 2.0
 
 
 def test_it_leads_towards_the_truth(case, fitted):
@@ -40,12 +52,13 @@ def test_it_leads_towards_the_truth(case, fitted):
         at = found.names.index(f"effects.{LIMIT}.rate")
         return (found.estimates[at] - case[1]) / np.sqrt(found.covariance[at, at])
 
-    assert abs(off(fitted)) > abs(off(in_finer_steps(fitted))) + 1.0
+    assert abs(off(fitted)) > abs(off(fitted.extrapolated)) + 1.0
 
 
 def test_everything_else_stays(fitted):
-    moved = in_finer_steps(fitted)
-    assert moved.linearised is fitted.linearised
+    moved = fitted.extrapolated
+    assert moved.linearised.slopes is fitted.linearised.slopes
+    assert moved.extrapolated is moved
     np.testing.assert_array_equal(moved.covariance, fitted.covariance)
     index = len(moved.problem.baseline)
     assert moved.point.effects[f"effects.{LIMIT}.rate"] == moved.estimates[index]
@@ -54,4 +67,4 @@ def test_everything_else_stays(fitted):
 def test_a_tail_without_jumps_needs_no_finer_steps(case):
     data = case[0]
     plain = fit(Problem(data, run_ids=data.ids[:1]), (), rounds=1, iterations=1)
-    assert in_finer_steps(plain) is plain
+    assert plain.extrapolated is plain

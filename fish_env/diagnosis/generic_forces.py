@@ -17,6 +17,7 @@ from fish_env.diagnosis.causes import Cause
 from fish_env.diagnosis.screening import SETTINGS_AT_ONCE, Projector, Signal
 from fish_env.identification.estimator import Fit
 from fish_env.identification.filtering import Filtered, Pushes
+from fish_env.identification.problem import Problem
 from fish_env.identification.runs import RunData
 from fish_env.identification.side_by_side import side_by_side
 from fish_env.sensing.channels import channels_from_states
@@ -84,12 +85,23 @@ def probes(columns: npt.NDArray[np.int64]) -> FloatArray:
 
 
 def changes(fit: Fit, forces: GenericForces, columns: npt.NDArray[np.int64]) -> FloatArray:
-    """How :func:`probes` of some wrenches change the residuals of a fit (D, N)."""
+    """How :func:`probes` of some wrenches change the residuals of a fit (D, N).
+
+    What a push does to the hull hardly depends on how jumps of the tail's rate are resolved: a fit
+    that does not look the same in long steps for their sake alone is pushed in those as well.
+    """
     count = 1 + len(columns)  # the first is pushed by nothing
     z = np.repeat(fit.point.z[:, None], count, axis=1)
     effects = {path: np.full(count, value) for path, value in fit.point.effects.items()}
     pushes = Pushes(forces.bases, np.r_[0, columns], np.r_[0.0, probes(columns)])
-    out = fit.comparing.innovations(z, effects, fit.noise, fit.filtered, pushes)
+
+    def pushed(problem: Problem) -> FloatArray:
+        return problem.innovations(z, effects, fit.noise, fit.filtered, pushes)
+
+    corners = fit.problem.has_corners(fit.point.effects)
+    out = pushed(fit.problem.with_long_steps() if corners else fit.comparing)
+    if not np.isfinite(out).all():
+        out = pushed(fit.problem)
     return np.asarray((out[1:] - out[0]).T)
 
 

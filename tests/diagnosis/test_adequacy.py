@@ -40,6 +40,9 @@ class Answering:
         self.runs, self.residuals, self.baseline, self.known = (run,), residuals, Sized(()), {}
         self.fish = load_fish("zheng-2021-a")
 
+    def has_corners(self, effects):
+        return False
+
     def innovations(self, z, effects, noise, filtered, pushes):
         out = np.tile(self.residuals, (len(pushes.column), 1)).reshape(-1, SAMPLES, 6)
         for lane, (column, size) in enumerate(zip(pushes.column, pushes.size, strict=True)):

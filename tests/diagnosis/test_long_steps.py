@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fish_env.diagnosis.generic_forces import changes as pushed
+from fish_env.diagnosis.generic_forces import generic_forces
 from fish_env.diagnosis.screening import residual_changes
 from fish_env.identification import Problem, fit
 from fish_env.identification.problem import Point
@@ -78,3 +80,31 @@ def test_only_what_jumps_is_sketched_in_the_usual_steps(fitted, monkeypatch):
     usual = fitted.problem.longest_step
     assert sorted(set(seen)) == pytest.approx([usual, 2.0 * usual])
     assert seen[0] == pytest.approx(2.0 * usual)
+
+
+@pytest.fixture(scope="module")
+def limited():
+    """A fit with a rate limit in it, and forces along it."""
+    setup = Setup(runs=1, duration=4.0)
+    problem = Problem(simulate(setup), paths=PATHS)
+    limit = Point(np.zeros(len(problem.baseline)), {"effects.servo_rate_limit.rate": 2.5})
+    held = {"refit_noise": False, "noise": setup.noise}
+    own = fit(problem, ("servo_rate_limit",), limit, iterations=1, **held)
+    return own, generic_forces(problem.runs, own.filtered)
+
+
+def test_a_push_does_the_same_in_long_steps_where_the_tails_rate_jumps(limited, monkeypatch):
+    own, forces = limited
+    long = pushed(own, forces, forces.columns)
+    monkeypatch.setattr(Problem, "with_long_steps", lambda self: self)
+    usual = pushed(own, forces, forces.columns)
+    assert not np.array_equal(long, usual)
+    apart = np.linalg.norm(long - usual, axis=0) / np.linalg.norm(usual, axis=0)
+    assert apart.max() < 0.05
+    assert np.median(apart) < 0.01
+
+
+def test_pushes_that_long_steps_do_not_follow_take_the_usual_ones(limited, monkeypatch):
+    own, forces = limited
+    monkeypatch.setattr(Problem, "with_long_steps", lambda self: Diverging(self))
+    assert np.isfinite(pushed(own, forces, forces.columns[:6])).all()

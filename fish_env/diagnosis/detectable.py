@@ -128,12 +128,10 @@ def simulated(fit: Fit, screen: Screen, settings: Sequence[Setting]) -> FloatArr
         with np.errstate(divide="ignore"):
             steps = np.log(target / energy) / (believed if turn else SMOOTH)
         steps = np.where(silent, 0.5 * np.log(last / at), steps)
-        before = at.copy()
-        last, last_energy = (
-            np.where(silent, *pair) for pair in ((last, at), (last_energy, energy))
-        )
-        at[moving] = np.maximum(at * np.exp(steps), least)[moving]
-        moving &= np.abs(np.log(at / before)) > TOLERANCE
+        last, last_energy = np.where(silent, last, at), np.where(silent, last_energy, energy)
+        corrected = np.where(moving, np.maximum(at * np.exp(steps), least), at)
+        moving &= np.abs(np.log(corrected / at)) > TOLERANCE
+        at = corrected
     energy = _energies(fit, screen, settings, probe, endless)
     twice = _energies(fit, screen, settings, 2.0 * probe, endless)
     fades = _power(probe, energy, 2.0 * probe, twice) >= FADING

@@ -99,8 +99,9 @@ def changes(fit: Fit, forces: GenericForces, columns: npt.NDArray[np.int64]) -> 
         return problem.innovations(z, effects, fit.noise, fit.filtered, pushes)
 
     corners = fit.problem.has_corners(fit.point.effects)
-    out = pushed(fit.problem.with_long_steps() if corners else fit.comparing)
-    if not np.isfinite(out).all():
+    problem = fit.problem.with_long_steps() if corners else fit.comparing
+    out = pushed(problem)
+    if problem is not fit.problem and not np.isfinite(out).all():
         out = pushed(fit.problem)
     return np.asarray((out[1:] - out[0]).T)
 

@@ -230,17 +230,17 @@ def finished(own: Fit) -> Fit:
 def _extrapolated(own: Fit) -> Fit:
     free = Free(own.problem, own.effects, own.released)
     vector, lin = free.pack(own.point), own.linearised
-    fine = own.problem.with_finer_steps()
+    problem, fine = own.problem, own.problem.with_finer_steps()
     (finer,) = residuals_at(fine, free, vector[:, None], own.noise, own.filtered)
     defect = (finer - lin.residuals) * FINER / (FINER - 1)
     before = lin.residuals + defect
     pull = gradient(lin.slopes, before, free.prior, vector)
     moved = free.clip(vector + free.within.step(information(lin.slopes, free.prior), pull, vector))
-    (usual,) = residuals_at(own.problem, free, moved[:, None], own.noise, own.filtered)
+    (usual,) = residuals_at(problem, free, moved[:, None], own.noise, own.filtered)
     after = usual + defect
-    if objective_of(fine, free, moved, after) >= objective_of(fine, free, vector, before):
+    if objective_of(problem, free, moved, after) >= objective_of(problem, free, vector, before):
         moved, after = vector, before
-    estimates, residuals = _physical(fine, moved), replace(lin, residuals=after)
+    estimates, residuals = _physical(problem, moved), replace(lin, residuals=after)
     return replace(
         own, point=free.unpack(moved), estimates=estimates, linearised=residuals, in_the_limit=True
     )

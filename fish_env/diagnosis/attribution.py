@@ -18,7 +18,6 @@ from fish_env.diagnosis.screening import Projector, Screen, Signal, screen
 from fish_env.diagnosis.search import (
     Explanation,
     exchanged,
-    loosened,
     reached,
     refits,
     second_look,
@@ -27,6 +26,7 @@ from fish_env.diagnosis.search import (
 from fish_env.effects.extended import PREFIX
 from fish_env.identification.estimator import Fit, finished
 from fish_env.identification.problem import Problem
+from fish_env.identification.side_by_side import both
 
 FloatArray = npt.NDArray[np.float64]
 MOST_CAUSES = 3
@@ -106,7 +106,11 @@ def attribute(
         report: told what is being done.
     """
     nothing = Explanation((), baseline)
-    begun = Attribution(nothing, (screen(baseline, causes, rng),), nothing, (), (), 0.0)
+    astray = effort.retries and strains(baseline)
+    first, _ = both(  # what strains is looked at with a wandering phase as well, in any case
+        partial(screen, baseline, causes, rng), lambda: nothing.loosened if astray else None
+    )
+    begun = Attribution(nothing, (first,), nothing, (), (), 0.0)
     return extended(begun, causes, rng, effort, report)
 
 
@@ -238,7 +242,7 @@ def _with_wandering_phase(
     """What shows when the tail's phase may wander."""
     if not _may_be_out_of_step(current, chosen):
         return None
-    loose = loosened(current)
+    loose = current.loosened
     if loose is None:
         return None
     shown = screen(loose, causes, rng)

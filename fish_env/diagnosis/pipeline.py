@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -34,6 +35,7 @@ from fish_env.diagnosis.writing import EXTENDING, write_answer
 from fish_env.errors import DatasetError
 from fish_env.identification.estimator import Fit, finished, fit
 from fish_env.identification.problem import Problem
+from fish_env.identification.side_by_side import both
 from fish_env.params.io import load_fish
 from fish_env.params.schema import FishParams
 
@@ -188,20 +190,23 @@ def _diagnose_runs(
     check_runs(dataset)
     progress("comparing the channels with each other")
     floors = noise_floors(dataset)
-    agreed = check_consistency(dataset, np.random.default_rng([seed, 2]), floors)
     fitted, final = fitted_and_final(dataset, seed)
-    progress("refitting the baseline")
     problem = Problem(dataset, fish, fitted, dt=effort.step_s)
     problem = problem.subset(effort.runs).until(effort.seconds)
-    baseline = _refitted(problem)
+    progress("refitting the baseline")
+    compare = partial(check_consistency, dataset, np.random.default_rng([seed, 2]), floors)
+    baseline, agreed = both(partial(_refitted, problem), compare)
     problem = baseline.problem  # with the tail phases settled
     causes = causes_of(problem)
     progress("screening causes")
     attribution = attribute(problem, baseline, causes, rng, effort, progress)
-    progress("what the runs could show")
-    shown = preconditions(problem, attribution.screens[0], causes, None if quick else baseline)
-    progress("testing what is left")
-    left = adequacy(attribution.accepted.fit, rng, attribution.tolerated)
+    progress("testing what is left, and what the runs could show")
+    left, shown = both(
+        partial(adequacy, attribution.accepted.fit, rng, attribution.tolerated),
+        partial(
+            preconditions, problem, attribution.screens[0], causes, None if quick else baseline
+        ),
+    )
     if effort.retries and not left.reached:
         attribution, left = _with_weaker_causes(attribution, left, causes, rng, progress)
     verdict = decide(attribution, left, shown)

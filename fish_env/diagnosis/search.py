@@ -10,6 +10,7 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from fish_env.diagnosis.adequacy import strains
 from fish_env.diagnosis.effort import FULL, Effort
 from fish_env.diagnosis.screening import Signal
 from fish_env.diagnosis.starts import baselines, probed, starts
@@ -46,6 +47,20 @@ class Explanation:
 
     causes: tuple[str, ...]
     fit: Fit
+
+    @cached_property
+    def loosened(self) -> Fit | None:
+        """The fit on a few runs when the tail's phase may wander from its command.
+
+        A beat a little quicker or slower than commanded is soon out of step, and every slope along
+        the simulation is then wrong. A filter that lets the phase go follows the beat, and what
+        drives the phase away becomes plain; what only shifts it, as a delay does, is hidden
+        instead. None where the simulation diverges.
+        """
+        own = self.fit
+        noise = replace(own.noise, phase_sd=WANDER)
+        few = own.problem.subset(3)
+        return reached(lambda: fit(few, own.effects, own.point, noise, own.released, rounds=2))
 
     def extrapolated(self) -> Explanation:
         """The same causes, with estimates as ever finer steps put them."""
@@ -90,19 +105,6 @@ def reached(make: Callable[[], T]) -> T | None:
         return None
 
 
-def loosened(current: Explanation) -> Fit | None:
-    """The fit on a few runs when the tail's phase may wander from its command.
-
-    A beat a little quicker or slower than commanded is soon out of step, and every slope along
-    the simulation is then wrong. A filter that lets the phase go follows the beat, and what drives
-    the phase away becomes plain; what only shifts it, as a delay does, is hidden instead.
-    """
-    own = current.fit
-    noise = replace(own.noise, phase_sd=WANDER)
-    few = own.problem.subset(3)
-    return reached(lambda: fit(few, own.effects, own.point, noise, own.released, rounds=2))
-
-
 def refits(
     current: Explanation,
     chosen: Sequence[Signal],
@@ -124,6 +126,8 @@ def refits(
         effort: how many causes to try beside the chosen ones, and to fit in full.
         like: further causes known to look like one, which are tried if it leads.
     """
+    if not chosen:
+        return [], None
     base = current.fit
     sketcher = Sketcher(base)
     wandering, shown = loose or (base, ())
@@ -145,15 +149,11 @@ def refits(
         more = side_by_side(partial(alone, s) for s in like(ahead)[: effort.shortlist])
         sketches += [s for found in more for s in found]
     finalists = _finalists(sketches, sketcher.base, BEHIND, effort.finalists)
-    leader = None
-    while finalists and leader is None:
-        (name, sketch), *finalists = finalists
-        report(f"fitting {name}")
-        leader = _in_full(base.problem, sketch, base.noise)
-    if leader is None:
+    settled = bool(current.causes) and not strains(base)
+    found = (_gaining if settled else _led)(current, finalists, report)
+    if not found:
         return [], None
-    first = Explanation((*current.causes, name), leader)
-    tried, noise = _best_first([first, *_rest(current, finalists, leader, report)])
+    tried, noise = _best_first(found, None if settled else found[0])
     # A baseline that diverges under the smaller disturbance keeps the one that suits it.
     return tried, Explanation(current.causes, _at_noise(base.problem, base, noise, 2) or base)
 
@@ -187,7 +187,7 @@ def second_look(
     finalists = _finalists(sketches, reached, 0.0, FULL.finalists)
     finalists = [f for f in finalists if f[1].objective < reached + LEEWAY]
     more = _rest(current, finalists, best, report)
-    return _best_first([*tried, *more])[0]
+    return _best_first([*tried, *more], tried[0])[0]
 
 
 def exchanged(current: Explanation, left: Sequence[Signal], report: Report) -> list[Explanation]:
@@ -299,6 +299,33 @@ def _finalists(
     return [s for s in ranked[:most] if s[1].objective <= best + margin]
 
 
+def _led(
+    current: Explanation, finalists: list[tuple[str, Sketch]], report: Report
+) -> list[Explanation]:
+    """Full fits under the noise that the likeliest of them leaves, which comes first."""
+    base, left = current.fit, [*finalists]
+    while left:
+        name, sketch = left.pop(0)
+        report(f"fitting {name}")
+        leader = _in_full(base.problem, sketch, base.noise)
+        if leader is not None:
+            first = Explanation((*current.causes, name), leader)
+            return [first, *_rest(current, left, leader, report)]
+    return []
+
+
+def _gaining(
+    current: Explanation, finalists: list[tuple[str, Sketch]], report: Report
+) -> list[Explanation]:
+    """Full fits under the present noise; none of them where none explains more than there is.
+
+    Where no misfit drives the disturbance, one more cause hardly changes it: its model will do to
+    see whether what showed was chance.
+    """
+    found = _rest(current, finalists, current.fit, report)
+    return found if any(e.score < current.score for e in found) else []
+
+
 def _rest(
     current: Explanation, finalists: list[tuple[str, Sketch]], leader: Fit, report: Report
 ) -> list[Explanation]:
@@ -314,16 +341,21 @@ def _rest(
     return [explanation for explanation in side_by_side(tasks) if explanation]
 
 
-def _best_first(tried: list[Explanation]) -> tuple[list[Explanation], NoiseModel]:
-    """Explanations by score, the first with the noise it leaves, and the others under that."""
-    leader = tried[0]
-    problem = leader.fit.problem
+def _best_first(
+    tried: list[Explanation], leader: Explanation | None
+) -> tuple[list[Explanation], NoiseModel]:
+    """Explanations by score, the first with the noise it leaves, and the others under that.
+
+    Args:
+        tried: explanations under one noise model.
+        leader: the one that has left it, if one of them has.
+    """
     ranked = sorted(tried, key=lambda e: e.score)
-    if ranked[0] is leader:
-        return ranked, leader.fit.noise
-    first = _noise_too(problem, ranked[0].fit)
+    own = ranked[0].fit
+    problem = own.problem
+    first = None if ranked[0] is leader else _noise_too(problem, own)
     if first is None:
-        return ranked, leader.fit.noise
+        return ranked, own.noise
     tasks = [partial(_at_noise, problem, e.fit, first.noise, 2) for e in ranked[1:]]
     pairs = zip(ranked[1:], side_by_side(tasks), strict=True)
     others = [Explanation(e.causes, fitted) for e, fitted in pairs if fitted]

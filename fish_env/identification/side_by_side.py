@@ -9,6 +9,8 @@ from typing import TypeVar
 from fish_env.model.runtime import default_threads
 
 T = TypeVar("T")
+A = TypeVar("A")
+B = TypeVar("B")
 
 
 def side_by_side(tasks: Iterable[Callable[[], T]]) -> list[T]:
@@ -18,3 +20,10 @@ def side_by_side(tasks: Iterable[Callable[[], T]]) -> list[T]:
     """
     with ThreadPoolExecutor(default_threads(), thread_name_prefix="fit") as pool:
         return list(pool.map(lambda task: task(), tasks))
+
+
+def both(one: Callable[[], A], other: Callable[[], B]) -> tuple[A, B]:
+    """Results of two tasks that do not depend on each other."""
+    with ThreadPoolExecutor(1, thread_name_prefix="fit") as pool:
+        found = pool.submit(other)
+        return one(), found.result()

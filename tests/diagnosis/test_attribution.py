@@ -117,11 +117,11 @@ def test_what_puts_a_beat_out_of_step_is_tried_whatever_the_screen_makes_of_it(m
     shown = SimpleNamespace(best=lambda: [*weak, *strong])
     loose = SimpleNamespace()
     for name, value in {
-        "strains": lambda fit: ("a push",), "loosened": lambda current: loose,
+        "strains": lambda fit: ("a push",),
         "screen": lambda *a: shown,
     }.items():  # fmt: skip
         monkeypatch.setattr(attribution, name, value)
-    nothing = SimpleNamespace(causes=(), fit=None)
+    nothing = SimpleNamespace(causes=(), fit=None, loosened=loose)
     found, tried = attribution._with_wandering_phase(nothing, strong, (), None)
     assert found is loose
     names = [s.cause.name for s in tried]

@@ -50,7 +50,7 @@ def contest(monkeypatch, results, shown="abc"):
         "_at_noise",
         lambda problem, at, noise, *spent: results.get(getattr(at, "name", None)),
     )
-    monkeypatch.setattr(search, "_best_first", lambda tried: (tried, None))
+    monkeypatch.setattr(search, "_best_first", lambda tried, leader: (tried, None))
     monkeypatch.setattr(
         search, "_finalists", lambda found, *rest: sorted(found, key=lambda f: f[1].objective)
     )

@@ -17,7 +17,8 @@ from fish_env.diagnosis.generic_forces import (
     generic_signals,
     probes,
 )
-from fish_env.diagnosis.screening import Projector, Signal, null_threshold
+from fish_env.diagnosis.projection import Projector, Signal
+from fish_env.diagnosis.screening import null_threshold
 from fish_env.effects.extended import PREFIX
 from fish_env.identification.estimator import Fit
 from fish_env.identification.noise import disturbance_range

@@ -14,7 +14,8 @@ from fish_env.diagnosis.adequacy import implausible, strains
 from fish_env.diagnosis.causes import PARAMETER, Cause, same_causes
 from fish_env.diagnosis.effort import FULL, Effort
 from fish_env.diagnosis.left_out import left_out_scores
-from fish_env.diagnosis.screening import Projector, Screen, Signal, screen
+from fish_env.diagnosis.projection import Projector, Signal
+from fish_env.diagnosis.screening import Screen, screen
 from fish_env.diagnosis.search import (
     Explanation,
     exchanged,

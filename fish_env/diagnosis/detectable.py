@@ -16,13 +16,8 @@ import numpy.typing as npt
 
 from fish_env.diagnosis import tails
 from fish_env.diagnosis.causes import Probe
-from fish_env.diagnosis.screening import (
-    Projector,
-    Screen,
-    Signal,
-    residual_changes,
-    smallest_detectable,
-)
+from fish_env.diagnosis.projection import Projector, Signal
+from fish_env.diagnosis.screening import Screen, residual_changes, smallest_detectable
 from fish_env.identification.estimator import Fit
 from fish_env.identification.free import Free
 from fish_env.identification.problem import Problem

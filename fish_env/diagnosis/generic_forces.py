@@ -8,18 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
 from fish_env.diagnosis.causes import Cause
-from fish_env.diagnosis.screening import SETTINGS_AT_ONCE, Projector, Signal
+from fish_env.diagnosis.projection import Projector, Signal
+from fish_env.diagnosis.screening import SETTINGS_AT_ONCE
 from fish_env.identification.estimator import Fit
 from fish_env.identification.filtering import Filtered, Pushes
 from fish_env.identification.problem import Problem
 from fish_env.identification.runs import RunData
-from fish_env.identification.side_by_side import side_by_side
 from fish_env.sensing.channels import channels_from_states
 
 FloatArray = npt.NDArray[np.float64]
@@ -112,11 +111,9 @@ def generic_signals(
     """Each wrench by its column, as a cause that a refit follows as far as it can."""
     for first in range(0, len(forces.columns), SETTINGS_AT_ONCE):
         part = forces.columns[first : first + SETTINGS_AT_ONCE]
-        tasks = [
-            partial(projector.signal, NOTHING, 0, change[:, None], strain=False)
-            for change in changes(fit, forces, part).T
-        ]
-        for column, signal in zip(part.tolist(), side_by_side(tasks), strict=True):
+        each = [(NOTHING, 0, [i]) for i in range(len(part))]
+        signals = projector.signals(each, changes(fit, forces, part).T, strain=False)
+        for column, signal in zip(part.tolist(), signals, strict=True):
             if signal is not None:
                 yield column, signal
 

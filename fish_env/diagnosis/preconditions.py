@@ -9,7 +9,8 @@ import numpy as np
 
 from fish_env.diagnosis.causes import Cause, Probe
 from fish_env.diagnosis.detectable import Setting, in_proportion, simulated
-from fish_env.diagnosis.screening import Screen, Signal, confusability, smallest_detectable
+from fish_env.diagnosis.projection import Signal
+from fish_env.diagnosis.screening import Screen, confusability, smallest_detectable
 from fish_env.identification.estimator import Fit
 from fish_env.identification.problem import Problem
 from fish_env.model.effect import Effect

@@ -24,7 +24,7 @@ from fish_env.diagnosis.generic_forces import (
     generic_signals,
     probes,
 )
-from fish_env.diagnosis.screening import Projector
+from fish_env.diagnosis.projection import Projector
 from fish_env.diagnosis.tails import chi2_log_tail
 from fish_env.identification.estimator import Fit, fit
 from fish_env.identification.filtering import Filtered, NoiseModel

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from fish_env.diagnosis.adequacy import strains
 from fish_env.diagnosis.effort import FULL, Effort
-from fish_env.diagnosis.screening import Signal
+from fish_env.diagnosis.projection import Signal
 from fish_env.diagnosis.starts import baselines, probed, starts
 from fish_env.effects.extended import PREFIX
 from fish_env.identification.estimator import Fit, fit

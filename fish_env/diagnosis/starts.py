@@ -6,7 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fish_env.diagnosis.causes import comb, combined, effect_values, mirrored
-from fish_env.diagnosis.screening import Signal, zoomed
+from fish_env.diagnosis.projection import Signal
+from fish_env.diagnosis.screening import zoomed
 from fish_env.identification.estimator import Fit
 from fish_env.identification.problem import Point, Problem
 

@@ -17,7 +17,7 @@ from scipy.stats import chi2, ncx2
 
 from fish_env.diagnosis.causes import Cause, probes_of
 from fish_env.diagnosis.detectable import changes
-from fish_env.diagnosis.screening import Projector
+from fish_env.diagnosis.projection import Projector
 from fish_env.identification.estimator import Fit, fit
 from fish_env.identification.filtering import NoiseModel
 from fish_env.identification.problem import Point, Problem

@@ -16,7 +16,7 @@ from threadpoolctl import threadpool_limits
 from fish_env.data import Dataset
 from fish_env.diagnosis.causes import Cause, effect_values
 from fish_env.diagnosis.pipeline import fitted_and_final
-from fish_env.diagnosis.screening import Projector
+from fish_env.diagnosis.projection import Projector
 from fish_env.identification.estimator import Fit, fit
 from fish_env.identification.problem import Problem
 from scripts.power.looks import Target, Values, measured

@@ -14,7 +14,8 @@ from fish_env.diagnosis.detectable import (
     noncentrality,
     simulated,
 )
-from fish_env.diagnosis.screening import Projector, Screen
+from fish_env.diagnosis.projection import Projector
+from fish_env.diagnosis.screening import Screen
 from fish_env.identification.free import Linearised
 from fish_env.model.effect import Effect, EffectParameter
 

@@ -7,14 +7,8 @@ import pytest
 from scipy.stats import kstest
 
 from fish_env.diagnosis.causes import Cause, best_of_each, causes_of, coefficient_sizes
-from fish_env.diagnosis.screening import (
-    Projector,
-    Signal,
-    confusability,
-    null_threshold,
-    screen,
-    smallest_detectable,
-)
+from fish_env.diagnosis.projection import Projector, Signal
+from fish_env.diagnosis.screening import confusability, null_threshold, screen, smallest_detectable
 from fish_env.identification import Problem, fit
 from fish_env.params import load_fish
 from tests.diagnosis.linear import COEFFICIENTS, LinearProblem

@@ -1,0 +1,220 @@
+"""What each cause would change, seen through a refit of the baseline: before looking, and after.
+
+All in the whitened prediction errors of the filter, where noise is white with unit variance. A
+cause's signal is projected on what the baseline (under its priors) cannot follow; the rest decides
+how detectable it is, how alike two causes are, and how much of the misfit it explains.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+
+import numpy as np
+import numpy.typing as npt
+
+from fish_env.diagnosis.causes import Cause
+from fish_env.diagnosis.tails import chi2_log_tail
+from fish_env.identification.estimator import Fit
+from fish_env.identification.information import (
+    BLOCK_S,
+    LONG_BLOCK_S,
+    block_index,
+    gradient,
+    information,
+    prior_precision,
+    sums_over,
+)
+from fish_env.identification.products import inner
+from fish_env.identification.side_by_side import side_by_side
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Signal:
+    """A cause at one of its alternatives.
+
+    Attributes:
+        cause: the cause.
+        probe: index of the alternative (-1: a baseline coefficient).
+        left: (D, m) change of the residuals for the settings probed, after a refit.
+        energy: squared size of that change before the refit.
+        projected: (m, m) information about the settings after a refit of the baseline.
+        score: (m,) projected signal times residuals.
+        inflation: factor by which coloured residuals widen the score, at least 1.
+    """
+
+    cause: Cause
+    probe: int
+    left: FloatArray
+    energy: float
+    projected: FloatArray
+    score: FloatArray
+    inflation: float
+
+    @property
+    def freedom(self) -> int:
+        """Number of settings."""
+        return len(self.score)
+
+    @property
+    def statistic(self) -> float:
+        """Likelihood ratio of the linearised fit: chi-squared with ``freedom`` under no effect."""
+        return float(self.score @ np.linalg.solve(self.projected, self.score)) / self.inflation
+
+    @property
+    def unwidened(self) -> float:
+        """The statistic as if what is left were white: what is out of step all along is not."""
+        return self.statistic * self.inflation
+
+    @property
+    def log_p(self) -> float:
+        """Logarithm of the p-value of this one test: overwhelming evidence still ranks."""
+        return float(chi2_log_tail(self.statistic, self.freedom))
+
+    @cached_property
+    def span(self) -> FloatArray:
+        """(D, m) orthonormal, of what is left after a refit."""
+        return np.asarray(np.linalg.qr(self.left)[0])
+
+    @property
+    def absorbed_share(self) -> float:
+        """Share of the signal's energy that a refit of the baseline swallows."""
+        return 1.0 - float(np.trace(self.projected)) / self.energy
+
+
+class Projector:
+    """Removes from signals what a refit of the free parameters of a fit would follow.
+
+    A refit follows nothing across a bound that holds it back already: the tangent space is that
+    of the bounds the fit is pressed against.
+    """
+
+    def __init__(self, fit: Fit) -> None:
+        self.lin = fit.linearised
+        slopes = self.lin.slopes
+        baseline = fit.problem.baseline
+        self.prior = prior_precision(baseline, slopes.shape[1] - len(baseline), fit.released)
+        self.vector = np.concatenate([fit.point.z, np.zeros(slopes.shape[1] - len(baseline))])
+        self.hessian = information(slopes, self.prior)
+        self.factor = np.linalg.cholesky(self.hessian)
+        self.held = fit.held
+        self.blocks = [
+            block_index(self.lin.run_of, self.lin.time_of, s) for s in (BLOCK_S, LONG_BLOCK_S)
+        ]
+
+    def coefficients(self, columns: FloatArray) -> FloatArray:
+        """How a refit follows the columns: (n, m)."""
+        return self.moved(inner(self.lin.slopes, columns), self.held)
+
+    def moved(self, pull: FloatArray, held: FloatArray) -> FloatArray:
+        """How far a pull (n, m) takes the free parameters, along bounds (k, n) that hold."""
+        free = self._free(pull)
+        if not len(held):
+            return free
+        across = self._free(held.T)
+        return np.asarray(free - across @ np.linalg.solve(held @ across, held @ free))
+
+    def let_go(self, i: int) -> tuple[float, float]:
+        """Where one coefficient settles when no bound of its own holds it, and its variance."""
+        own = np.array([np.flatnonzero(row)[-1] == i for row in self.held], bool)
+        others = self.held[~own]
+        variance = float(self.moved(np.eye(len(self.vector))[:, [i]], others)[i, 0])
+        at = float(self.vector[i])
+        if own.any():
+            at -= float(self.moved(self.gradient[:, None], others)[i, 0])
+        return at, variance
+
+    @cached_property
+    def gradient(self) -> FloatArray:
+        """What pulls the free parameters (n,), along bounds and across them."""
+        return gradient(self.lin.slopes, self.lin.residuals, self.prior, self.vector)
+
+    def _free(self, pull: FloatArray) -> FloatArray:
+        return np.asarray(np.linalg.solve(self.factor.T, np.linalg.solve(self.factor, pull)))
+
+    def signal(
+        self, cause: Cause, probe: int, columns: FloatArray, strain: bool = True
+    ) -> Signal | None:
+        """Project a cause; None where nothing of it is left, or the simulation diverges with it.
+
+        Args:
+            cause: the cause.
+            probe: index of the alternative.
+            columns: (D, m) change of the residuals.
+            strain: whether what pulled the coefficients from their priors counts as evidence, as
+                it does for a cause that would let them return.
+        """
+        return self.signals([(cause, probe, slice(None))], columns.T, strain)[0]
+
+    def signals(
+        self,
+        tests: Sequence[tuple[Cause, int, Sequence[int] | slice]],
+        rows: FloatArray,
+        strain: bool = True,
+    ) -> list[Signal | None]:
+        """As :meth:`signal`, of many causes at once: a tall product costs no more than a slim one.
+
+        Args:
+            tests: cause, index of the alternative, and which rows are its own.
+            rows: (m, D) changes of the residuals.
+            strain: see :meth:`signal`.
+        """
+        followed, left = np.empty((len(self.vector), len(rows))), np.empty_like(rows)
+
+        def follow(own: slice) -> None:
+            followed[:, own] = self.coefficients(rows[own].T)
+            np.matmul(followed[:, own].T, self.lin.slopes.T, out=left[own])
+            np.subtract(rows[own], left[own], out=left[own])
+
+        half = len(rows) // 2
+        side_by_side(partial(follow, own) for own in (slice(half), slice(half, None)))
+
+        def one(test: tuple[Cause, int, Sequence[int] | slice]) -> Signal | None:
+            cause, probe, own = test
+            return self._signal(cause, probe, rows[own].T, followed[:, own], left[own].T, strain)
+
+        return side_by_side(partial(one, test) for test in tests)
+
+    def _signal(
+        self,
+        cause: Cause,
+        probe: int,
+        columns: FloatArray,
+        followed: FloatArray,
+        left: FloatArray,
+        strain: bool,
+    ) -> Signal | None:
+        if not np.isfinite(left).all():
+            return None
+        projected = inner(left, left) + followed.T @ (self.prior[:, None] * followed)
+        energy = np.einsum("ij,ij->j", columns, columns)
+        if np.any(np.diag(projected) < 1e-4) or np.any(energy < 1e-3):
+            return None
+        projected += 1e-9 * np.diag(np.diag(projected))
+        score = -left.T @ self.lin.residuals
+        if strain:
+            score += followed.T @ (self.prior * self.vector)
+        step = np.linalg.solve(projected, score)
+        remaining = self.lin.residuals + left @ step
+        inflation = self.inflation(left, remaining)
+        return Signal(cause, probe, left, float(energy.sum()), projected, score, inflation)
+
+    def inflation(self, left: FloatArray, residuals: FloatArray) -> float:
+        """Spread of block sums of the score against what white residuals would give.
+
+        The larger of two spreads, over blocks long enough for most disturbances and for slow ones.
+
+        Args:
+            left: (D, m) change of the residuals.
+            residuals: (D,) without what changes along those directions would take from them.
+        """
+        scores = left * residuals[:, None]
+        white = np.maximum(np.einsum("ij,ij->j", left, left), 1e-12)
+        largest = 1.0
+        for index in self.blocks:
+            sums = sums_over(index, scores)
+            largest = max(largest, float((np.einsum("ij,ij->j", sums, sums) / white).max()))
+        return largest

@@ -13,17 +13,11 @@ from scipy.special import chdtri, stdtrit
 from fish_env.diagnosis.adequacy import implausible, strains
 from fish_env.diagnosis.causes import PARAMETER, Cause, same_causes
 from fish_env.diagnosis.effort import FULL, Effort
+from fish_env.diagnosis.explanation import Explanation, reached
 from fish_env.diagnosis.left_out import left_out_scores
 from fish_env.diagnosis.projection import Projector, Signal
 from fish_env.diagnosis.screening import Screen, screen
-from fish_env.diagnosis.search import (
-    Explanation,
-    exchanged,
-    reached,
-    refits,
-    second_look,
-    without,
-)
+from fish_env.diagnosis.search import exchanged, refits, second_look, without
 from fish_env.effects.extended import PREFIX
 from fish_env.identification.estimator import Fit, finished
 from fish_env.identification.problem import Problem
@@ -141,13 +135,14 @@ def extended(
     while len(current.causes) < MOST_CAUSES and not any(tied(current, e) for e in rivals):
         found = len(current.fit.released)
         chosen = shortlisted(problem, screens[-1], effort.shortlist, rough * total, lenience, found)
+        relatives: list[Signal] = []
         for name in current.causes if chosen and effort.retries else ():
             # What looks like an accepted cause may be in its numbers, and shows no more.
-            chosen += _like(name, screens[-1], chosen, problem)
-        hiding = _detuning(current, screens[-1], chosen)
+            relatives += _like(name, screens[-1], [*chosen, *relatives], problem)
+        unseen = [*relatives, *_detuning(current, screens[-1], chosen)]
         loose = _with_wandering_phase(current, chosen, causes, rng) if effort.retries else None
-        like = partial(_like, before=screens[-1], chosen=[*chosen, *hiding], problem=problem)
-        tried, base = refits(current, [*chosen, *hiding], report, loose, effort, like)
+        like = partial(_like, before=screens[-1], chosen=[*chosen, *unseen], problem=problem)
+        tried, base = refits(current, chosen, report, loose, effort, like, unseen)
         if base is None:
             break
         if not ranking:
@@ -159,7 +154,8 @@ def extended(
         after = screen(tried[0].fit, causes, rng)
         rough = roughness(tried[0])
         if effort.retries and shortlisted(problem, after, 1, rough * total):
-            others = [*chosen, *_new(after, chosen)]
+            others = [*chosen, *relatives]
+            others += _new(after, others)
             others += _like(tried[0].causes[-1], screens[-1], others, problem)
             again = second_look(current, tried, others, report)
             if again[0] is not tried[0]:

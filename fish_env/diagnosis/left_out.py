@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from fish_env.diagnosis.search import Explanation, known_before
+from fish_env.diagnosis.explanation import Explanation, known_before
 from fish_env.identification.information import information
 
 FloatArray = npt.NDArray[np.float64]

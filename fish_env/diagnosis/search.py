@@ -2,107 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
-from typing import TypeVar
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
 from fish_env.diagnosis.adequacy import strains
 from fish_env.diagnosis.effort import FULL, Effort
+from fish_env.diagnosis.explanation import Explanation, reached
 from fish_env.diagnosis.projection import Signal
 from fish_env.diagnosis.starts import baselines, probed, starts
 from fish_env.effects.extended import PREFIX
 from fish_env.identification.estimator import Fit, fit
 from fish_env.identification.filtering import NoiseModel
-from fish_env.identification.free import REACH
-from fish_env.identification.information import information, prior_precision
 from fish_env.identification.problem import Point, Problem
 from fish_env.identification.side_by_side import side_by_side
 from fish_env.identification.sketch import Sketch, Sketcher
 
 FloatArray = npt.NDArray[np.float64]
 Report = Callable[[str], None]
-T = TypeVar("T")
-WANDER = 0.3
-"""rad/s^0.5. Enough to stay in step with a beat that is a tenth off."""
 BEHIND = 0.25
 """A sketch that gains less by more than this share of the best one's gain is not fitted in full."""
 LEEWAY = 100.0
 """... unless the difference in -2 log likelihood is smaller than this: sketches are not fits."""
+TELLING = 2.0
+"""What a sketch gains by one more parameter that does nothing, at most as a rule (Akaike, 1974)."""
 HOPELESS = 1000.0
 """A fit that cannot come this near to the leader's is no rival, however coloured what is left."""
-
-
-@dataclass(frozen=True, eq=False)
-class Explanation:
-    """A fit with some causes in it.
-
-    Attributes:
-        causes: names, in the order they were added.
-        fit: the fit.
-    """
-
-    causes: tuple[str, ...]
-    fit: Fit
-
-    @cached_property
-    def loosened(self) -> Fit | None:
-        """The fit on a few runs when the tail's phase may wander from its command.
-
-        A beat a little quicker or slower than commanded is soon out of step, and every slope along
-        the simulation is then wrong. A filter that lets the phase go follows the beat, and what
-        drives the phase away becomes plain; what only shifts it, as a delay does, is hidden
-        instead. None where the simulation diverges.
-        """
-        own = self.fit
-        noise = replace(own.noise, phase_sd=WANDER)
-        few = own.problem.subset(3)
-        return reached(lambda: fit(few, own.effects, own.point, noise, own.released, rounds=2))
-
-    def extrapolated(self) -> Explanation:
-        """The same causes, with estimates as ever finer steps put them."""
-        return Explanation(self.causes, self.fit.extrapolated)
-
-    @cached_property
-    def score(self) -> float:
-        """-2 log evidence (Laplace's approximation), but for a constant of the problem.
-
-        The misfit and the prior at the best fit, and what it costs that the data narrowed each
-        parameter so far from what was known: an effect may be anywhere in its plausible range, a
-        coefficient whose prior is lifted within :data:`REACH` deviations. Source: Kass and Raftery
-        (1995), "Bayes factors", JASA 90, eq. 3; differences of 6 they call strong.
-        """
-        own, known = self.fit, known_before(self)
-        lifted = [own.problem.baseline.paths.index(path) for path in own.released]
-        narrowed = np.linalg.slogdet(information(own.linearised.slopes, known))[1]
-        strained = known[lifted] @ own.point.z[lifted] ** 2
-        return float(own.objective + strained + narrowed - np.log(known).sum())
-
-
-def known_before(explanation: Explanation) -> FloatArray:
-    """Precision of what was known of each free parameter before the data (n,).
-
-    Any plausible value of an effect's parameter is as likely; a coefficient whose prior is lifted
-    may lie :data:`REACH` times as far from its nominal value as one whose prior is not.
-    """
-    own = explanation.fit
-    problem = own.problem
-    ranges = [p.plausible for name in own.effects for p in problem.known[name].parameters]
-    known = prior_precision(problem.baseline, len(ranges), ())
-    known[[problem.baseline.paths.index(path) for path in own.released]] = REACH**-2
-    known[len(problem.baseline) :] = [12.0 / (high - low) ** 2 for low, high in ranges]
-    return known
-
-
-def reached(make: Callable[[], T]) -> T | None:
-    """A fit or a sketch; None where the simulation diverges before it can begin."""
-    try:
-        return make()
-    except np.linalg.LinAlgError:
-        return None
 
 
 def refits(
@@ -112,6 +40,7 @@ def refits(
     loose: tuple[Fit, Sequence[Signal]] | None = None,
     effort: Effort = FULL,
     like: Callable[[str], Sequence[Signal]] = lambda name: (),
+    unseen: Sequence[Signal] = (),
 ) -> tuple[list[Explanation], Explanation | None]:
     """Fits with one more cause each, best first, and the present one under the best one's noise.
 
@@ -125,6 +54,7 @@ def refits(
         loose: fit with a wandering phase, and what it shows to be missing.
         effort: how many causes to try beside the chosen ones, and to fit in full.
         like: further causes known to look like one, which are tried if it leads.
+        unseen: causes to add that may hide from the screen.
     """
     if not chosen:
         return [], None
@@ -142,14 +72,17 @@ def refits(
         report(f"trying {signal.cause.name}")
         return _sketches(sketcher, base, signal, starts(base, signal))
 
-    tasks = [*(partial(followed, s) for s in shown), *(partial(alone, s) for s in chosen)]
+    plain = [*chosen, *unseen]
+    tasks = [*(partial(followed, s) for s in shown), *(partial(alone, s) for s in plain)]
     sketches = [s for found in side_by_side(tasks) for s in found]
     if sketches:
         ahead = min(sketches, key=lambda s: s[1].objective)[0]
         more = side_by_side(partial(alone, s) for s in like(ahead)[: effort.shortlist])
         sketches += [s for found in more for s in found]
-    finalists = _finalists(sketches, sketcher.base, BEHIND, effort.finalists)
     settled = bool(current.causes) and not strains(base)
+    if settled:
+        sketches = _telling(sketcher, sketches, {signal.cause.name for signal in chosen})
+    finalists = _finalists(sketches, sketcher.base, BEHIND, effort.finalists)
     found = (_gaining if settled else _led)(current, finalists, report)
     if not found:
         return [], None
@@ -174,18 +107,18 @@ def second_look(
     """
     best = tried[0].fit
     sketcher = Sketcher(best)
+    enough = sketcher.base + LEEWAY
     done = {e.causes[-1] for e in tried}
 
     def again(signal: Signal) -> list[tuple[str, Sketch]]:
         report(f"trying {signal.cause.name} again")
         begin = starts(current.fit, signal, best.point.z)
-        return _sketches(sketcher, current.fit, signal, begin)
+        return _sketches(sketcher, current.fit, signal, begin, enough)
 
     others = [s for s in chosen if s.cause.is_effect and s.cause.name not in done]
     sketches = [s for found in side_by_side(partial(again, s) for s in others) for s in found]
-    reached = sketcher.base
-    finalists = _finalists(sketches, reached, 0.0, FULL.finalists)
-    finalists = [f for f in finalists if f[1].objective < reached + LEEWAY]
+    finalists = _finalists(sketches, sketcher.base, 0.0, FULL.finalists)
+    finalists = [f for f in finalists if f[1].objective < enough]
     more = _rest(current, finalists, best, report)
     return _best_first([*tried, *more], tried[0])[0]
 
@@ -261,7 +194,11 @@ def without(current: Explanation, name: str) -> Explanation | None:
 
 
 def _sketches(
-    sketcher: Sketcher, base: Fit, signal: Signal, begin: Sequence[Point]
+    sketcher: Sketcher,
+    base: Fit,
+    signal: Signal,
+    begin: Sequence[Point],
+    hopeless: float = np.inf,
 ) -> list[tuple[str, Sketch]]:
     """The sketch of one cause; none where the simulation diverges from every start.
 
@@ -271,7 +208,7 @@ def _sketches(
     cause = signal.cause
     effects = (*base.effects, cause.name) if cause.is_effect else base.effects
     released = base.released if cause.is_effect else (*base.released, cause.path or "")
-    found = reached(lambda: sketcher.sketch(effects, released, begin))
+    found = reached(lambda: sketcher.sketch(effects, released, begin, hopeless))
     if found is None:
         return []
     if cause.is_effect and _off(base.problem, found.point, cause.name):
@@ -297,6 +234,18 @@ def _finalists(
     best = ranked[0][1].objective
     margin = max(LEEWAY, behind * (base - best))
     return [s for s in ranked[:most] if s[1].objective <= best + margin]
+
+
+def _telling(
+    sketcher: Sketcher, sketches: list[tuple[str, Sketch]], seen: Collection[str]
+) -> list[tuple[str, Sketch]]:
+    """Sketches of what the screen has seen, and of what gains on their runs where it has not."""
+    if all(name in seen for name, _ in sketches):
+        return sketches
+    own = sketcher.fit
+    alone = sketcher.sketch(own.effects, own.released, [own.point])
+    enough = alone.objective - TELLING
+    return [(name, s) for name, s in sketches if name in seen or s.objective < enough]
 
 
 def _led(

@@ -73,7 +73,11 @@ class Sketcher:
         return self._objectives(few, own, [own.pack(self.fit.point)])[0]
 
     def sketch(
-        self, effects: Sequence[str], released: Sequence[str], starts: Sequence[Point]
+        self,
+        effects: Sequence[str],
+        released: Sequence[str],
+        starts: Sequence[Point],
+        hopeless: float = np.inf,
     ) -> Sketch:
         """A few Gauss-Newton steps from the best of some starts.
 
@@ -81,6 +85,7 @@ class Sketcher:
             effects: names of effects that are free.
             released: baseline coefficients whose prior is lifted.
             starts: values of all effects' parameters.
+            hopeless: stop early where the objective will not get below this.
 
         Raises:
             LinAlgError: the simulation diverges from every start.
@@ -91,7 +96,7 @@ class Sketcher:
         few, vector = self._best(few, free, vectors)
         survey = partial(self._surveyed, few, free)
         vector, value, _ = descend(
-            vector, survey, lambda _, known: known, free.within, STEPS, TOLERANCE
+            vector, survey, lambda _, known: known, free.within, STEPS, TOLERANCE, hopeless
         )
         return Sketch(tuple(effects), tuple(released), free.unpack(vector), value)
 

@@ -134,8 +134,8 @@ def test_relatives_of_an_accepted_cause_are_tried_along_with_what_shows_next(mon
     screens = SimpleNamespace(best=lambda: [echo, twin, other])
     asked = []
 
-    def refits(current, chosen, *rest):
-        asked.append([s.cause.name for s in chosen])
+    def refits(current, chosen, report, loose, effort, like, unseen):
+        asked.append([s.cause.name for s in (*chosen, *unseen)])
         return [], None
 
     monkeypatch.setattr(attribution, "refits", refits)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from fish_env.diagnosis import attribution, search
-from fish_env.diagnosis.search import Explanation, reached, refits, without
+from fish_env.diagnosis.explanation import Explanation, reached
+from fish_env.diagnosis.search import refits, without
 
 
 def diverge(*arguments, **options):

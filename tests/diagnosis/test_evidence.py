@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from fish_env.diagnosis.attribution import alike, ranking_of
+from fish_env.diagnosis.explanation import Explanation
 from fish_env.diagnosis.left_out import left_out_scores
-from fish_env.diagnosis.search import REACH, Explanation
-from fish_env.identification.free import Linearised
+from fish_env.identification.free import REACH, Linearised
 from tests.diagnosis.linear import COEFFICIENTS, LinearProblem, Sized
 
 LINEAR = LinearProblem(signals=2)

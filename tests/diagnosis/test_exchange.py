@@ -7,7 +7,8 @@ import pytest
 
 from fish_env.diagnosis import search
 from fish_env.diagnosis.causes import Cause, probes_of
-from fish_env.diagnosis.search import Explanation, exchanged
+from fish_env.diagnosis.explanation import Explanation
+from fish_env.diagnosis.search import exchanged
 from fish_env.effects import catalogue
 
 KNOWN = catalogue()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from itertools import islice
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -15,10 +14,9 @@ FloatArray = npt.NDArray[np.float64]
 T = TypeVar("T")
 SHARES = (1.0, 0.5, 0.2)
 DAMPINGS = (0.1, 10.0)
-NEAR, SLIGHT, FEW = 1.0, 0.1, 2
+NEAR, SLIGHT = 1.0, 0.1
 """Where the quadratic model promises less than the first (in -2 log likelihood), a shortened step
-that gains less than the second follows the objective's roughness, and so few trials are made: what
-still shorter ones could gain is less than that."""
+that gains less than the second follows the objective's roughness."""
 AT = 0.01
 """A vector is at a bound when it is as near to it, in standard deviations."""
 
@@ -93,8 +91,7 @@ def descend(
         if promise < tolerance**2 or value - left * promise > hopeless:
             break
         before, tried = value, 0
-        trials = _trials(hessian, gradient, vector, whole, within)
-        for trial in islice(trials, FEW) if promise < NEAR else trials:
+        for trial in _trials(hessian, gradient, vector, whole, within):
             tried += 1
             trial_value, trial_known = evaluate(trial)
             if trial_value < value:

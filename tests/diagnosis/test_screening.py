@@ -62,6 +62,21 @@ def test_a_signal_that_the_coefficients_can_follow_is_absorbed():
     assert Projector(fit).signal(PROBLEM.causes[0], 0, np.zeros((PROBLEM.size, 1))) is None
 
 
+def test_signals_at_once_are_those_one_by_one_and_a_diverged_one_spoils_no_other():
+    fit = PROBLEM.fit(np.random.default_rng(2))
+    widths = [columns.shape[1] for columns in PROBLEM.columns]
+    ends = np.cumsum(widths)
+    own = [list(range(end - width, end)) for end, width in zip(ends, widths, strict=True)]
+    rows = np.concatenate([columns.T for columns in PROBLEM.columns])
+    rows[own[1][0], 5] = np.nan
+    tests = [(cause, 0, part) for cause, part in zip(PROBLEM.causes, own, strict=True)]
+    found, alone = Projector(fit).signals(tests, rows), signals(fit)
+    assert found[1] is None
+    for i in (0, *range(2, len(alone))):
+        np.testing.assert_allclose(found[i].left, alone[i].left, atol=1e-12)
+        assert found[i].statistic == pytest.approx(alone[i].statistic, rel=1e-9)
+
+
 def test_what_a_bound_holds_back_hides_no_cause():
     """A cause like a coefficient that has gone as far as it may is all that can still explain."""
     column = PROBLEM.slopes[:, [1]] + 0.01 * PROBLEM.columns[0]

@@ -72,3 +72,21 @@ def test_the_objective_that_comes_with_the_slopes_is_that_of_the_same_gains(base
     impossible = tried[0].copy()
     impossible[problem.baseline.paths.index("mass.total")] = -1e4
     assert np.isinf(sketcher._surveyed(problem, free, impossible)[0])
+
+
+def test_a_sketch_that_will_not_get_there_ends_early(baseline, monkeypatch):
+    sketcher = Sketcher(baseline)
+    begin = [Point(baseline.point.z, {LAG: 0.01})]
+    counts, surveyed = [], Sketcher._surveyed
+
+    def counted(self, *given):
+        counts[-1] += 1
+        return surveyed(self, *given)
+
+    monkeypatch.setattr(Sketcher, "_surveyed", counted)
+    objectives = []
+    for hopeless in (np.inf, sketcher.base, -1e9):
+        counts.append(0)
+        objectives.append(sketcher.sketch(["servo_lag"], (), begin, hopeless).objective)
+    assert counts[0] == counts[1] > counts[2] == 1
+    assert objectives[0] == objectives[1] < sketcher.base < objectives[2]

@@ -1,0 +1,115 @@
+"""Contests after the first: what chance calls for is over as soon as nothing gains."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from fish_env.diagnosis import search
+from fish_env.diagnosis.explanation import Explanation
+from fish_env.diagnosis.search import refits
+
+PRESENT, NOTHING_MORE = 100.0, 90.0
+"""Objective of the present explanation on the runs of a sketch, and of a sketch of it alone."""
+
+
+class Named(str):
+    """A cause by its name."""
+
+    @property
+    def cause(self):
+        return SimpleNamespace(name=str(self))
+
+
+def fake(name, score):
+    return SimpleNamespace(
+        name=name, score=score, objective=score, effects=("a",), released=(), noise=name,
+        point=None, problem="runs",
+    )  # fmt: skip
+
+
+@pytest.fixture
+def contest(monkeypatch):
+    """Holds a contest of causes by the objectives of their sketches and the scores of their fits.
+
+    Returns what it finds and which fits it made: (name, noise) with the noise held.
+    """
+
+    def run(sketches, scores, causes=("first",), strained=(), unseen=()):
+        fits = {name: fake(name, score) for name, score in scores.items()}
+        done = SimpleNamespace(at_noise=[], in_full=[], noise_too=[])
+
+        class Sketcher:
+            base = PRESENT
+
+            def __init__(self, fit):
+                self.fit = fit
+
+            def sketch(self, effects, released, begin):
+                return SimpleNamespace(objective=NOTHING_MORE)
+
+        def sketched(sketcher, base, signal, begin):
+            return [(signal, SimpleNamespace(name=str(signal), objective=sketches[signal]))]
+
+        def at_noise(problem, at, noise, *spent):
+            done.at_noise.append((at.name, noise))
+            return fits.get(at.name)
+
+        def in_full(problem, at, noise):
+            done.in_full.append(at.name)
+            return fits[at.name]
+
+        def noise_too(problem, own):
+            done.noise_too.append(own.name)
+            return own
+
+        for name, value in {
+            "Sketcher": Sketcher, "_sketches": sketched, "starts": lambda *a: [],
+            "strains": lambda fit: strained,
+            "_at_noise": at_noise, "_in_full": in_full, "_noise_too": noise_too,
+        }.items():  # fmt: skip
+            monkeypatch.setattr(search, name, value)
+        monkeypatch.setattr(Explanation, "score", property(lambda self: self.fit.score))
+        present = Explanation(causes, fake("present", 0.0))
+        seen = [Named(name) for name in sketches if name not in unseen]
+        hidden = [Named(name) for name in unseen]
+        return (*refits(present, seen, lambda step: None, unseen=hidden), done)
+
+    return run
+
+
+def test_it_is_over_where_nothing_gains_under_the_present_noise(contest):
+    tried, base, done = contest({"b": 80.0, "c": 85.0}, {"b": 1.0, "c": 2.0})
+    assert (tried, base) == ([], None)
+    assert [noise for _, noise in done.at_noise] == ["present", "present"]
+    assert not done.noise_too
+    assert not done.in_full
+
+
+def test_what_gains_leaves_its_own_noise_and_the_others_are_fitted_under_that(contest):
+    tried, _, done = contest({"b": 80.0, "c": 85.0}, {"b": -3.0, "c": -9.0, "present": 0.0})
+    assert [e.causes for e in tried] == [("first", "c"), ("first", "b")]
+    assert done.noise_too == ["c"]
+    assert done.at_noise[2:] == [("b", "c"), ("present", "c")]
+
+
+@pytest.mark.parametrize(("causes", "strained"), [((), ()), (("first",), ("a disturbing force",))])
+def test_where_the_present_noise_says_little_the_likeliest_brings_its_own(
+    contest, causes, strained
+):
+    tried, _, done = contest({"b": 80.0, "c": 85.0}, {"b": 1.0, "c": 2.0}, causes, strained)
+    assert len(tried) == 2
+    assert done.in_full == ["b"]
+    assert done.at_noise[0] == ("c", "b")
+
+
+def test_what_the_screen_has_not_seen_is_fitted_only_if_its_sketch_gains(contest):
+    """A sketch of what is there already gains as well: two runs are easier to please than six."""
+    slight, plain = NOTHING_MORE - 1.0, NOTHING_MORE - 5.0
+    scores = dict.fromkeys(("b", "c", "d"), 1.0)
+    given = {"b": NOTHING_MORE + 5.0, "c": slight, "d": plain}
+    *_, done = contest(given, scores, unseen=("c", "d"))
+    assert sorted(name for name, _ in done.at_noise) == ["b", "d"]
+
+
+def test_nothing_is_tried_where_nothing_is_chosen():
+    assert refits(Explanation((), None), [], lambda step: None) == ([], None)

@@ -188,24 +188,21 @@ def _diagnose_runs(
     effort = QUICK if quick else FULL
     progress("checking the runs")
     check_runs(dataset)
-    progress("comparing the channels with each other")
-    floors = noise_floors(dataset)
     fitted, final = fitted_and_final(dataset, seed)
     problem = Problem(dataset, fish, fitted, dt=effort.step_s)
     problem = problem.subset(effort.runs).until(effort.seconds)
-    progress("refitting the baseline")
-    compare = partial(check_consistency, dataset, np.random.default_rng([seed, 2]), floors)
-    baseline, agreed = both(partial(_refitted, problem), compare)
+    progress("refitting the baseline, comparing the channels with each other")
+    compare = partial(_compared, dataset, seed)
+    baseline, (floors, agreed) = both(partial(_refitted, problem), compare)
     problem = baseline.problem  # with the tail phases settled
     causes = causes_of(problem)
     progress("screening causes")
     attribution = attribute(problem, baseline, causes, rng, effort, progress)
     progress("testing what is left, and what the runs could show")
+    where = None if quick else baseline
     left, shown = both(
         partial(adequacy, attribution.accepted.fit, rng, attribution.tolerated),
-        partial(
-            preconditions, problem, attribution.screens[0], causes, None if quick else baseline
-        ),
+        partial(preconditions, problem, attribution.screens[0], causes, where),
     )
     if effort.retries and not left.reached:
         attribution, left = _with_weaker_causes(attribution, left, causes, rng, progress)
@@ -233,6 +230,12 @@ def _diagnose_runs(
         dataset, final, floors, agreed, problem, attribution, left, shown, verdict, place, misfit,
         gain, residual, proposal, seed, quick, time.perf_counter() - begin,
     )  # fmt: skip
+
+
+def _compared(dataset: Dataset, seed: int) -> tuple[tuple[Floor, ...], Consistency]:
+    """How much each channel scatters, and whether the channels agree with each other."""
+    floors = noise_floors(dataset)
+    return floors, check_consistency(dataset, np.random.default_rng([seed, 2]), floors)
 
 
 def _with_weaker_causes(

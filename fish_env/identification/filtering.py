@@ -131,8 +131,7 @@ class RunFilter:
 
     def _history_rows(self, records: FloatArray, data: RunData) -> int:
         """Room for tail commands that come late."""
-        step = float(np.min(np.diff(data.clock) / data.corner_substeps[1:]))
-        return history_rows(self.kernels.longest_delay(records), step)
+        return history_rows(self.kernels.longest_delay(records), data.shortest_step)
 
     def _starts(self, data: RunData, measurement: Measurement) -> FloatArray:
         """Initial states (states, N): what the first samples say once their distortion is undone.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -103,6 +104,11 @@ class RunData:
     def corner_substeps(self) -> npt.NDArray[np.int64]:
         """(T,) steps for motion with corners: finer everywhere."""
         return CORNERS * self.substeps
+
+    @cached_property
+    def shortest_step(self) -> float:
+        """Of the steps for motion with corners (s)."""
+        return float(np.min(np.diff(self.clock) / self.corner_substeps[1:]))
 
     def in_long_steps(self) -> RunData:
         """The same run, simulated no finer than a comparison needs."""

@@ -102,7 +102,8 @@ def changes(fit: Fit, forces: GenericForces, columns: npt.NDArray[np.int64]) -> 
     out = pushed(problem)
     if problem is not fit.problem and not np.isfinite(out).all():
         out = pushed(fit.problem)
-    return np.asarray((out[1:] - out[0]).T)
+    out[1:] -= out[0]
+    return out[1:].T
 
 
 def generic_signals(

@@ -150,7 +150,8 @@ def _changes_at_once(
     lanes = {path: np.array([own.get(path, base[path]) for own in values]) for path in base}
     start = np.column_stack([fit.point.z, z])
     out = problem.innovations(start, lanes, fit.noise, fit.filtered)
-    return np.asarray(out[1:] - out[0])
+    out[1:] -= out[0]
+    return out[1:]
 
 
 def _coefficient_signals(projector: Projector, causes: Sequence[Cause], fit: Fit) -> list[Signal]:

@@ -231,7 +231,7 @@ def take_sample(work, width, measured, codes, gain, bias, k_in, w_in, e, error, 
 def filter_block(
     states0, swimming, par, pace_all, delay_all, gain_all, bias_all, clock, substeps, times, values,
     measured, codes, k_in, w_in, wrench_decay_s, history_rows, known, push_basis, push_column,
-    push_size, tables, out, first, count,
+    push_size, tables, out, place, first, count,
 ):  # fmt: skip
     """Lanes first..first+count through a run with given gains (see :func:`filter_lanes`)."""
     width = FILTER_LANES
@@ -280,14 +280,14 @@ def filter_block(
         )  # fmt: skip
         for k in range(count):
             for i in range(channels):
-                out[first + k, sample, i] = white[i, k]
+                out[first + k, place + sample * channels + i] = white[i, k]
 
 
 @entry_point
 def filter_lanes(
     states0, swimming, par, pace, delay, gain, bias, clock, substeps, times, values, measured,
     codes, k_in, w_in, wrench_decay_s, history_rows, known, push_basis, push_column, push_size,
-    tables, out, first, last,
+    tables, out, place, first, last,
 ):  # fmt: skip
     """Whitened innovations of many parameter sets on one run, with the gains of one of them.
 
@@ -314,7 +314,9 @@ def filter_lanes(
         push_column: (N,) 6 * function + direction for each lane.
         push_size: (N,) N or N m; zero for none.
         tables: packed coefficient curves.
-        out: (N, T, C) whitened innovations.
+        out: (N, residuals of all runs) whitened innovations; those of the channels at one sample
+            come one after another.
+        place: where those of this run begin.
         first: first lane.
         last: one past the last.
     """
@@ -322,6 +324,6 @@ def filter_lanes(
         filter_block(
             states0, swimming, par, pace, delay, gain, bias, clock, substeps, times, values,
             measured, codes, k_in, w_in, wrench_decay_s, history_rows, known, push_basis,
-            push_column, push_size, tables, out, block, min(FILTER_LANES, last - block),
+            push_column, push_size, tables, out, place, block, min(FILTER_LANES, last - block),
         )  # fmt: skip
     return 0

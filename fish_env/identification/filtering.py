@@ -228,41 +228,41 @@ class RunFilter:
         noise: NoiseModel,
         filtered: Sequence[Filtered],
         pushes: Pushes | None = None,
-    ) -> list[FloatArray]:
-        """Whitened innovations of many parameter sets with given gains, per run (N, T, C).
+    ) -> FloatArray:
+        """Whitened innovations of many parameter sets with given gains (N, residuals).
 
-        ``pushes`` adds a prescribed wrench to each lane.
+        Run after run, sample after sample. ``pushes`` adds a prescribed wrench to each lane.
         """
         entry, lanes = self.kernels.entry("filter_lanes"), self.kernels.module.FILTER_LANES
         count = records.shape[1]
-        outs = [np.empty((count, *data.measured.shape)) for data in self.runs]
+        ends = np.cumsum([data.measured.size for data in self.runs]).tolist()
+        out = np.empty((count, ends[-1]))
         column = np.zeros(count, np.int64) if pushes is None else pushes.column
         size = np.zeros(count) if pushes is None else pushes.size
         none = [np.zeros((0, 0))] * len(self.runs)
         bases = none if pushes is None else pushes.bases
         jobs = []
-        for data, gains, out, basis in zip(self.runs, filtered, outs, bases, strict=True):
+        places = [0, *ends[:-1]]
+        for data, gains, place, basis in zip(self.runs, filtered, places, bases, strict=True):
             state0 = self._starts(data, measurement)
             step = lanes * max(1, -(-count // (4 * lanes)))
             for first in range(0, count, step):
                 last = min(count, first + step)
-                jobs.append((data, gains, out, basis, state0, first, last))
+                jobs.append((data, gains, place, basis, state0, first, last))
 
-        def one(
-            job: tuple[RunData, Filtered, FloatArray, FloatArray, FloatArray, int, int],
-        ) -> None:
-            data, gains, out, basis, state0, first, last = job
+        def one(job: tuple[RunData, Filtered, int, FloatArray, FloatArray, int, int]) -> None:
+            data, gains, place, basis, state0, first, last = job
             entry(
                 state0, data.swimming, records, measurement.pace, measurement.delay,
                 measurement.gain, measurement.bias, data.clock,
                 steps_of(data, gains.corners), data.command_times, data.command_values,
                 data.measured, self.codes, gains.gains, gains.whitening,
                 noise.correlation_s, self._history_rows(records, data), data.known_wrench, basis,
-                column, size, self.model.tables, out, first, last,
+                column, size, self.model.tables, out, place, first, last,
             )  # fmt: skip
 
         list(_threads().map(one, jobs))
-        return outs
+        return out
 
 
 @dataclass(frozen=True, eq=False)

@@ -224,8 +224,8 @@ class Problem:
         """
         count = z.shape[1]
         records, measurement = self._lanes(z, effects, count)
-        parts = self.filter_for(effects).innovations(records, measurement, noise, filtered, pushes)
-        return np.concatenate([part.reshape(count, -1) for part in parts], axis=1)
+        lanes = self.filter_for(effects)
+        return lanes.innovations(records, measurement, noise, filtered, pushes)
 
     def filtered(
         self, point: Point, noise: NoiseModel, keep_slopes: bool = False

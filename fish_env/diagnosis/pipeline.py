@@ -191,14 +191,16 @@ def _diagnose_runs(
     fitted, final = fitted_and_final(dataset, seed)
     problem = Problem(dataset, fish, fitted, dt=effort.step_s)
     problem = problem.subset(effort.runs).until(effort.seconds)
-    progress("refitting the baseline, comparing the channels with each other")
+    progress("comparing the channels with each other")
+    progress("refitting the baseline")
     compare = partial(_compared, dataset, seed)
     baseline, (floors, agreed) = both(partial(_refitted, problem), compare)
     problem = baseline.problem  # with the tail phases settled
     causes = causes_of(problem)
     progress("screening causes")
     attribution = attribute(problem, baseline, causes, rng, effort, progress)
-    progress("testing what is left, and what the runs could show")
+    progress("what the runs could show")
+    progress("testing what is left")
     where = None if quick else baseline
     left, shown = both(
         partial(adequacy, attribution.accepted.fit, rng, attribution.tolerated),

@@ -92,7 +92,9 @@ def of_visible(
 ) -> S | None:
     """The test of those settings of an alternative that change something in what is measured.
 
-    A camera overhead sees a compass that is mounted askew, and nothing of its roll and pitch.
+    For an alternative whose whole test finds nothing: None where no setting shows, or where each
+    shows and only all at once leave nothing. A camera overhead sees a compass that is mounted
+    askew, and nothing of its roll and pitch.
 
     Args:
         test: of a cause at an alternative by what its settings change; None where one of them
@@ -102,9 +104,8 @@ def of_visible(
         columns: (D, m) what its m settings change.
     """
     settings = range(columns.shape[1])
-    whole = test(cause, probe, columns)
-    if whole is not None:
-        return whole
+    if len(settings) == 1:
+        return None
     live = [i for i in settings if test(cause, probe, columns[:, [i]]) is not None]
     if not live or len(live) == len(settings):
         return None

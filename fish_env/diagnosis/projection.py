@@ -33,8 +33,8 @@ FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Signal:
-    """A cause at one of its alternatives.
+class Projected:
+    """A cause at one of its alternatives, seen through a refit of the baseline.
 
     Attributes:
         cause: the cause.
@@ -43,7 +43,6 @@ class Signal:
         energy: squared size of that change before the refit.
         projected: (m, m) information about the settings after a refit of the baseline.
         score: (m,) projected signal times residuals.
-        inflation: factor by which coloured residuals widen the score, at least 1.
     """
 
     cause: Cause
@@ -52,7 +51,6 @@ class Signal:
     energy: float
     projected: FloatArray
     score: FloatArray
-    inflation: float
 
     @property
     def freedom(self) -> int:
@@ -60,9 +58,30 @@ class Signal:
         return len(self.score)
 
     @property
+    def likelihood_ratio(self) -> float:
+        """Of the linearised fit, in white noise of unit variance and with no bound in the way."""
+        return float(self.score @ np.linalg.solve(self.projected, self.score))
+
+    @property
+    def absorbed_share(self) -> float:
+        """Share of the signal's energy that a refit of the baseline swallows."""
+        return 1.0 - float(np.trace(self.projected)) / max(self.energy, 1e-30)
+
+
+@dataclass(frozen=True, eq=False)
+class Signal(Projected):
+    """A cause at one of its alternatives, in time series.
+
+    Attributes:
+        inflation: factor by which coloured residuals widen the score, at least 1.
+    """
+
+    inflation: float
+
+    @property
     def statistic(self) -> float:
-        """Likelihood ratio of the linearised fit: chi-squared with ``freedom`` under no effect."""
-        return float(self.score @ np.linalg.solve(self.projected, self.score)) / self.inflation
+        """Likelihood ratio, widened: chi-squared with ``freedom`` under no effect."""
+        return self.likelihood_ratio / self.inflation
 
     @property
     def unwidened(self) -> float:
@@ -78,11 +97,6 @@ class Signal:
     def span(self) -> FloatArray:
         """(D, m) orthonormal, of what is left after a refit."""
         return np.asarray(np.linalg.qr(self.left)[0])
-
-    @property
-    def absorbed_share(self) -> float:
-        """Share of the signal's energy that a refit of the baseline swallows."""
-        return 1.0 - float(np.trace(self.projected)) / self.energy
 
 
 class Projector:

@@ -189,9 +189,8 @@ def linearise(
     """
     lanes, steps = free.lanes(vector)
     innovations = residuals_at(problem, free, lanes, noise, filtered)
-    rows = innovations[
-        1:
-    ]  # in place: what is fresh from the system costs as much as the arithmetic
+    rows = innovations[1:]
+    # In place: memory fresh from the system costs as much as the arithmetic.
     rows -= innovations[0]
     rows /= steps[:, None]
     rows[~((rows.min(axis=1) > -LARGEST_SLOPE) & (rows.max(axis=1) < LARGEST_SLOPE))] = 0.0

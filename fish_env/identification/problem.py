@@ -224,8 +224,7 @@ class Problem:
         """
         count = z.shape[1]
         records, measurement = self._lanes(z, effects, count)
-        lanes = self.filter_for(effects)
-        return lanes.innovations(records, measurement, noise, filtered, pushes)
+        return self.filter_for(effects).innovations(records, measurement, noise, filtered, pushes)
 
     def filtered(
         self, point: Point, noise: NoiseModel, keep_slopes: bool = False

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from typing import TypeVar, cast
 
 from fish_env.model.runtime import default_threads
 
@@ -24,6 +24,6 @@ def side_by_side(tasks: Iterable[Callable[[], T]]) -> list[T]:
 
 def both(one: Callable[[], A], other: Callable[[], B]) -> tuple[A, B]:
     """Results of two tasks that do not depend on each other."""
-    with ThreadPoolExecutor(1, thread_name_prefix="fit") as pool:
-        found = pool.submit(other)
-        return one(), found.result()
+    tasks: tuple[Callable[[], A | B], ...] = (one, other)
+    first, second = side_by_side(tasks)
+    return cast(A, first), cast(B, second)

@@ -24,6 +24,7 @@ from fish_env.diagnosis.causes import (
     of_visible,
     probes_of,
 )
+from fish_env.diagnosis.projection import Projected
 from fish_env.diagnosis.steady.fitting import SteadyFit, lines
 from fish_env.diagnosis.steady.orbit import coordinates
 from fish_env.diagnosis.steady.problem import SteadyProblem
@@ -43,48 +44,26 @@ PLACE_AND_TIME = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Signal:
-    """A cause at one of its alternatives.
+class Signal(Projected):
+    """A cause at one of its alternatives, in averages: its residuals are the lines and the priors.
 
     Attributes:
-        cause: the cause.
-        probe: index of the alternative, -1 for a coefficient.
-        left: what a refit leaves of the change of the lines, priors included, shape (N, m).
-        energy: squared size of the change before the refit.
-        projected: information about the settings after a refit, shape (m, m).
-        score: projected signal times residuals, shape (m,).
         one_sided: the only setting cannot be negative.
     """
 
-    cause: Cause
-    probe: int
-    left: FloatArray
-    energy: float
-    projected: FloatArray
-    score: FloatArray
     one_sided: bool
-
-    @property
-    def freedom(self) -> int:
-        """Number of settings."""
-        return len(self.score)
 
     @property
     def statistic(self) -> float:
         """Likelihood ratio of the linearised fit."""
         if self.one_sided and self.score[0] <= 0.0:
             return 0.0
-        return float(self.score @ np.linalg.solve(self.projected, self.score))
+        return self.likelihood_ratio
 
     @property
     def log_p(self) -> float:
         """Of this one test, noise known."""
         return float(log_p(self.statistic, self.freedom, self.one_sided))
-
-    @property
-    def absorbed_share(self) -> float:
-        """Share of the signal's energy that a refit of the baseline swallows."""
-        return 1.0 - float(np.trace(self.projected)) / max(self.energy, 1e-30)
 
 
 def log_p(statistic: npt.ArrayLike, freedom: int, one_sided: bool) -> FloatArray:
@@ -221,7 +200,8 @@ def _effect_signals(fit: SteadyFit, projector: Projector, causes: Sequence[Cause
         if np.isfinite(columns[:, chosen]).all():
             sided = len(chosen) == 1 and one_sided(problem.known[name])
             test = partial(projector.signal, one_sided=sided)
-            found.append(of_visible(test, jobs[chosen[0]][0], index, columns[:, chosen]))
+            case = jobs[chosen[0]][0], index, columns[:, chosen]
+            found.append(test(*case) or of_visible(test, *case))
     return [signal for signal in found if signal is not None]
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -101,6 +101,16 @@ class Prepared:
     keep: npt.NDArray[np.bool_]
     integral: sparse.csr_array
 
+    def angles_at(self, wanted: FloatArray) -> FloatArray:
+        """Angles at some times."""
+        if _alike(self.t_angle, wanted):
+            return self.angles
+        return _along(self._course, self.t_angle, wanted)
+
+    @cached_property
+    def _course(self) -> CubicSpline:
+        return CubicSpline(self.t_angle, self.angles)
+
 
 @dataclass(frozen=True)
 class Relation:
@@ -161,7 +171,7 @@ class Relation:
         offset = np.array([given.get(f"{name}_offset", 0.0) for name in names])
         delay = given.get("delay", 0.0)
         # What is read at t was so at t - delay.
-        euler = _on(run.t_angle, run.angles, run.t_in - delay) - offset
+        euler = run.angles_at(run.t_in - delay) - offset
         matrix = self._matrix(euler, given)
         rates = np.einsum("nij,nj->ni", matrix, run.inputs - bias)
         grown = run.integral @ rates
@@ -172,7 +182,7 @@ class Relation:
         grown = grown * (1.0 + given.get("scale", 0.0))
         if self.name == "position":
             arm = np.array([given.get(f"arm_{a}", 0.0) for a in "xyz"])[: len(self.outputs)]
-            at = _on(run.t_angle, run.angles, run.t_out) - offset
+            at = run.angles_at(run.t_out) - offset
             grown = grown + np.diff(np.einsum("nij,j->ni", self._matrix(at, given), arm), axis=0)
         return (np.diff(run.outputs, axis=0) - grown)[run.keep], matrix
 
@@ -200,10 +210,17 @@ def _complete(run: Run, names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
 
 def _on(times: FloatArray, values: FloatArray, wanted: FloatArray) -> FloatArray:
     """Values at other times, along a cubic spline, held constant outside."""
-    if times.shape == wanted.shape and np.array_equal(times, wanted):
+    if _alike(times, wanted):
         return values
-    result: FloatArray = CubicSpline(times, values)(np.clip(wanted, times[0], times[-1]))
-    return result
+    return _along(CubicSpline(times, values), times, wanted)
+
+
+def _alike(times: FloatArray, wanted: FloatArray) -> bool:
+    return times.shape == wanted.shape and bool(np.array_equal(times, wanted))
+
+
+def _along(curve: CubicSpline, times: FloatArray, wanted: FloatArray) -> FloatArray:
+    return np.asarray(curve(np.clip(wanted, times[0], times[-1])), float)
 
 
 def _bridged(t_out: FloatArray, t_in: FloatArray) -> npt.NDArray[np.bool_]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -23,6 +23,8 @@ from fish_env.identification.sketch import Sketch, Sketcher
 
 FloatArray = npt.NDArray[np.float64]
 Report = Callable[[str], None]
+Sketched = tuple[str, Sketch]
+"""With the name of the cause that it has added."""
 BEHIND = 0.25
 """A sketch that gains less by more than this share of the best one's gain is not fitted in full."""
 LEEWAY = 100.0
@@ -63,22 +65,25 @@ def refits(
     wandering, shown = loose or (base, ())
     follower = Sketcher(wandering)
 
-    def followed(signal: Signal) -> list[tuple[str, Sketch]]:
+    def followed(signal: Signal) -> list[Sketched]:
         report(f"trying {signal.cause.name} with a wandering phase")
         first = _sketches(follower, base, signal, starts(wandering, signal))
         return [s for _, f in first for s in _sketches(sketcher, base, signal, [f.point])]
 
-    def alone(signal: Signal) -> list[tuple[str, Sketch]]:
+    def alone(signal: Signal, enough: float = np.inf) -> list[Sketched]:
         report(f"trying {signal.cause.name}")
-        return _sketches(sketcher, base, signal, starts(base, signal))
+        return _sketches(sketcher, base, signal, starts(base, signal), enough)
 
-    plain = [*chosen, *unseen]
-    tasks = [*(partial(followed, s) for s in shown), *(partial(alone, s) for s in plain)]
-    sketches = [s for found in side_by_side(tasks) for s in found]
+    sketches = _all([*(partial(followed, s) for s in shown), *(partial(alone, s) for s in chosen)])
+
+    def also(signals: Sequence[Signal]) -> list[Sketched]:
+        enough = _enough(sketches, sketcher.base, BEHIND, effort.finalists)
+        return _all([partial(alone, signal, enough) for signal in signals])
+
+    sketches += also(unseen)
     if sketches:
         ahead = min(sketches, key=lambda s: s[1].objective)[0]
-        more = side_by_side(partial(alone, s) for s in like(ahead)[: effort.shortlist])
-        sketches += [s for found in more for s in found]
+        sketches += also(like(ahead)[: effort.shortlist])
     settled = bool(current.causes) and not strains(base)
     if settled:
         sketches = _telling(sketcher, sketches, {signal.cause.name for signal in chosen})
@@ -89,6 +94,10 @@ def refits(
     tried, noise = _best_first(found, None if settled else found[0])
     # A baseline that diverges under the smaller disturbance keeps the one that suits it.
     return tried, Explanation(current.causes, _at_noise(base.problem, base, noise, 2) or base)
+
+
+def _all(tasks: Iterable[Callable[[], list[Sketched]]]) -> list[Sketched]:
+    return [sketch for found in side_by_side(tasks) for sketch in found]
 
 
 def second_look(
@@ -110,13 +119,13 @@ def second_look(
     enough = sketcher.base + LEEWAY
     done = {e.causes[-1] for e in tried}
 
-    def again(signal: Signal) -> list[tuple[str, Sketch]]:
+    def again(signal: Signal) -> list[Sketched]:
         report(f"trying {signal.cause.name} again")
         begin = starts(current.fit, signal, best.point.z)
         return _sketches(sketcher, current.fit, signal, begin, enough)
 
     others = [s for s in chosen if s.cause.is_effect and s.cause.name not in done]
-    sketches = [s for found in side_by_side(partial(again, s) for s in others) for s in found]
+    sketches = _all(partial(again, s) for s in others)
     finalists = _finalists(sketches, sketcher.base, 0.0, FULL.finalists)
     finalists = [f for f in finalists if f[1].objective < enough]
     more = _rest(current, finalists, best, report)
@@ -199,7 +208,7 @@ def _sketches(
     signal: Signal,
     begin: Sequence[Point],
     hopeless: float = np.inf,
-) -> list[tuple[str, Sketch]]:
+) -> list[Sketched]:
     """The sketch of one cause; none where the simulation diverges from every start.
 
     Where the few runs of a sketch show nothing of an effect it may end switched off, and the
@@ -222,23 +231,24 @@ def _off(problem: Problem, point: Point, name: str) -> bool:
     return all(point.effects[f"{PREFIX}{name}.{p.name}"] == p.neutral for p in switching)
 
 
-def _finalists(
-    sketches: list[tuple[str, Sketch]], base: float, behind: float, most: int
-) -> list[tuple[str, Sketch]]:
+def _finalists(sketches: list[Sketched], base: float, behind: float, most: int) -> list[Sketched]:
     """The sketches that may still be the best fit, best first."""
     if not sketches:
         return []
     ranked = sorted(sketches, key=lambda s: s[1].objective)
     first = {name: i for i, (name, _) in reversed(list(enumerate(ranked)))}
     ranked = [ranked[i] for i in sorted(first.values())]  # a cause may have several
-    best = ranked[0][1].objective
-    margin = max(LEEWAY, behind * (base - best))
-    return [s for s in ranked[:most] if s[1].objective <= best + margin]
+    enough = _enough(ranked, base, behind, most)
+    return [s for s in ranked[:most] if s[1].objective <= enough]
 
 
-def _telling(
-    sketcher: Sketcher, sketches: list[tuple[str, Sketch]], seen: Collection[str]
-) -> list[tuple[str, Sketch]]:
+def _enough(sketches: list[Sketched], base: float, behind: float, most: int) -> float:
+    """Objective up to which a sketch may be a finalist, however far others will yet get."""
+    best = min((s.objective for _, s in sketches), default=np.inf)
+    return best if most == 1 else best + max(LEEWAY, behind * (base - best))
+
+
+def _telling(sketcher: Sketcher, sketches: list[Sketched], seen: Collection[str]) -> list[Sketched]:
     """Sketches of what the screen has seen, and of what gains on their runs where it has not."""
     if all(name in seen for name, _ in sketches):
         return sketches
@@ -248,9 +258,7 @@ def _telling(
     return [(name, s) for name, s in sketches if name in seen or s.objective < enough]
 
 
-def _led(
-    current: Explanation, finalists: list[tuple[str, Sketch]], report: Report
-) -> list[Explanation]:
+def _led(current: Explanation, finalists: list[Sketched], report: Report) -> list[Explanation]:
     """Full fits under the noise that the likeliest of them leaves, which comes first."""
     base, left = current.fit, [*finalists]
     while left:
@@ -263,9 +271,7 @@ def _led(
     return []
 
 
-def _gaining(
-    current: Explanation, finalists: list[tuple[str, Sketch]], report: Report
-) -> list[Explanation]:
+def _gaining(current: Explanation, finalists: list[Sketched], report: Report) -> list[Explanation]:
     """Full fits under the present noise; none of them where none explains more than there is.
 
     Where no misfit drives the disturbance, one more cause hardly changes it: its model will do to
@@ -276,7 +282,7 @@ def _gaining(
 
 
 def _rest(
-    current: Explanation, finalists: list[tuple[str, Sketch]], leader: Fit, report: Report
+    current: Explanation, finalists: list[Sketched], leader: Fit, report: Report
 ) -> list[Explanation]:
     """Full fits under the leader's noise, as far as they may come near the leader's."""
     hopeless = leader.objective + HOPELESS

@@ -227,13 +227,18 @@ def objectives_with_gains(
     together take no longer than one filter. Infinite where no fish can have the coefficients, or
     the simulation diverges.
     """
-    rows = residuals_at(problem, free, np.column_stack(vectors), noise, filtered)
-    pairs = zip(vectors, rows, strict=True)
-    return [objective_of(problem, free, vector, residuals) for vector, residuals in pairs]
+    lanes = np.column_stack(vectors)
+    rows = residuals_at(problem, free, lanes, noise, filtered)
+    able = problem.baseline.all_possible(lanes[: free.count])
+    cases = zip(vectors, rows, able.tolist(), strict=True)
+    return [_objective(free, vector, residuals, can) for vector, residuals, can in cases]
 
 
 def objective_of(problem: Problem, free: Free, vector: FloatArray, residuals: FloatArray) -> float:
     """The same of a vector whose whitened residuals (D,) are known."""
+    return _objective(free, vector, residuals, problem.baseline.possible(vector[: free.count]))
+
+
+def _objective(free: Free, vector: FloatArray, residuals: FloatArray, possible: bool) -> float:
     value = float(residuals @ residuals + free.prior @ (vector * vector))
-    able = np.isfinite(value) and problem.baseline.possible(vector[: free.count])
-    return value if able else np.inf
+    return value if possible and np.isfinite(value) else np.inf

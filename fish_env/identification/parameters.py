@@ -112,6 +112,11 @@ class Baseline:
             return False
         return True
 
+    def all_possible(self, z: FloatArray) -> npt.NDArray[np.bool_]:
+        """The same of many (n, N): (N,), and no longer for those that are equal."""
+        distinct, which = np.unique(z, axis=1, return_inverse=True)
+        return np.array([self.possible(one) for one in distinct.T])[which.ravel()]
+
     @cached_property
     def bounds(self) -> tuple[FloatArray, FloatArray]:
         """Physical bounds (n,), (n,)."""

@@ -69,10 +69,13 @@ def _saved(figure: Figure, album: Album, name: str) -> Path:
     """Writes the figure and returns the path of the SVG."""
     album.folder.mkdir(parents=True, exist_ok=True)
     vector = album.folder / f"{name}.svg"
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        # What was laid out stays. With an engine, even one that does nothing, it is drawn twice.
+        engine.execute(figure)
+        figure.set_layout_engine(None)
     figure.savefig(vector)
     if album.bitmaps:
-        # What was laid out stays. With an engine, even one that does nothing, it is drawn twice.
-        figure.set_layout_engine(None)
         figure.savefig(vector.with_suffix(".png"), dpi=DOTS_PER_INCH)
     return vector
 

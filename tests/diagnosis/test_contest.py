@@ -2,9 +2,11 @@
 
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from fish_env.diagnosis import search
+from fish_env.diagnosis.effort import FULL, QUICK
 from fish_env.diagnosis.explanation import Explanation
 from fish_env.diagnosis.search import refits
 
@@ -34,20 +36,19 @@ def contest(monkeypatch):
     Returns what it finds and which fits it made: (name, noise) with the noise held.
     """
 
-    def run(sketches, scores, causes=("first",), strained=(), unseen=()):
+    def run(sketches, scores, causes=("first",), strained=(), unseen=(), effort=FULL, base=PRESENT):
         fits = {name: fake(name, score) for name, score in scores.items()}
-        done = SimpleNamespace(at_noise=[], in_full=[], noise_too=[])
+        done = SimpleNamespace(at_noise=[], in_full=[], noise_too=[], enough={})
 
         class Sketcher:
-            base = PRESENT
-
             def __init__(self, fit):
-                self.fit = fit
+                self.fit, self.base = fit, base
 
             def sketch(self, effects, released, begin):
                 return SimpleNamespace(objective=NOTHING_MORE)
 
-        def sketched(sketcher, base, signal, begin):
+        def sketched(sketcher, base, signal, begin, enough):
+            done.enough[str(signal)] = enough
             return [(signal, SimpleNamespace(name=str(signal), objective=sketches[signal]))]
 
         def at_noise(problem, at, noise, *spent):
@@ -72,7 +73,8 @@ def contest(monkeypatch):
         present = Explanation(causes, fake("present", 0.0))
         seen = [Named(name) for name in sketches if name not in unseen]
         hidden = [Named(name) for name in unseen]
-        return (*refits(present, seen, lambda step: None, unseen=hidden), done)
+        found = refits(present, seen, lambda step: None, effort=effort, unseen=hidden)
+        return (*found, done)
 
     return run
 
@@ -109,6 +111,24 @@ def test_what_the_screen_has_not_seen_is_fitted_only_if_its_sketch_gains(contest
     given = {"b": NOTHING_MORE + 5.0, "c": slight, "d": plain}
     *_, done = contest(given, scores, unseen=("c", "d"))
     assert sorted(name for name, _ in done.at_noise) == ["b", "d"]
+
+
+def test_later_sketches_end_where_they_cannot_get_among_the_finalists(contest):
+    scores = dict.fromkeys(("b", "c", "d"), 1.0)
+    given = {"b": 8000.0, "c": 6000.0, "d": 7000.0}
+    *_, done = contest(given, scores, (), unseen=("d",), base=10_000.0)
+    assert done.enough == {"b": np.inf, "c": np.inf, "d": 6000.0 + search.BEHIND * 4000.0}
+    assert "d" in dict(done.at_noise)
+    *_, done = contest(given, scores, (), unseen=("d",), base=6500.0)
+    assert done.enough["d"] == 6000.0 + max(search.LEEWAY, search.BEHIND * 500.0)
+    assert "d" not in dict(done.at_noise)
+
+
+def test_where_one_is_fitted_later_sketches_have_to_lead(contest):
+    given = {"b": 8000.0, "c": 6000.0, "d": 7000.0}
+    *_, done = contest(given, {"c": 1.0}, (), unseen=("d",), effort=QUICK, base=10_000.0)
+    assert done.enough["d"] == 6000.0
+    assert done.in_full == ["c"]
 
 
 def test_nothing_is_tried_where_nothing_is_chosen():

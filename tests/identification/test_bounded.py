@@ -59,6 +59,8 @@ def test_no_fit_goes_where_no_fish_can_be():
     # Far off the axes: the model keeps no products of inertia to go with such a balance.
     impossible = (np.array([-0.5, 0.3]) - problem.baseline.mean) / problem.baseline.sd
     assert not problem.baseline.possible(impossible)
+    several = np.column_stack([impossible, np.zeros(2), impossible, np.zeros(2)])
+    assert problem.baseline.all_possible(several).tolist() == [False, True, False, True]
     assert objective(problem, free, impossible, noise) == (np.inf, [])
     with pytest.raises(np.linalg.LinAlgError):
         gauss_newton(problem, free, impossible, noise, 3, 0.1)

@@ -39,11 +39,11 @@ def test_a_cause_without_which_the_simulation_diverges_is_not_dropped(monkeypatc
 def contest(monkeypatch, results, shown="abc"):
     """Three sketches, best first, and what becomes of each when it is fitted in full."""
     sketches = [(name, SimpleNamespace(objective=i, name=name)) for i, name in enumerate("abc")]
-    monkeypatch.setattr(search, "Sketcher", lambda base: SimpleNamespace(base=lambda: 1000.0))
+    monkeypatch.setattr(search, "Sketcher", lambda base: SimpleNamespace(base=1000.0))
     monkeypatch.setattr(search, "starts", lambda *arguments: [])
     by_name = dict(sketches)
     monkeypatch.setattr(
-        search, "_sketches", lambda s, base, signal, begin: [(signal, by_name[signal])]
+        search, "_sketches", lambda s, base, signal, *rest: [(signal, by_name[signal])]
     )
     monkeypatch.setattr(search, "_in_full", lambda problem, s, noise: results[s.name])
     monkeypatch.setattr(

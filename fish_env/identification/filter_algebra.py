@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from fish_env.model.jit import kernel
 from fish_env.model.state import BASE_STATES
 
@@ -13,6 +15,11 @@ N_ERROR = 19
 """Error state: position 3, rotation 3, velocity 3, rates 3, wrench 6, tail phase."""
 N_MOVING = 12
 """Its first rows, which the equations of motion move; wrench and phase follow by themselves."""
+WIDE, MOVING_WIDE = 24, 16
+"""The same as whole vector registers. Columns beyond are zero: sums over a row are taken column by
+column at once, in registers, which pays only if no column is left over."""
+TOGETHER = 3
+"""Channels that the covariance loses at once."""
 
 
 @kernel
@@ -71,39 +78,58 @@ def cholesky_inverse(s, w):
 
 
 @kernel
-def predict_covariance(p, f, keep, variance, wander, scratch):
+def no_gain(channels):
+    """Room for a Kalman gain, transposed: (channels to the next multiple of 3, 24)."""
+    return np.zeros((-(-channels // TOGETHER) * TOGETHER, WIDE))
+
+
+@kernel
+def widened(covariance):
+    """A covariance (19, 19) in the layout of these kernels (19, 24)."""
+    p = np.zeros((N_ERROR, WIDE))
+    for i in range(N_ERROR):
+        for j in range(N_ERROR):
+            p[i, j] = covariance[i, j]
+    return p
+
+
+@kernel
+def predict_covariance(p, f, keep, variance, wander, scratch, turned):
     """p = F p F' + Q in place, F = [f; keep on the wrench; 1 on the phase].
 
     Args:
-        p: (19, 19) covariance of the error state.
+        p: (19, 24) covariance of the error state.
         f: (12, 19) slopes of the moving rows.
         keep: what is left of the wrench after the interval.
         variance: (6,) stationary variance of the wrench.
         wander: variance that the tail phase gains over the interval (rad^2).
-        scratch: (19, 19).
+        scratch: (19, 24).
+        turned: (19, 16) scratch, zero in the columns beyond the moving rows.
     """
-    for i in range(N_MOVING):
-        for j in range(N_ERROR):
-            scratch[i, j] = 0.0
+    for j in range(N_MOVING):
         for m in range(N_ERROR):
-            slope = f[i, m]
-            for j in range(N_ERROR):
-                scratch[i, j] += slope * p[m, j]
-    for i in range(N_MOVING, N_ERROR):
-        factor = keep if i < N_ERROR - 1 else 1.0
-        for j in range(N_ERROR):
-            scratch[i, j] = factor * p[i, j]
-    for i in range(N_ERROR):
-        for j in range(min(i + 1, N_MOVING)):
+            turned[m, j] = f[j, m]
+    for i in range(N_MOVING):
+        for j in range(WIDE):
             total = 0.0
             for m in range(N_ERROR):
-                total += scratch[i, m] * f[j, m]
+                total += f[i, m] * p[m, j]
+            scratch[i, j] = total
+    for i in range(N_MOVING, N_ERROR):
+        factor = keep if i < N_ERROR - 1 else 1.0
+        for j in range(WIDE):
+            scratch[i, j] = factor * p[i, j]
+    for i in range(N_ERROR):
+        for j in range(MOVING_WIDE):
+            total = 0.0
+            for m in range(N_ERROR):
+                total += scratch[i, m] * turned[m, j]
             p[i, j] = total
-            p[j, i] = total
-        for j in range(N_MOVING, i + 1):
-            total = scratch[i, j] * (keep if j < N_ERROR - 1 else 1.0)
-            p[i, j] = total
-            p[j, i] = total
+        for j in range(N_MOVING, N_ERROR):
+            p[i, j] = scratch[i, j] * (keep if j < N_ERROR - 1 else 1.0)
+    for i in range(N_ERROR):
+        for j in range(i):
+            p[j, i] = p[i, j]
     for j in range(6):
         p[N_MOVING + j, N_MOVING + j] += variance[j] * (1.0 - keep * keep)
     p[N_ERROR - 1, N_ERROR - 1] += wander
@@ -116,26 +142,27 @@ def update_covariance(p, rows, measured, noise_variance, s, w, seen, gain):
     Channels first, error states last: the innermost loops run over rows of memory.
 
     Args:
-        p: (19, 19) covariance.
+        p: (19, 24) covariance.
         rows: (C, 19) slopes of the channels.
         measured: (C,) NaN where missing; such a channel must have a row of zeros.
         noise_variance: (C,).
         s: (C, C) scratch.
         w: (C, C) becomes the inverse Cholesky factor of the innovations' covariance.
-        seen: (C, 19) scratch: covariance of channels and error states.
-        gain: (C, 19) becomes the Kalman gain, transposed.
+        seen: (C, 24) scratch: covariance of channels and error states.
+        gain: (C to the next multiple of 3, 24) becomes the Kalman gain, transposed; the rows beyond
+            the channels are zero.
 
     Returns:
         Logarithm of the determinant of the innovations' covariance.
     """
     channels = rows.shape[0]
     for j in range(channels):
-        for i in range(N_ERROR):
+        for i in range(WIDE):
             seen[j, i] = 0.0
         for m in range(N_MOVING):
             slope = rows[j, m]
             if slope != 0.0:  # a channel shows one to three of them
-                for i in range(N_ERROR):
+                for i in range(WIDE):
                     seen[j, i] += slope * p[m, i]
     for i in range(channels):
         for j in range(i + 1):
@@ -149,22 +176,24 @@ def update_covariance(p, rows, measured, noise_variance, s, w, seen, gain):
         s[i, i] += noise_variance[i] if present else 1.0
     log_det = cholesky_inverse(s, w)
     for j in range(channels):  # the gain is w' w seen; at first w seen, which p loses the square of
-        for i in range(N_ERROR):
+        for i in range(WIDE):
             gain[j, i] = 0.0
         for m in range(j + 1):
             factor = w[j, m]
-            for i in range(N_ERROR):
+            for i in range(WIDE):
                 gain[j, i] += factor * seen[m, i]
-    for i in range(N_ERROR):
-        for m in range(channels):
-            factor = gain[m, i]
-            for j in range(N_ERROR):
-                p[i, j] -= factor * gain[m, j]
-    for j in range(channels):
+    for first in range(0, gain.shape[0], TOGETHER):
         for i in range(N_ERROR):
+            for j in range(WIDE):
+                total = p[i, j]
+                for m in range(TOGETHER):
+                    total -= gain[first + m, i] * gain[first + m, j]
+                p[i, j] = total
+    for j in range(channels):
+        for i in range(WIDE):
             gain[j, i] *= w[j, j]
         for m in range(j + 1, channels):
             factor = w[m, j]
-            for i in range(N_ERROR):
+            for i in range(WIDE):
                 gain[j, i] += factor * gain[m, i]
     return log_det

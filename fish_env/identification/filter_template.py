@@ -13,10 +13,14 @@ import math
 import numpy as np
 
 from fish_env.identification.filter_algebra import (
+    MOVING_WIDE,
     N_ERROR,
     N_MOVING,
+    WIDE,
+    no_gain,
     predict_covariance,
     update_covariance,
+    widened,
 )
 
 # --- completed by compose ---
@@ -135,16 +139,16 @@ def ekf_run(
     history = np.zeros((history_rows, width))
     start_effects(work, width, clock[0], swimming, pace, late, history, tables)
     channels = codes.shape[0]
-    p = covariance0.copy()
+    p = widened(covariance0)
     f = np.zeros((N_MOVING, N_ERROR))
-    scratch = np.zeros((N_ERROR, N_ERROR))
+    scratch, turned = np.zeros((N_ERROR, WIDE)), np.zeros((N_ERROR, MOVING_WIDE))
     gap = np.zeros((N_MOVING, width))
     error = np.zeros((N_ERROR, width))
     rows = np.zeros((channels, N_ERROR))
     s = np.zeros((channels, channels))
     w = np.zeros((channels, channels))
-    seen = np.zeros((channels, N_ERROR))
-    k_gain = np.zeros((channels, N_ERROR))
+    seen = np.zeros((channels, WIDE))
+    k_gain = no_gain(channels)
     e = np.zeros((channels, width))
     gains, biases = np.ones((channels, width)), np.zeros((channels, width))
     for i in range(channels):
@@ -164,7 +168,7 @@ def ekf_run(
             keep = math.exp(-span / wrench_decay_s)
             for j in range(6):
                 work[(WRENCH + j) * width] *= keep
-            predict_covariance(p, f, keep, wrench_variance, wander * span, scratch)
+            predict_covariance(p, f, keep, wrench_variance, wander * span, scratch, turned)
         observation_rows(work, width, codes, gain, measured[sample], rows)
         innovations_of(work, width, measured[sample], codes, gains, biases, e)
         log_det = update_covariance(

@@ -12,10 +12,14 @@ import math
 import numpy as np
 
 from fish_env.identification.filter_algebra import (
+    MOVING_WIDE,
     N_ERROR,
     N_MOVING,
+    WIDE,
+    no_gain,
     predict_covariance,
     update_covariance,
+    widened,
 )
 
 # --- completed by compose ---
@@ -47,12 +51,12 @@ def replay_run(
         wander: variance that the tail phase gains in a second (rad^2/s).
     """
     channels = measured.shape[1]
-    p = covariance0.copy()
-    scratch = np.zeros((N_ERROR, N_ERROR))
+    p = widened(covariance0)
+    scratch, turned = np.zeros((N_ERROR, WIDE)), np.zeros((N_ERROR, MOVING_WIDE))
     s = np.zeros((channels, channels))
     w = np.zeros((channels, channels))
-    seen = np.zeros((channels, N_ERROR))
-    gain = np.zeros((channels, N_ERROR))
+    seen = np.zeros((channels, WIDE))
+    gain = no_gain(channels)
     e = np.zeros(channels)
     stray = np.zeros(N_ERROR)
     moved = np.zeros(N_ERROR)
@@ -62,11 +66,13 @@ def replay_run(
             span = clock[sample] - clock[sample - 1]
             keep = math.exp(-span / wrench_decay_s)
             kept = math.exp(-span / decay_in_s)
-            predict_covariance(p, f_in[sample], keep, wrench_variance, wander * span, scratch)
-            for i in range(N_MOVING):
+            predict_covariance(
+                p, f_in[sample], keep, wrench_variance, wander * span, scratch, turned
+            )
+            for i in range(MOVING_WIDE):
                 total = 0.0
                 for j in range(N_ERROR):
-                    total += f_in[sample, i, j] * stray[j]
+                    total += turned[j, i] * stray[j]
                 moved[i] = total
             for j in range(6):
                 i = N_MOVING + j

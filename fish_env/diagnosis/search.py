@@ -25,6 +25,8 @@ FloatArray = npt.NDArray[np.float64]
 Report = Callable[[str], None]
 Sketched = tuple[str, Sketch]
 """With the name of the cause that it has added."""
+Way = Callable[[float, Signal], list[Sketched]]
+"""To sketch a cause, no further than it takes to see that it stays above an objective."""
 BEHIND = 0.25
 """A sketch that gains less by more than this share of the best one's gain is not fitted in full."""
 LEEWAY = 100.0
@@ -65,25 +67,25 @@ def refits(
     wandering, shown = loose or (base, ())
     follower = Sketcher(wandering)
 
-    def followed(signal: Signal) -> list[Sketched]:
+    def followed(enough: float, signal: Signal) -> list[Sketched]:
         report(f"trying {signal.cause.name} with a wandering phase")
         first = _sketches(follower, base, signal, starts(wandering, signal))
-        return [s for _, f in first for s in _sketches(sketcher, base, signal, [f.point])]
+        return [s for _, f in first for s in _sketches(sketcher, base, signal, [f.point], enough)]
 
-    def alone(signal: Signal, enough: float = np.inf) -> list[Sketched]:
+    def alone(enough: float, signal: Signal) -> list[Sketched]:
         report(f"trying {signal.cause.name}")
         return _sketches(sketcher, base, signal, starts(base, signal), enough)
 
-    sketches = _all([*(partial(followed, s) for s in shown), *(partial(alone, s) for s in chosen)])
-
-    def also(signals: Sequence[Signal]) -> list[Sketched]:
+    def also(way: Way, signals: Sequence[Signal]) -> list[Sketched]:
         enough = _enough(sketches, sketcher.base, BEHIND, effort.finalists)
-        return _all([partial(alone, signal, enough) for signal in signals])
+        return _all([partial(way, enough, signal) for signal in signals])
 
-    sketches += also(unseen)
+    sketches: list[Sketched] = []
+    for way, signals in ((alone, chosen), (followed, shown), (alone, unseen)):
+        sketches += also(way, signals)
     if sketches:
         ahead = min(sketches, key=lambda s: s[1].objective)[0]
-        sketches += also(like(ahead)[: effort.shortlist])
+        sketches += also(alone, like(ahead)[: effort.shortlist])
     settled = bool(current.causes) and not strains(base)
     if settled:
         sketches = _telling(sketcher, sketches, {signal.cause.name for signal in chosen})

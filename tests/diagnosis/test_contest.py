@@ -36,7 +36,10 @@ def contest(monkeypatch):
     Returns what it finds and which fits it made: (name, noise) with the noise held.
     """
 
-    def run(sketches, scores, causes=("first",), strained=(), unseen=(), effort=FULL, base=PRESENT):
+    def run(
+        sketches, scores, causes=("first",), strained=(), unseen=(), wandering=(), effort=FULL,
+        base=PRESENT,
+    ):  # fmt: skip
         fits = {name: fake(name, score) for name, score in scores.items()}
         done = SimpleNamespace(at_noise=[], in_full=[], noise_too=[], enough={})
 
@@ -47,9 +50,10 @@ def contest(monkeypatch):
             def sketch(self, effects, released, begin):
                 return SimpleNamespace(objective=NOTHING_MORE)
 
-        def sketched(sketcher, base, signal, begin, enough):
+        def sketched(sketcher, base, signal, begin, enough=np.inf):
             done.enough[str(signal)] = enough
-            return [(signal, SimpleNamespace(name=str(signal), objective=sketches[signal]))]
+            found = SimpleNamespace(name=str(signal), objective=sketches[signal], point=None)
+            return [(signal, found)]
 
         def at_noise(problem, at, noise, *spent):
             done.at_noise.append((at.name, noise))
@@ -71,9 +75,10 @@ def contest(monkeypatch):
             monkeypatch.setattr(search, name, value)
         monkeypatch.setattr(Explanation, "score", property(lambda self: self.fit.score))
         present = Explanation(causes, fake("present", 0.0))
-        seen = [Named(name) for name in sketches if name not in unseen]
-        hidden = [Named(name) for name in unseen]
-        found = refits(present, seen, lambda step: None, effort=effort, unseen=hidden)
+        seen = [Named(name) for name in sketches if name not in (*unseen, *wandering)]
+        hidden, lost = ([Named(name) for name in names] for names in (unseen, wandering))
+        loose = (fake("loose", 0.0), lost)
+        found = refits(present, seen, lambda step: None, loose, effort, unseen=hidden)
         return (*found, done)
 
     return run
@@ -129,6 +134,15 @@ def test_where_one_is_fitted_later_sketches_have_to_lead(contest):
     *_, done = contest(given, {"c": 1.0}, (), unseen=("d",), effort=QUICK, base=10_000.0)
     assert done.enough["d"] == 6000.0
     assert done.in_full == ["c"]
+
+
+def test_what_was_begun_with_a_wandering_phase_has_to_get_among_the_finalists_too(contest):
+    given = {"b": 6000.0, "w": 6500.0, "x": 9000.0}
+    scores = dict.fromkeys(given, 1.0)
+    *_, done = contest(given, scores, (), wandering=("w", "x"), base=10_000.0)
+    assert done.enough["w"] == done.enough["x"] == 6000.0 + search.BEHIND * 4000.0
+    assert "w" in dict(done.at_noise)
+    assert "x" not in dict(done.at_noise)
 
 
 def test_nothing_is_tried_where_nothing_is_chosen():

@@ -1,0 +1,65 @@
+"""The filter's small dense algebra against the formulas of a textbook, whatever its layout."""
+
+import numpy as np
+import pytest
+
+from fish_env.identification.filter_algebra import (
+    MOVING_WIDE,
+    N_ERROR,
+    N_MOVING,
+    WIDE,
+    no_gain,
+    predict_covariance,
+    update_covariance,
+    widened,
+)
+
+PHASE = N_ERROR - 1
+
+
+def covariance(rng):
+    root = rng.standard_normal((N_ERROR, N_ERROR))
+    return root @ root.T + np.eye(N_ERROR)
+
+
+def test_prediction_is_the_lyapunov_step():
+    rng = np.random.default_rng(0)
+    before, slopes = covariance(rng), rng.standard_normal((N_MOVING, N_ERROR))
+    variance, keep, wander = rng.uniform(1.0, 2.0, 6), 0.8, 0.3
+    transition = np.diag([0.0] * N_MOVING + [keep] * 6 + [1.0])
+    transition[:N_MOVING] = slopes
+    added = np.zeros(N_ERROR)
+    added[N_MOVING:PHASE], added[PHASE] = variance * (1.0 - keep**2), wander
+    p = widened(before)
+    scratch, turned = np.zeros((N_ERROR, WIDE)), np.zeros((N_ERROR, MOVING_WIDE))
+    predict_covariance(p, slopes, keep, variance, wander, scratch, turned)
+    expected = transition @ before @ transition.T + np.diag(added)
+    np.testing.assert_allclose(p[:, :N_ERROR], expected, rtol=1e-12, atol=1e-12)
+    assert not p[:, N_ERROR:].any()
+
+
+@pytest.mark.parametrize("channels", [1, 4, 9, 11])
+def test_update_is_that_of_kalman(channels):
+    rng = np.random.default_rng(channels)
+    before = covariance(rng)
+    rows = np.zeros((channels, N_ERROR))
+    rows[:, :N_MOVING] = rng.standard_normal((channels, N_MOVING))
+    measured, noise = np.zeros(channels), rng.uniform(0.1, 1.0, channels)
+    lost = channels // 2 if channels > 1 else None
+    if lost is not None:
+        measured[lost], rows[lost] = np.nan, 0.0
+    p, gain = widened(before), no_gain(channels)
+    s, w = np.zeros((2, channels, channels))
+    log_det = update_covariance(
+        p, rows, measured, noise, s, w, np.zeros((channels, WIDE)), gain
+    )  # fmt: skip
+    spread = rows @ before @ rows.T + np.diag(np.where(np.isfinite(measured), noise, 1.0))
+    kalman = before @ rows.T @ np.linalg.inv(spread)
+    np.testing.assert_allclose(gain[:channels, :N_ERROR].T, kalman, rtol=1e-9, atol=1e-11)
+    np.testing.assert_allclose(
+        p[:, :N_ERROR], before - kalman @ rows @ before, rtol=1e-9, atol=1e-9
+    )
+    np.testing.assert_allclose(w.T @ w, np.linalg.inv(spread), rtol=1e-9, atol=1e-11)
+    assert log_det == pytest.approx(np.linalg.slogdet(spread)[1])
+    assert not gain[channels:].any()
+    assert not p[:, N_ERROR:].any()

@@ -18,6 +18,7 @@ class Effort:
         retries: whether what was found is questioned: other starts from where the winner is,
             tails out of step with their beat, weaker causes where something is missing; and what
             no cause explains described.
+        pictured: most runs that the report shows, those kept for judging first.
         left_out: in words, what a full diagnosis does beyond this one.
     """
 
@@ -27,12 +28,19 @@ class Effort:
     shortlist: int
     finalists: int
     retries: bool
+    pictured: int
     left_out: tuple[str, ...] = ()
 
 
 PICTURES = "figures as PNG"
 FULL = Effort(
-    runs=10_000, seconds=float("inf"), step_s=0.01, shortlist=6, finalists=4, retries=True
+    runs=10_000,
+    seconds=float("inf"),
+    step_s=0.01,
+    shortlist=6,
+    finalists=4,
+    retries=True,
+    pictured=6,
 )
 QUICK = Effort(
     runs=2,
@@ -41,11 +49,13 @@ QUICK = Effort(
     shortlist=3,
     finalists=1,
     retries=False,
+    pictured=2,
     left_out=(
         "all but the first 20 s of two of the runs for fitting",
         "fits of rival causes, so nothing comes out as ambiguous",
         "second looks: from the winner, at tails out of step, for weaker causes",
         "a model of what no cause explains",
+        "pictures of more than two runs, and the map of where the misfit sits",
         PICTURES,
     ),
 )

@@ -153,6 +153,7 @@ def _series(diagnosis: Diagnosis) -> ReportSeries:
         accepted=diagnosis.accepted,
         final_runs=diagnosis.final_runs,
         localisation=diagnosis.localisation,
+        most_runs=(QUICK if diagnosis.quick else FULL).pictured,
     )
 
 

@@ -108,13 +108,18 @@ def test_the_answer_about_a_table_is_read_with_its_own_signs_and_units(tmp_path)
 
 
 def test_a_quick_answer_draws_fewer_runs(tmp_path):
-    write_report(answer(quick=True), run_series(), tmp_path)
+    series = run_series()
+    page = write_report(answer(quick=True), series, tmp_path).read_text()
     assert (tmp_path / "figures" / "run_r01.svg").exists()
     assert not (tmp_path / "figures" / "run_r02.svg").exists()
+    assert not (tmp_path / "figures" / "regimes.svg").exists()
+    assert text(series.localisation.words()) in page
     assert not list((tmp_path / "figures").glob("*.png"))
     assert "figures as PNG" in QUICK.left_out
-    write_report(answer(), run_series(), tmp_path)
+    assert any("map of where" in words for words in QUICK.left_out)
+    write_report(answer(), series, tmp_path)
     assert (tmp_path / "figures" / "run_r01.png").exists()
+    assert (tmp_path / "figures" / "regimes.png").exists()
 
 
 def test_figures_of_an_earlier_diagnosis_go(tmp_path):

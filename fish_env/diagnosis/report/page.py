@@ -39,7 +39,7 @@ PARTS: tuple[Part, ...] = (
 def write_report(answer: Answer, series: Series, out: str | Path) -> Path:
     """Writes ``report.html`` and its figures into a folder.
 
-    Figures are SVG and, but for a first look, PNG.
+    Figures are SVG and PNG; a first look has no PNG and no map of where the misfit sits.
 
     Args:
         answer: Content of ``diagnosis.json``; what it lacks is left out of the page.
@@ -54,7 +54,8 @@ def write_report(answer: Answer, series: Series, out: str | Path) -> Path:
     figures.mkdir(parents=True, exist_ok=True)
     for old in (*figures.glob("*.svg"), *figures.glob("*.png")):
         old.unlink()  # figures of an earlier diagnosis would contradict this one
-    album = Album(figures, bitmaps=not answer.get("quick"))
+    whole = not answer.get("quick")
+    album = Album(figures, bitmaps=whole, maps=whole)
     body = "\n".join(filter(None, (part(answer, series, album) for part in PARTS)))
     page = folder / "report.html"
     page.write_text(_page(answer, body), encoding="utf-8")

@@ -223,13 +223,14 @@ def where(answer: Answer, series: Series, album: Album) -> str:
     found = series.localisation if isinstance(series, ReportSeries) else None
     if found is not None:
         parts.append(paragraph(found.words()))
-        parts.append(
-            figure(
-                draw.draw_regimes(found, album),
-                "Error of the refitted baseline in each channel and regime. Framed: more than "
-                "chance gives anywhere in the table. Hatched: never visited.",
+        if album.maps:
+            parts.append(
+                figure(
+                    draw.draw_regimes(found, album),
+                    "Error of the refitted baseline in each channel and regime. Framed: more than "
+                    "chance gives anywhere in the table. Hatched: never visited.",
+                )
             )
-        )
         by_regime: dict[str, list[str]] = {}
         for regime, label in found.never_visited:
             by_regime.setdefault(regime.replace("_", " "), []).append(label)

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from fish_env.data.schema import CommandSteps, Dataset
 from fish_env.data.units import unwrap_angle
 from fish_env.diagnosis import open_loop
+from fish_env.diagnosis.effort import FULL
 from fish_env.diagnosis.extended_file import extended_fish
 from fish_env.diagnosis.gain import ANGLES, WINDOW_S
 from fish_env.diagnosis.regimes import Localisation
@@ -30,8 +31,6 @@ from fish_env.sensing import measured_channels, true_times
 from fish_env.simulator import InitialState, Simulator
 
 FloatArray = npt.NDArray[np.float64]
-MOST_RUNS = 6
-"""Runs that are shown: the final ones first."""
 SETTLED_S = 1.0
 """After this time the filter knows velocities that were not measured: whole runs start here."""
 LONGEST_STEP_S = 0.01
@@ -110,7 +109,7 @@ def series_from(
     accepted: Fit,
     final_runs: Sequence[str] = (),
     localisation: Localisation | None = None,
-    most_runs: int = MOST_RUNS,
+    most_runs: int = FULL.pictured,
 ) -> ReportSeries:
     """Series of the runs to show, from what a diagnosis has in hand.
 
@@ -120,7 +119,7 @@ def series_from(
         accepted: accepted explanation, from the same runs; the same object where nothing was added.
         final_runs: ids of runs kept for judging; they are shown first.
         localisation: of the misfit.
-        most_runs: how many runs to show.
+        most_runs: how many runs to show, the final ones first.
     """
     problem = baseline.problem
     kept = list(final_runs)[:most_runs]

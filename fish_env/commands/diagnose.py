@@ -17,7 +17,7 @@ from fish_env.diagnosis.generic_forces import wrench_unit
 from fish_env.diagnosis.pipeline import diagnose
 
 COLLECT_AFTER = 100_000
-"""New objects after which garbage is looked for; usually that is after 700."""
+"""New objects after which garbage is looked for; Python 3.11 does so after 700."""
 
 
 def diagnose_dataset(
@@ -44,7 +44,7 @@ def diagnose_dataset(
         RoboticFishError: The data or the fish cannot be used.
     """
     # What is loaded by now stays, and hardly anything made later refers to itself: to look for
-    # garbage as often as usual would take a twelfth of a first look's time.
+    # garbage as often as usual would take a fifteenth of a first look's time.
     gc.freeze()
     gc.set_threshold(COLLECT_AFTER)
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())

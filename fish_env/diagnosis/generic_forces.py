@@ -95,15 +95,14 @@ def changes(fit: Fit, forces: GenericForces, columns: npt.NDArray[np.int64]) -> 
     pushes = Pushes(forces.bases, np.r_[0, columns], np.r_[0.0, probes(columns)])
 
     def pushed(problem: Problem) -> FloatArray:
-        return problem.innovations(z, effects, fit.noise, fit.filtered, pushes)
+        return problem.changes(z, effects, fit.noise, fit.filtered, pushes)
 
     corners = fit.problem.has_corners(fit.point.effects)
     problem = fit.problem.with_long_steps() if corners else fit.comparing
     out = pushed(problem)
     if problem is not fit.problem and not np.isfinite(out).all():
         out = pushed(fit.problem)
-    out[1:] -= out[0]
-    return out[1:].T
+    return out.T
 
 
 def generic_signals(

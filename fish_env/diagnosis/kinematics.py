@@ -78,6 +78,30 @@ class Increments:
 
 
 @dataclass(frozen=True, eq=False)
+class Course:
+    """Samples, and what lies between them: a cubic spline, held constant outside.
+
+    Attributes:
+        times: (n,).
+        values: (n, columns).
+    """
+
+    times: FloatArray
+    values: FloatArray
+
+    def at(self, wanted: FloatArray) -> FloatArray:
+        """Values at some times (m, columns)."""
+        if np.array_equal(self.times, wanted):
+            return self.values
+        result: FloatArray = self._curve(np.clip(wanted, self.times[0], self.times[-1]))
+        return result
+
+    @cached_property
+    def _curve(self) -> CubicSpline:
+        return CubicSpline(self.times, self.values)
+
+
+@dataclass(frozen=True, eq=False)
 class Prepared:
     """One run, read for a relation.
 
@@ -86,8 +110,7 @@ class Prepared:
         outputs: (n, rows).
         t_in: (m,) times of the inputs.
         inputs: (m, inputs).
-        t_angle: (a,) times of the attitude.
-        angles: (a, 1 or 3).
+        angles: the attitude (a, 1 or 3).
         keep: (n - 1,) increments that can be compared.
         integral: (n - 1, m) integrates what is sampled with the inputs between the outputs.
     """
@@ -96,20 +119,9 @@ class Prepared:
     outputs: FloatArray
     t_in: FloatArray
     inputs: FloatArray
-    t_angle: FloatArray
-    angles: FloatArray
+    angles: Course
     keep: npt.NDArray[np.bool_]
     integral: sparse.csr_array
-
-    def angles_at(self, wanted: FloatArray) -> FloatArray:
-        """Angles at some times."""
-        if _alike(self.t_angle, wanted):
-            return self.angles
-        return _along(self._course, self.t_angle, wanted)
-
-    @cached_property
-    def _course(self) -> CubicSpline:
-        return CubicSpline(self.t_angle, self.angles)
 
 
 @dataclass(frozen=True)
@@ -141,7 +153,7 @@ class Relation:
         if not keep.any():
             return None
         integral = integrator(t_in, t_out, run.commands.times_s)
-        return Prepared(t_out, outputs, t_in, inputs, t_angle, angles, keep, integral)
+        return Prepared(t_out, outputs, t_in, inputs, Course(t_angle, angles), keep, integral)
 
     def increments(self, run: Prepared, values: FloatArray) -> Increments:
         """What is left of the increments under settings.
@@ -152,7 +164,7 @@ class Relation:
         """
         left, matrix = self._left(run, values)
         flat = matrix.reshape(len(run.t_in), -1)
-        gain = _on(run.t_in, flat, run.t_out).reshape(-1, *matrix.shape[1:])
+        gain = Course(run.t_in, flat).at(run.t_out).reshape(-1, *matrix.shape[1:])
         middle, span = 0.5 * (run.t_out[1:] + run.t_out[:-1]), np.diff(run.t_out)
         joined = np.append(False, run.keep[:-1])[run.keep]
         step = float(np.median(np.diff(run.t_in)))
@@ -171,7 +183,7 @@ class Relation:
         offset = np.array([given.get(f"{name}_offset", 0.0) for name in names])
         delay = given.get("delay", 0.0)
         # What is read at t was so at t - delay.
-        euler = run.angles_at(run.t_in - delay) - offset
+        euler = run.angles.at(run.t_in - delay) - offset
         matrix = self._matrix(euler, given)
         rates = np.einsum("nij,nj->ni", matrix, run.inputs - bias)
         grown = run.integral @ rates
@@ -182,7 +194,7 @@ class Relation:
         grown = grown * (1.0 + given.get("scale", 0.0))
         if self.name == "position":
             arm = np.array([given.get(f"arm_{a}", 0.0) for a in "xyz"])[: len(self.outputs)]
-            at = run.angles_at(run.t_out) - offset
+            at = run.angles.at(run.t_out) - offset
             grown = grown + np.diff(np.einsum("nij,j->ni", self._matrix(at, given), arm), axis=0)
         return (np.diff(run.outputs, axis=0) - grown)[run.keep], matrix
 
@@ -206,21 +218,6 @@ def _complete(run: Run, names: Sequence[str]) -> tuple[FloatArray, FloatArray]:
         if name in ("roll", "yaw"):
             values[:, column] = np.unwrap(values[:, column])
     return run.time_s[measured], values
-
-
-def _on(times: FloatArray, values: FloatArray, wanted: FloatArray) -> FloatArray:
-    """Values at other times, along a cubic spline, held constant outside."""
-    if _alike(times, wanted):
-        return values
-    return _along(CubicSpline(times, values), times, wanted)
-
-
-def _alike(times: FloatArray, wanted: FloatArray) -> bool:
-    return times.shape == wanted.shape and bool(np.array_equal(times, wanted))
-
-
-def _along(curve: CubicSpline, times: FloatArray, wanted: FloatArray) -> FloatArray:
-    return np.asarray(curve(np.clip(wanted, times[0], times[-1])), float)
 
 
 def _bridged(t_out: FloatArray, t_in: FloatArray) -> npt.NDArray[np.bool_]:

@@ -117,9 +117,8 @@ def separation(fit: Fit, rivals: Sequence[Point], manoeuvre: Manoeuvre) -> Float
     count = len(problem.baseline)
     nudged = [replace(fit.point, z=fit.point.z + Z_STEP * np.eye(count)[i]) for i in range(count)]
     z, effects = _lanes(problem, [fit.point, *nudged, *rivals])
-    out = problem.innovations(z, effects, fit.noise, filtered)
-    slopes = (out[1 : 1 + count] - out[0]).T / Z_STEP
-    differences = (out[1 + count :] - out[0]).T
+    changes = problem.changes(z, effects, fit.noise, filtered)
+    slopes, differences = changes[:count].T / Z_STEP, changes[count:].T
     return unfollowed(slopes, differences, _information(fit, count))
 
 

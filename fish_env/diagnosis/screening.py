@@ -149,9 +149,7 @@ def _changes_at_once(
     values = [base, *(effect_values(problem, name, probe) for name, probe in jobs)]
     lanes = {path: np.array([own.get(path, base[path]) for own in values]) for path in base}
     start = np.column_stack([fit.point.z, z])
-    out = problem.innovations(start, lanes, fit.noise, fit.filtered)
-    out[1:] -= out[0]
-    return out[1:]
+    return problem.changes(start, lanes, fit.noise, fit.filtered)
 
 
 def _coefficient_signals(projector: Projector, causes: Sequence[Cause], fit: Fit) -> list[Signal]:

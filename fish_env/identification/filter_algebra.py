@@ -78,9 +78,27 @@ def cholesky_inverse(s, w):
 
 
 @kernel
-def no_gain(channels):
-    """Room for a Kalman gain, transposed: (channels to the next multiple of 3, 24)."""
-    return np.zeros((-(-channels // TOGETHER) * TOGETHER, WIDE))
+def room(channels):
+    """What the kernels below write on: scratch, turned; s, w, seen and gain, as they say."""
+    return (
+        np.zeros((N_ERROR, WIDE)),
+        np.zeros((N_ERROR, MOVING_WIDE)),
+        np.zeros((channels, channels)),
+        np.zeros((channels, channels)),
+        np.zeros((channels, WIDE)),
+        np.zeros((-(-channels // TOGETHER) * TOGETHER, WIDE)),
+    )
+
+
+@kernel
+def multiply(a, rows, b, columns, product):
+    """product = a b: so many rows of a (., 19) and columns of b (19, .)."""
+    for i in range(rows):
+        for j in range(columns):
+            total = 0.0
+            for m in range(N_ERROR):
+                total += a[i, m] * b[m, j]
+            product[i, j] = total
 
 
 @kernel
@@ -104,27 +122,18 @@ def predict_covariance(p, f, keep, variance, wander, scratch, turned):
         variance: (6,) stationary variance of the wrench.
         wander: variance that the tail phase gains over the interval (rad^2).
         scratch: (19, 24).
-        turned: (19, 16) scratch, zero in the columns beyond the moving rows.
+        turned: (19, 16) becomes f transposed; the columns beyond the moving rows are zero.
     """
     for j in range(N_MOVING):
         for m in range(N_ERROR):
             turned[m, j] = f[j, m]
-    for i in range(N_MOVING):
-        for j in range(WIDE):
-            total = 0.0
-            for m in range(N_ERROR):
-                total += f[i, m] * p[m, j]
-            scratch[i, j] = total
+    multiply(f, N_MOVING, p, WIDE, scratch)
     for i in range(N_MOVING, N_ERROR):
         factor = keep if i < N_ERROR - 1 else 1.0
         for j in range(WIDE):
             scratch[i, j] = factor * p[i, j]
+    multiply(scratch, N_ERROR, turned, MOVING_WIDE, p)
     for i in range(N_ERROR):
-        for j in range(MOVING_WIDE):
-            total = 0.0
-            for m in range(N_ERROR):
-                total += scratch[i, m] * turned[m, j]
-            p[i, j] = total
         for j in range(N_MOVING, N_ERROR):
             p[i, j] = scratch[i, j] * (keep if j < N_ERROR - 1 else 1.0)
     for i in range(N_ERROR):

@@ -13,12 +13,10 @@ import math
 import numpy as np
 
 from fish_env.identification.filter_algebra import (
-    MOVING_WIDE,
     N_ERROR,
     N_MOVING,
-    WIDE,
-    no_gain,
     predict_covariance,
+    room,
     update_covariance,
     widened,
 )
@@ -140,15 +138,11 @@ def ekf_run(
     start_effects(work, width, clock[0], swimming, pace, late, history, tables)
     channels = codes.shape[0]
     p = widened(covariance0)
+    scratch, turned, s, w, seen, k_gain = room(channels)
     f = np.zeros((N_MOVING, N_ERROR))
-    scratch, turned = np.zeros((N_ERROR, WIDE)), np.zeros((N_ERROR, MOVING_WIDE))
     gap = np.zeros((N_MOVING, width))
     error = np.zeros((N_ERROR, width))
     rows = np.zeros((channels, N_ERROR))
-    s = np.zeros((channels, channels))
-    w = np.zeros((channels, channels))
-    seen = np.zeros((channels, WIDE))
-    k_gain = no_gain(channels)
     e = np.zeros((channels, width))
     gains, biases = np.ones((channels, width)), np.zeros((channels, width))
     for i in range(channels):

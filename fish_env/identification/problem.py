@@ -226,6 +226,19 @@ class Problem:
         records, measurement = self._lanes(z, effects, count)
         return self.filter_for(effects).innovations(records, measurement, noise, filtered, pushes)
 
+    def changes(
+        self,
+        z: FloatArray,
+        effects: Mapping[str, FloatArray],
+        noise: NoiseModel,
+        filtered: Sequence[Filtered],
+        pushes: Pushes | None = None,
+    ) -> FloatArray:
+        """What :meth:`innovations` change from the first point to each other (N - 1, residuals)."""
+        rows = self.innovations(z, effects, noise, filtered, pushes)
+        rows[1:] -= rows[0]  # in place: fresh memory costs as much as the arithmetic
+        return rows[1:]
+
     def filtered(
         self, point: Point, noise: NoiseModel, keep_slopes: bool = False
     ) -> list[Filtered]:

@@ -15,9 +15,8 @@ from fish_env.identification.filter_algebra import (
     MOVING_WIDE,
     N_ERROR,
     N_MOVING,
-    WIDE,
-    no_gain,
     predict_covariance,
+    room,
     update_covariance,
     widened,
 )
@@ -52,11 +51,7 @@ def replay_run(
     """
     channels = measured.shape[1]
     p = widened(covariance0)
-    scratch, turned = np.zeros((N_ERROR, WIDE)), np.zeros((N_ERROR, MOVING_WIDE))
-    s = np.zeros((channels, channels))
-    w = np.zeros((channels, channels))
-    seen = np.zeros((channels, WIDE))
-    gain = no_gain(channels)
+    scratch, turned, s, w, seen, gain = room(channels)
     e = np.zeros(channels)
     stray = np.zeros(N_ERROR)
     moved = np.zeros(N_ERROR)

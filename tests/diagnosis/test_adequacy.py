@@ -36,19 +36,19 @@ def swimming(rng):
 class Answering:
     """A problem in which each direction of the wrench moves one of six channels."""
 
-    def __init__(self, run, residuals):
-        self.runs, self.residuals, self.baseline, self.known = (run,), residuals, Sized(()), {}
+    def __init__(self, run):
+        self.runs, self.baseline, self.known = (run,), Sized(()), {}
         self.fish = load_fish("zheng-2021-a")
 
     def has_corners(self, effects):
         return False
 
-    def innovations(self, z, effects, noise, filtered, pushes):
-        out = np.tile(self.residuals, (len(pushes.column), 1)).reshape(-1, SAMPLES, 6)
+    def changes(self, z, effects, noise, filtered, pushes):
+        out = np.zeros((len(pushes.column), SAMPLES, 6))
         for lane, (column, size) in enumerate(zip(pushes.column, pushes.size, strict=True)):
             function, direction = divmod(column, 6)
             out[lane, :, direction] -= size / UNIT[direction] * pushes.bases[0][:, function]
-        return out.reshape(len(out), -1)
+        return (out[1:] - out[0]).reshape(len(out) - 1, -1)
 
 
 QUIET = NoiseModel(np.ones(6), 3e-3, 1e-4, 1.0)
@@ -65,7 +65,7 @@ def fit_with(missing, seed=0, noise=QUIET):
     flat = residuals.ravel()
     lin = Linearised(flat, np.zeros((len(flat), 0)), np.zeros(len(flat), np.int64),
                      np.repeat(run.clock, 6))  # fmt: skip
-    problem = Answering(run, flat)
+    problem = Answering(run)
     own = SimpleNamespace(
         problem=problem, comparing=problem, filtered=[filtered], linearised=lin, released=(),
         effects=(), noise=noise,

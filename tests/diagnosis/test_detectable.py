@@ -61,8 +61,9 @@ class Bending:
     def freedoms(self, names) -> tuple:
         return ()
 
-    def innovations(self, z, lanes, noise, filtered) -> np.ndarray:
-        return np.array([self.change(*pair) for pair in zip(z.T, lanes[PATH], strict=True)])
+    def changes(self, z, lanes, noise, filtered) -> np.ndarray:
+        rows = np.array([self.change(*pair) for pair in zip(z.T, lanes[PATH], strict=True)])
+        return rows[1:] - rows[0]
 
 
 def followed(z):

@@ -48,9 +48,9 @@ class Diverging:
     def __getattr__(self, name):
         return getattr(self.problem, name)
 
-    def innovations(self, *given):
-        out = self.problem.innovations(*given)
-        out[1, 100:] = np.nan
+    def changes(self, *given):
+        out = self.problem.changes(*given)
+        out[0, 100:] = np.nan
         return out
 
 

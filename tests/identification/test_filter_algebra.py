@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 
 from fish_env.identification.filter_algebra import (
-    MOVING_WIDE,
     N_ERROR,
     N_MOVING,
-    WIDE,
-    no_gain,
     predict_covariance,
+    room,
     update_covariance,
     widened,
 )
@@ -31,7 +29,7 @@ def test_prediction_is_the_lyapunov_step():
     added = np.zeros(N_ERROR)
     added[N_MOVING:PHASE], added[PHASE] = variance * (1.0 - keep**2), wander
     p = widened(before)
-    scratch, turned = np.zeros((N_ERROR, WIDE)), np.zeros((N_ERROR, MOVING_WIDE))
+    scratch, turned, *_ = room(1)
     predict_covariance(p, slopes, keep, variance, wander, scratch, turned)
     expected = transition @ before @ transition.T + np.diag(added)
     np.testing.assert_allclose(p[:, :N_ERROR], expected, rtol=1e-12, atol=1e-12)
@@ -48,11 +46,9 @@ def test_update_is_that_of_kalman(channels):
     lost = channels // 2 if channels > 1 else None
     if lost is not None:
         measured[lost], rows[lost] = np.nan, 0.0
-    p, gain = widened(before), no_gain(channels)
-    s, w = np.zeros((2, channels, channels))
-    log_det = update_covariance(
-        p, rows, measured, noise, s, w, np.zeros((channels, WIDE)), gain
-    )  # fmt: skip
+    p = widened(before)
+    _, _, s, w, seen, gain = room(channels)
+    log_det = update_covariance(p, rows, measured, noise, s, w, seen, gain)
     spread = rows @ before @ rows.T + np.diag(np.where(np.isfinite(measured), noise, 1.0))
     kalman = before @ rows.T @ np.linalg.inv(spread)
     np.testing.assert_allclose(gain[:channels, :N_ERROR].T, kalman, rtol=1e-9, atol=1e-11)

@@ -47,12 +47,10 @@ class Album:
     Attributes:
         folder: Their folder.
         bitmaps: Whether each is a PNG too, not only an SVG.
-        maps: Whether to draw where in the regime the misfit sits.
     """
 
     folder: Path
     bitmaps: bool = True
-    maps: bool = True
 
 
 @contextmanager

@@ -54,8 +54,7 @@ def write_report(answer: Answer, series: Series, out: str | Path) -> Path:
     figures.mkdir(parents=True, exist_ok=True)
     for old in (*figures.glob("*.svg"), *figures.glob("*.png")):
         old.unlink()  # figures of an earlier diagnosis would contradict this one
-    whole = not answer.get("quick")
-    album = Album(figures, bitmaps=whole, maps=whole)
+    album = Album(figures, bitmaps=not answer.get("quick"))
     body = "\n".join(filter(None, (part(answer, series, album) for part in PARTS)))
     page = folder / "report.html"
     page.write_text(_page(answer, body), encoding="utf-8")

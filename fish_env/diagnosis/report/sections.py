@@ -223,7 +223,7 @@ def where(answer: Answer, series: Series, album: Album) -> str:
     found = series.localisation if isinstance(series, ReportSeries) else None
     if found is not None:
         parts.append(paragraph(found.words()))
-        if album.maps:
+        if not answer.get("quick"):
             parts.append(
                 figure(
                     draw.draw_regimes(found, album),

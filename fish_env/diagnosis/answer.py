@@ -68,7 +68,7 @@ def as_dict(diagnosis: Diagnosis) -> Plain:
         "residual_model": residual_entry(diagnosis.residual),
         "next_experiment": experiment_entry(diagnosis.next_experiment),
         "strained": list(diagnosis.adequacy.strained),
-        "notes": list(diagnosis.dataset.notes),
+        "notes": [*diagnosis.dataset.notes, *_chance(diagnosis)],
     }
     return {**answer, "doubts": doubts(answer)}
 
@@ -97,6 +97,19 @@ def _unexplained(diagnosis: Diagnosis) -> list[Plain]:
     return [
         {"depends_on": m.function, "direction": m.direction, "rms": float(m.size), "log_p": m.log_p}
         for m in diagnosis.adequacy.misfits
+    ]
+
+
+def _chance(diagnosis: Diagnosis) -> list[str]:
+    """What was asked for by the fitted runs, and is no good for the others."""
+    gain = diagnosis.adequacy.refuted
+    if gain is None:
+        return []
+    asked = _unexplained(diagnosis)[0]
+    return [
+        f"The runs that were fitted ask for {_wrench(asked)} ({asked['rms']:.2g} "
+        f"{wrench_unit(asked['direction'])}), hardly louder than chance does; as it foretells the "
+        f"final runs no better (log likelihood {gain:+.2g}), it is taken for chance."
     ]
 
 
@@ -176,11 +189,14 @@ def _asked(answer: Plain) -> str:
         return ""
     holds = holds_elsewhere(answer)
     first = answer["residual_model"]["terms"][0] if holds else answer["unexplained"][0]
-    kind = "force" if wrench_unit(first["direction"]) == "N" else "moment"
-    return (
-        f"What is left looks most like a {kind} in {first['direction']} that depends on "
-        f"{first['depends_on']}{', on runs kept for judging too' if holds else ''}."
-    )
+    also = ", on runs kept for judging too" if holds else ""
+    return f"What is left looks most like {_wrench(first)}{also}."
+
+
+def _wrench(term: Plain) -> str:
+    """One wrench in words."""
+    kind = "force" if wrench_unit(term["direction"]) == "N" else "moment"
+    return f"a {kind} in {term['direction']} that depends on {term['depends_on']}"
 
 
 def holds_elsewhere(answer: Plain) -> bool:

@@ -207,22 +207,25 @@ def _diagnose_runs(
         partial(adequacy, attribution.accepted.fit, rng, attribution.tolerated),
         partial(preconditions, problem, attribution.screens[0], causes, where),
     )
+    judging = Problem(dataset, fish, final, dt=effort.step_s) if final else None
+    residual = None
+    if effort.retries and left.slight:
+        progress("asking the final runs about what is left")
+        left, residual = _judged_elsewhere(attribution, left, judging)
     if effort.retries and not left.reached:
         attribution, left = _with_weaker_causes(attribution, left, causes, rng, progress)
     verdict = decide(attribution, left, shown)
     attribution = attribution.extrapolated()
     accepted = attribution.accepted.fit
     gain = None
-    judging = Problem(dataset, fish, final, dt=effort.step_s) if final else None
     if verdict.name in EXTENDING and judging is not None:
         progress("measuring the gain on final runs")
         gain = measure_gain(judging, baseline, accepted, rng)
-    residual = None
-    if verdict.name == "outside_library" and effort.retries:
+    if verdict.name != "outside_library":
+        residual = None
+    elif effort.retries and residual is None:
         progress("describing what is left")
-        # Numbers that nobody believes would bend what is left.
-        basis = baseline if implausible(accepted) else accepted
-        residual = residual_model(basis, left.threshold, judging)
+        residual = _described(attribution, left, judging)
     progress("locating the misfit")
     judged = one_step(problem, baseline, accepted)
     place = localise_fits(problem, judged, np.random.default_rng([seed, 3]))
@@ -239,6 +242,26 @@ def _compared(dataset: Dataset, seed: int) -> tuple[tuple[Floor, ...], Consisten
     """How much each channel scatters, and whether the channels agree with each other."""
     floors = noise_floors(dataset)
     return floors, check_consistency(dataset, np.random.default_rng([seed, 2]), floors)
+
+
+def _described(
+    attribution: Attribution, left: Adequacy, judging: Problem | None
+) -> ResidualModel | None:
+    """What is left, as a sum of simple wrenches."""
+    accepted = attribution.extrapolated().accepted.fit
+    # Numbers that nobody believes would bend what is left.
+    basis = attribution.baseline.fit if implausible(accepted) else accepted
+    return residual_model(basis, left.threshold, judging)
+
+
+def _judged_elsewhere(
+    attribution: Attribution, left: Adequacy, judging: Problem | None
+) -> tuple[Adequacy, ResidualModel | None]:
+    """What is left once the runs kept for judging were asked about it, and a model of it."""
+    model = _described(attribution, left, judging)
+    if model is not None and model.judged is not None:
+        left = left.judged(model.judged.gain)
+    return left, model
 
 
 def _with_weaker_causes(

@@ -1,11 +1,12 @@
 """The test of what is left, on residuals that answer linearly to a wrench."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from fish_env.diagnosis.adequacy import adequacy, implausible
+from fish_env.diagnosis.adequacy import Adequacy, Misfit, adequacy, implausible
 from fish_env.diagnosis.generic_forces import regressors
 from fish_env.effects import catalogue
 from fish_env.identification.filtering import NoiseModel
@@ -110,6 +111,29 @@ def test_a_missing_wrench_is_found_with_what_it_depends_on(function, channel, di
 
 def test_a_wrench_below_the_noise_is_left_alone():
     assert adequacy(fit_with([("depth", 2, 0.02)]), np.random.default_rng(0)).reached
+
+
+SLIGHT = Adequacy(False, -11.0, (Misfit("u", "surge", -12.0, 1e-3),))
+
+
+@pytest.mark.parametrize("gain", [-3.0, 0.0])
+def test_what_foretells_nothing_elsewhere_and_may_be_chance_is_taken_for_it(gain):
+    judged = SLIGHT.judged(gain)
+    assert judged.reached
+    assert judged.refuted == gain
+
+
+@pytest.mark.parametrize(
+    ("left", "gain"),
+    [
+        (SLIGHT, 0.1),  # the other runs ask for it too
+        (replace(SLIGHT, misfits=(Misfit("u", "surge", -22.5, 1e-3),)), -3.0),  # no chance
+        (replace(SLIGHT, strained=("a hull without lift",)), -3.0),
+        (replace(SLIGHT, reached=True), -3.0),
+    ],
+)
+def test_all_else_stays_as_it_is(left, gain):
+    assert left.judged(gain) is left
 
 
 def named(effects=(), released=(), z=0.0, interval=(0.0, 0.0), at_bounds=()):

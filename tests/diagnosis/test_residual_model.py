@@ -83,6 +83,24 @@ def test_where_nothing_is_missing_there_is_nothing_to_describe(tmp_path):
     assert residual_model(own, left.threshold, final) is None
 
 
+def test_runs_kept_for_judging_refute_chance_and_nothing_else(swirled, tmp_path):
+    """Chance gets its say by a threshold that it just passes."""
+    own, final, _ = fits("null", 9, tmp_path / "data")
+    chance = just_asked(adequacy(own, np.random.default_rng(0)))
+    model = residual_model(own, chance.threshold, final)
+    assert chance.judged(model.judged.gain).refuted < 0.0
+    model, left, *_ = swirled
+    assert just_asked(left).judged(model.judged.gain).refuted is None
+
+
+def just_asked(left):
+    """A test with the threshold a little above what is asked for most, and nothing strained."""
+    asked = left.misfits[0].log_p
+    lax = replace(left, reached=False, threshold=asked + 0.1, strained=())
+    assert lax.slight
+    return lax
+
+
 def test_scores_of_samples_add_up_to_the_likelihood_of_the_run():
     setup = Setup(runs=1)
     problem = Problem(simulate(setup), paths=PATHS)

@@ -118,6 +118,24 @@ AS_CAMERA = replace(
 CLOSED = replace(
     RICH, choices=tuple((n,) for n in SIZES if n not in INVISIBLE), schedule="controller"
 )
+DESIGNS: dict[str, Plan] = {
+    "four runs of a minute at 50 Hz": replace(RICH, runs=4, duration=60.0, rate=50.0),
+    "twelve runs of 10 s at 10 Hz": replace(RICH, runs=12, duration=10.0, rate=10.0),
+    "two runs": replace(RICH, runs=2),
+    "four times the noise": replace(RICH, noise={c: 4.0 * sd for c, sd in SENSORS.items()}),
+    "gyro, compass and depth, a tenth missing": replace(
+        RICH, noise={c: SENSORS[c] for c in ("z", "yaw", "p", "q", "r")}, missing=0.1
+    ),
+    "speeds, attitude and depth": replace(
+        RICH,
+        noise=dict.fromkeys(("u", "v", "w"), 0.01)
+        | {c: SENSORS[c] for c in ("z", "roll", "pitch", "yaw")},
+    ),
+    "unknown starts, 30 % missing": replace(RICH, start="unknown", missing=0.3),
+    "strong slow pushes of any colour": replace(RICH, **STRONG),
+    "twice the size": replace(RICH, strength=2.0),
+}
+"""Experiments of other people; two numbers that follow each other share one."""
 SHORT = Plan(runs=3, duration=12.0, visible=False)
 PLANS: dict[str, Plan] = {
     "rich": RICH,
@@ -132,6 +150,8 @@ PLANS: dict[str, Plan] = {
     "triples": replace(RICH, choices=TRIPLES),
     "outside": replace(RICH, choices=tuple((name,) for name in FOREIGN_SIZES)),
     "coefficients": replace(RICH, choices=(), moved=(1, 4)),
+    "designs": replace(RICH, choices=AS_CAMERA.choices),
+    "null_designs": replace(RICH, choices=()),
     "poor": SHORT,
     "steady": Plan(
         STEADY_TABLE,
@@ -155,12 +175,14 @@ POOR_CASES: tuple[tuple[str, str], ...] = (
 
 
 def plan_of(tier: str, seed: int) -> Plan:
-    """The plan of one case; the poor tier has one for each of its cases.
+    """The plan of one case; poor runs and other people's experiments are of several kinds.
 
     Raises:
         KeyError: No such tier.
     """
     plan = PLANS[tier]
+    if tier in ("designs", "null_designs"):
+        return replace([*DESIGNS.values()][seed // 2 % len(DESIGNS)], choices=plan.choices)
     if tier != "poor":
         return plan
     name, schedule = POOR_CASES[seed % len(POOR_CASES)]

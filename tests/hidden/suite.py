@@ -30,6 +30,8 @@ FULL = {
     "pairs": len(PLANS["pairs"].choices),
     "triples": len(PLANS["triples"].choices),
     "outside": len(PLANS["outside"].choices),
+    "designs": 18,
+    "null_designs": 18,
     "coefficients": 12,
     "poor": 10,
     "steady": len(PLANS["steady"].choices),

@@ -19,11 +19,13 @@ ORDER = (
     "pairs",
     "triples",
     "outside",
+    "designs",
     "coefficients",
     "null",
     "null_strong",
     "null_camera",
     "null_closed_loop",
+    "null_designs",
     "poor",
     "steady",
 )

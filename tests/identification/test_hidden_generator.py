@@ -22,7 +22,7 @@ from tests.hidden import suite
 from tests.hidden.cases import draw_truth, make_case
 from tests.hidden.measurement import channels_of, distorted
 from tests.hidden.measurement import true_times as hidden_times
-from tests.hidden.plans import PLANS, plan_of
+from tests.hidden.plans import DESIGNS, PLANS, plan_of
 from tests.hidden.scoring import score
 from tests.hidden.simulate import Start, simulate
 from tests.hidden.sizes import FOREIGN_SIZES, SIZES, draw_effect
@@ -305,6 +305,10 @@ def test_a_full_suite_holds_what_it_must():
     assert count["null"] >= 30
     assert min(count["coefficients"], count["pairs"], count["outside"]) >= 12
     assert count["poor"] >= 8
+    for tier in ("designs", "null_designs"):
+        plans = [plan_of(tier, job.seed) for job in todo if job.tier == tier]
+        for plan in DESIGNS.values():
+            assert replace(plan, choices=PLANS[tier].choices) in plans
 
 
 def test_the_benchmark_goes_on_where_it_stopped(tmp_path, capsys):

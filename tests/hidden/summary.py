@@ -11,24 +11,28 @@ from scipy.stats import binomtest
 
 from tests.hidden.scoring import Row
 
-ORDER = (
-    "rich",
-    "small",
-    "camera",
-    "closed_loop",
-    "pairs",
-    "triples",
-    "outside",
-    "designs",
-    "coefficients",
-    "null",
-    "null_strong",
-    "null_camera",
-    "null_closed_loop",
-    "null_designs",
-    "poor",
-    "steady",
-)
+TIERS = {
+    "rich": "One effect of typical size in eight runs of 30 s: nine channels at 25 Hz, sensor "
+    "noise, a small coloured disturbance.",
+    "small": "The same at 0.3 of the size.",
+    "camera": "As rich, but x, y, z and yaw only, at 15 Hz, with unknown starts and tail phases.",
+    "closed_loop": "As rich, but the commands come from a controller.",
+    "pairs": "Two effects at once.",
+    "triples": "Three effects at once.",
+    "outside": "An effect that the library does not have.",
+    "designs": "As rich, but other experiments: four runs of a minute at 50 Hz, twelve of 10 s at "
+    "10 Hz, two runs, four times the noise, other sensors, many samples missing, strong slow "
+    "pushes, twice the size.",
+    "coefficients": "One to three coefficients off by three to six prior deviations.",
+    "null": "Nothing wrong, runs as in rich.",
+    "null_strong": "Nothing wrong, pushes of 5 to 10 mN that last 1 to 5 s, of four colours.",
+    "null_camera": "Nothing wrong, seen by a camera.",
+    "null_closed_loop": "Nothing wrong, under a controller.",
+    "null_designs": "Nothing wrong, experiments as in designs.",
+    "poor": "Runs that cannot show what is wrong.",
+    "steady": "Tables of steady motion instead of runs.",
+}
+"""What each tier holds, in the order in which they are told."""
 RATES: tuple[tuple[str, str, Callable[[Row], bool]], ...] = (
     ("verdict_right", "verdict right", lambda row: row.verdict_right),
     ("name_right", "verdict and name right", lambda row: row.name_right),
@@ -100,7 +104,7 @@ def confusion(rows: Sequence[Row]) -> dict[str, dict[str, int]]:
 
 def summarise(rows: Sequence[Row]) -> dict[str, Any]:
     """Everything that a suite says: by tier, over all, and the confusion matrix."""
-    tiers = [tier for tier in ORDER if any(row.tier == tier for row in rows)]
+    tiers = [tier for tier in TIERS if any(row.tier == tier for row in rows)]
     return {
         "cases": len(rows),
         "overall": tier_summary(rows),
@@ -136,7 +140,7 @@ def markdown(summary: dict[str, Any]) -> str:
     """The summary as a page: all cases, then each tier with its rates and confusion matrix."""
     lines = ["## All cases", "", *rates_table(summary["overall"])]
     for tier, rates in summary["tiers"].items():
-        lines += ["", f"## {tier}", "", *rates_table(rates)]
+        lines += ["", f"## {tier}", "", TIERS[tier], "", *rates_table(rates)]
         lines += ["", "| hidden | answers |", "| --- | --- |"]
         for truth, answers in summary["confusion"][tier].items():
             said = ", ".join(f"{name} x {count}" for name, count in answers.items())

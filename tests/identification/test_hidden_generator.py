@@ -28,7 +28,7 @@ from tests.hidden.simulate import Start, simulate
 from tests.hidden.sizes import FOREIGN_SIZES, SIZES, draw_effect
 from tests.hidden.steady import steady_row
 from tests.hidden.stubs import perfect, silent
-from tests.hidden.summary import rate, summarise
+from tests.hidden.summary import TIERS, rate, summarise
 from tests.hidden.truth import Truth
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -302,6 +302,7 @@ def test_a_full_suite_holds_what_it_must():
     for tier in ("rich", "small"):
         hidden = {tuple(drawn(tier, job.seed).effects) for job in todo if job.tier == tier}
         assert hidden == {(name,) for name in SIZES}
+    assert set(TIERS) == set(count) == set(suite.FULL)
     assert count["null"] >= 30
     assert min(count["coefficients"], count["pairs"], count["outside"]) >= 12
     assert count["poor"] >= 8

@@ -32,8 +32,8 @@ LEVEL = 0.003
 right, so it gets a tenth of that. How far disturbances of other colours go is measured by
 scripts/calibrate_adequacy.py."""
 CERTAIN = 2.0
-"""Multiple of the threshold's log p-value that no chance reaches. In 60 data sets of that
-calibration it came to 1.0 at most."""
+"""Multiple of the threshold's log p-value that no chance reaches: it came to 1.0 at most in 60 data
+sets of that calibration."""
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ class Effort:
         shortlist: effects tried at each step.
         finalists: of these, fitted in full.
         retries: whether what was found is questioned: other starts from where the winner is,
-            tails out of step with their beat, weaker causes where something is missing; and what
-            no cause explains described.
+            tails out of step with their beat, weaker causes where something is missing, the final
+            runs where that may be chance; and what no cause explains described.
         pictured: most runs that the report shows, those kept for judging first.
         left_out: in words, what a full diagnosis does beyond this one.
     """
@@ -53,7 +53,7 @@ QUICK = Effort(
     left_out=(
         "all but the first 20 s of two of the runs for fitting",
         "fits of rival causes, so nothing comes out as ambiguous",
-        "second looks: from the winner, at tails out of step, for weaker causes",
+        "second looks: from the winner, at tails out of step, for weaker causes, for chance",
         "a model of what no cause explains",
         "pictures of more than two runs, and the map of where the misfit sits",
         PICTURES,

@@ -211,7 +211,9 @@ def _diagnose_runs(
     residual = None
     if effort.retries and left.slight:
         progress("asking the final runs about what is left")
-        left, residual = _judged_elsewhere(attribution, left, judging)
+        residual = _described(attribution, left, judging)
+        if residual is not None and residual.judged is not None:
+            left = left.judged(residual.judged.gain)
     if effort.retries and not left.reached:
         attribution, left = _with_weaker_causes(attribution, left, causes, rng, progress)
     verdict = decide(attribution, left, shown)
@@ -252,16 +254,6 @@ def _described(
     # Numbers that nobody believes would bend what is left.
     basis = attribution.baseline.fit if implausible(accepted) else accepted
     return residual_model(basis, left.threshold, judging)
-
-
-def _judged_elsewhere(
-    attribution: Attribution, left: Adequacy, judging: Problem | None
-) -> tuple[Adequacy, ResidualModel | None]:
-    """What is left once the runs kept for judging were asked about it, and a model of it."""
-    model = _described(attribution, left, judging)
-    if model is not None and model.judged is not None:
-        left = left.judged(model.judged.gain)
-    return left, model
 
 
 def _with_weaker_causes(

@@ -17,7 +17,8 @@ class Effort:
         finalists: of these, fitted in full.
         retries: whether what was found is questioned: other starts from where the winner is,
             tails out of step with their beat, weaker causes where something is missing, the final
-            runs where that may be chance; and what no cause explains described.
+            runs where that may be chance and nothing is named; and what no cause explains
+            described.
         pictured: most runs that the report shows, those kept for judging first.
         left_out: in words, what a full diagnosis does beyond this one.
     """

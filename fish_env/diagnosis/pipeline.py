@@ -210,10 +210,7 @@ def _diagnose_runs(
     judging = Problem(dataset, fish, final, dt=effort.step_s) if final else None
     residual = None
     if effort.retries and left.slight:
-        progress("asking the final runs about what is left")
-        residual = _described(attribution, left, judging)
-        if residual is not None and residual.judged is not None:
-            left = left.judged(residual.judged.gain)
+        left, residual = _judged_elsewhere(attribution, left, judging, progress)
     if effort.retries and not left.reached:
         attribution, left = _with_weaker_causes(attribution, left, causes, rng, progress)
     verdict = decide(attribution, left, shown)
@@ -254,6 +251,22 @@ def _described(
     # Numbers that nobody believes would bend what is left.
     basis = attribution.baseline.fit if implausible(accepted) else accepted
     return residual_model(basis, left.threshold, judging)
+
+
+def _judged_elsewhere(
+    attribution: Attribution, left: Adequacy, judging: Problem | None, progress: Progress
+) -> tuple[Adequacy, ResidualModel | None]:
+    """What is left once the runs kept for judging were asked about it, and a model of it.
+
+    Beside causes it stays as it is: it may be all that tells an imitation from what acts.
+    """
+    if attribution.accepted.causes:
+        return left, None
+    progress("asking the final runs about what is left")
+    model = _described(attribution, left, judging)
+    if model is not None and model.judged is not None:
+        left = left.judged(model.judged.gain)
+    return left, model
 
 
 def _with_weaker_causes(

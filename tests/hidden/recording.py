@@ -23,7 +23,7 @@ from tests.hidden.truth import Truth
 SHALLOWEST, DEEPEST = 0.08, 2.5
 STEEPEST, MOST_ROLL = math.radians(55.0), math.radians(70.0)
 FASTEST = 0.8
-ATTEMPTS = 40
+ATTEMPTS = 400
 BEFORE = 4.0
 """s. How long a fish with an unknown start has swum when its record begins."""
 

@@ -10,7 +10,7 @@ from fish_env.diagnosis import consistency, noise_floor
 from fish_env.diagnosis.attribution import Ranked
 from fish_env.diagnosis.beats import beats_of, by_run, uneven
 from fish_env.diagnosis.causes import PARAMETER, coefficient_sizes
-from fish_env.diagnosis.effort import QUICK
+from fish_env.diagnosis.effort import effort_of
 from fish_env.diagnosis.entries import (
     FORMAT,
     Plain,
@@ -49,7 +49,7 @@ def as_dict(diagnosis: Diagnosis) -> Plain:
         "fish": diagnosis.problem.fish.name,
         "seed": diagnosis.seed,
         "quick": diagnosis.quick,
-        "left_out": list(QUICK.left_out) if diagnosis.quick else [],
+        "left_out": list(effort_of(diagnosis.quick).left_out),
         "runtime_s": diagnosis.runtime_s,
         "verdict": verdict.name,
         "causes": [cause_entry(diagnosis.accepted, name) for name in verdict.causes],

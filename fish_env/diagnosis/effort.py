@@ -62,3 +62,8 @@ QUICK = Effort(
 )
 STEADY_LEFT_OUT = ("fits of all but the three likeliest causes", PICTURES)
 """What a first look at a steady table leaves out."""
+
+
+def effort_of(quick: bool) -> Effort:
+    """What a first look spends, or a whole diagnosis."""
+    return QUICK if quick else FULL

@@ -19,7 +19,7 @@ from fish_env.diagnosis.attribution import Attribution, attribute, extended
 from fish_env.diagnosis.beats import with_measured_beats
 from fish_env.diagnosis.causes import Cause, causes_of
 from fish_env.diagnosis.consistency import Consistency, check_consistency
-from fish_env.diagnosis.effort import FULL, QUICK
+from fish_env.diagnosis.effort import FULL, effort_of
 from fish_env.diagnosis.extended_file import extended_fish
 from fish_env.diagnosis.gain import Gain, Pair, measure_gain, misfit_of, one_step
 from fish_env.diagnosis.next_experiment import Proposal, propose
@@ -153,7 +153,7 @@ def _series(diagnosis: Diagnosis) -> ReportSeries:
         accepted=diagnosis.accepted,
         final_runs=diagnosis.final_runs,
         localisation=diagnosis.localisation,
-        most_runs=(QUICK if diagnosis.quick else FULL).pictured,
+        most_runs=effort_of(diagnosis.quick).pictured,
     )
 
 
@@ -186,7 +186,7 @@ def _diagnose_runs(
 ) -> Diagnosis:
     begin = time.perf_counter()
     rng = np.random.default_rng(seed)
-    effort = QUICK if quick else FULL
+    effort = effort_of(quick)
     progress("checking the runs")
     check_runs(dataset)
     fitted, final = fitted_and_final(dataset, seed)

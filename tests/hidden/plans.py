@@ -135,7 +135,7 @@ DESIGNS: dict[str, Plan] = {
     "strong slow pushes of any colour": replace(RICH, **STRONG),
     "twice the size": replace(RICH, strength=2.0),
 }
-"""Experiments of other people; two numbers that follow each other share one."""
+"""Experiments of other people."""
 SHORT = Plan(runs=3, duration=12.0, visible=False)
 PLANS: dict[str, Plan] = {
     "rich": RICH,
@@ -174,21 +174,35 @@ POOR_CASES: tuple[tuple[str, str], ...] = (
 """An effect, and runs that cannot show it: its signal in them is zero, or next to it."""
 
 
+def poor(name: str, schedule: str) -> Plan:
+    """Runs that cannot show an effect."""
+    if schedule == "deep":
+        return replace(SHORT, choices=((name,),), depth=(2.0, 2.2))
+    return replace(SHORT, choices=((name,),), schedule=schedule)
+
+
+def designed(tier: str) -> tuple[Plan, ...]:
+    """Every experiment of other people, twice."""
+    choices = PLANS[tier].choices
+    return tuple(replace(plan, choices=choices) for plan in DESIGNS.values() for _ in range(2))
+
+
+KINDS = {
+    "poor": tuple(poor(name, schedule) for name, schedule in POOR_CASES),
+    "designs": designed("designs"),
+    "null_designs": designed("null_designs"),
+}
+"""Tiers of several kinds of experiments, which consecutive numbers go through in order."""
+
+
 def plan_of(tier: str, seed: int) -> Plan:
-    """The plan of one case; poor runs and other people's experiments are of several kinds.
+    """The plan of one case.
 
     Raises:
         KeyError: No such tier.
     """
-    plan = PLANS[tier]
-    if tier in ("designs", "null_designs"):
-        return replace([*DESIGNS.values()][seed // 2 % len(DESIGNS)], choices=plan.choices)
-    if tier != "poor":
-        return plan
-    name, schedule = POOR_CASES[seed % len(POOR_CASES)]
-    if schedule == "deep":
-        return replace(plan, choices=((name,),), depth=(2.0, 2.2))
-    return replace(plan, choices=((name,),), schedule=schedule)
+    kinds = KINDS.get(tier, (PLANS[tier],))
+    return kinds[seed % len(kinds)]
 
 
 assert set(SENSORS) == set(ALL_CHANNELS)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest
 
+from tests.hidden.plans import DESIGNS
 from tests.hidden.scoring import Row
 
 TIERS = {
@@ -20,9 +21,7 @@ TIERS = {
     "pairs": "Two effects at once.",
     "triples": "Three effects at once.",
     "outside": "An effect that the library does not have.",
-    "designs": "As rich, but other experiments: four runs of a minute at 50 Hz, twelve of 10 s at "
-    "10 Hz, two runs, four times the noise, other sensors, many samples missing, strong slow "
-    "pushes, twice the size.",
+    "designs": f"As rich, but other experiments: {'; '.join(DESIGNS)}.",
     "coefficients": "One to three coefficients off by three to six prior deviations.",
     "null": "Nothing wrong, runs as in rich.",
     "null_strong": "Nothing wrong, pushes of 5 to 10 mN that last 1 to 5 s, of four colours.",

@@ -1,0 +1,177 @@
+"""Writing files: beside the old one and put in place at once, and never over what was read.
+
+Every writer of the package uses :func:`replacing`, :func:`write_bytes` or :func:`write_text`. A
+reader, a kill or a full disk then meets the old file or the new one, never a part of either.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import uuid
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from fish_env.errors import OutputError
+
+PART = ".part"
+"""Files that are being written have this in their names; a kill may leave one behind."""
+FORBIDDEN = '/\\:*?"<>|'
+"""What the names of files cannot hold on every system."""
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+_LONGEST_STEM = 60
+
+
+@contextmanager
+def replacing(path: str | Path) -> Iterator[Path]:
+    """Yields the path of a new file and puts that file in the place of `path` at the end.
+
+    The new file stands in the same folder, with the same ending. If the block fails, it is removed
+    and what was at `path` stays. Missing folders are made. Of a link, the file that it points to
+    is replaced. A device or a pipe is written to as it is.
+
+    Args:
+        path: The file to write.
+
+    Raises:
+        OutputError: The file cannot be written; names it, the cause and what to do.
+    """
+    target, part = Path(os.path.realpath(path)), None
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        if target.exists() and not target.is_file() and not target.is_dir():
+            yield target
+            return
+        part = _new_part(target)
+        yield part
+        _to_disk(part)
+        part.replace(target)
+        part = None
+    except OSError as error:
+        if isinstance(error, OutputError) or _of_another_file(error, target):
+            raise
+        raise cannot_write(path, error) from error
+    finally:
+        if part is not None:
+            with suppress(OSError):
+                part.unlink(missing_ok=True)
+
+
+def write_bytes(path: str | Path, content: bytes) -> None:
+    """Writes a file at once, see :func:`replacing`.
+
+    Args:
+        path: The file to write.
+        content: All of it.
+
+    Raises:
+        OutputError: The file cannot be written.
+    """
+    with replacing(path) as part:
+        part.write_bytes(content)
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Writes a text in UTF-8 at once, see :func:`replacing`.
+
+    Args:
+        path: The file to write.
+        text: All of it; line ends are written as they are.
+
+    Raises:
+        OutputError: The file cannot be written.
+    """
+    write_bytes(path, text.encode("utf-8"))
+
+
+def cannot_write(path: str | Path, error: OSError) -> OutputError:
+    """Words the error for a file that cannot be written.
+
+    Args:
+        path: The file, or what else the user calls the output.
+        error: What the system said.
+
+    Returns:
+        The error, to be raised by the caller.
+    """
+    if error.errno in _FULL:
+        remedy = "free some space, or choose another place"
+    elif error.errno in (errno.EROFS, errno.EACCES, errno.EPERM):
+        remedy = "choose a place that you may write to"
+    else:
+        remedy = "choose another place"
+    reason = error.strerror or str(error)
+    return OutputError(
+        f"{path}: cannot be written ({reason}); {remedy}. What was there is unchanged"
+    )
+
+
+def file_name(text: str) -> str:
+    """Returns a text as part of a file name: what names cannot hold becomes an underscore."""
+    allowed = "".join("_" if c in FORBIDDEN or not c.isprintable() else c for c in text)
+    return allowed if allowed.strip(". ") else "_" * max(1, len(allowed))
+
+
+def check_outputs(
+    outputs: Iterable[str | Path | None], inputs: Iterable[str | Path | None] = ()
+) -> None:
+    """Refuses outputs that would replace a file that is read, or each other.
+
+    Args:
+        outputs: Files that will be written; None is passed over.
+        inputs: Files that are read. One file under two names, or reached over a link, is one file.
+
+    Raises:
+        OutputError: Names the file.
+    """
+    read = [Path(path) for path in inputs if path is not None]
+    written: list[Path] = []
+    for output in (Path(path) for path in outputs if path is not None):
+        for other in read:
+            if _same(output, other):
+                called = "" if output == other else f" (as {other})"
+                raise OutputError(
+                    f"{output}: is read{called} and would be replaced; give the output another name"
+                )
+        if any(_same(output, other) for other in written):
+            raise OutputError(f"{output}: two outputs have this name; give one another name")
+        written.append(output)
+
+
+def _same(one: Path, other: Path) -> bool:
+    try:
+        return os.path.samefile(one, other)
+    except OSError:
+        return one.resolve() == other.resolve()
+
+
+def _new_part(target: Path) -> Path:
+    """An empty file beside the target, with the rights that the target has or would get."""
+    if target.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(target))
+    exists = target.exists()
+    if exists and not os.access(target, os.W_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(target))
+    stem = target.stem[:_LONGEST_STEM].lstrip(".")
+    part = target.with_name(f".{stem}-{uuid.uuid4().hex[:12]}{PART}{target.suffix}")
+    os.close(os.open(part, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+    if exists:
+        with suppress(OSError):
+            part.chmod(target.stat().st_mode & 0o777)
+    return part
+
+
+def _to_disk(part: Path) -> None:
+    # Opened for writing: some systems refuse to flush what is open for reading.
+    with part.open("rb+") as stream:
+        os.fsync(stream.fileno())
+
+
+def _of_another_file(error: OSError, target: Path) -> bool:
+    """Whether an error tells of a file that is not the one being written, such as one read."""
+    if not isinstance(error.filename, str):
+        return False
+    named = Path(error.filename)
+    ours = named.parent == target.parent and PART in named.name
+    return not ours and named != target and named not in target.parents

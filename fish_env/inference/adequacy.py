@@ -1,0 +1,204 @@
+"""Does an explanation reach the noise floor? A test against forces of no particular origin.
+
+A generic force is added, one function of the motion and one direction at a time; the problem
+provides them. If one of them is significant after everything that is free has been refitted, the
+model lacks something.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fish_env.inference.effects import EffectParameter
+from fish_env.inference.estimate.fit import Fit
+from fish_env.inference.hypotheses import PREFIX
+from fish_env.inference.policy import POLICY
+from fish_env.inference.probes import Cause
+from fish_env.inference.problem import GenericTerms, LackOfFit
+from fish_env.inference.projection import Projector, Signal
+from fish_env.inference.screening import SETTINGS_AT_ONCE, null_threshold
+
+NOTHING = Cause("generic")
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """One generic force that the data indicate.
+
+    Attributes:
+        function: what the missing force depends on.
+        direction: which force or moment.
+        log_p: of this one test, in logarithm.
+        amount: root mean square of the force indicated (N or N m), with its sign.
+    """
+
+    function: str
+    direction: str
+    log_p: float
+    amount: float
+
+    @property
+    def size(self) -> float:
+        """The amount without its sign."""
+        return abs(self.amount)
+
+
+@dataclass(frozen=True)
+class Adequacy:
+    """Result of the test.
+
+    Attributes:
+        reached: no generic force is significant, and all estimates are plausible.
+        threshold: log p-value for that.
+        misfits: generic forces indicated, strongest first.
+        implausible: disturbance at its limit, and implausible estimates of causes; empty if none.
+        refuted: gain in log likelihood of held-out runs by the force indicated, where it is not
+            positive and the force may be chance; else None.
+        lack: what the fit misses against what repeats differ by, where there are enough.
+    """
+
+    reached: bool
+    threshold: float
+    misfits: tuple[Misfit, ...]
+    implausible: tuple[str, ...] = ()
+    refuted: float | None = None
+    lack: LackOfFit | None = None
+
+    @property
+    def short(self) -> bool:
+        """Whether the fit misses more than repeats differ by."""
+        return self.lack is not None and self.lack.p_value < POLICY.adequacy_level
+
+    @property
+    def slight(self) -> bool:
+        """Whether a force is indicated, but no more strongly than seen by chance."""
+        if self.reached or self.implausible or self.short:
+            return False
+        return self.misfits[0].log_p > POLICY.adequacy_certain * self.threshold
+
+    def judged(self, gain: float) -> Adequacy:
+        """The same, after a test on held-out runs.
+
+        A real force improves the prediction of held-out runs; a spurious one worsens it. For a
+        force at the threshold, and a quarter of the runs held out, either error has a probability
+        of about 8 %.
+
+        Args:
+            gain: in log likelihood of held-out runs by the force indicated.
+        """
+        if not self.slight or gain > 0.0:
+            return self
+        return replace(self, reached=True, refuted=gain)
+
+
+def disturbance_at_limit(fit: Fit) -> tuple[str, ...]:
+    """What of the fitted disturbance is at its limit: a misfit with another name."""
+    return fit.problem.disturbance_at_limit(fit.noise)
+
+
+def implausible_estimates(fit: Fit) -> tuple[str, ...]:
+    """Implausible estimates of causes: something similar acts instead.
+
+    A coefficient is implausible more than :data:`FAR_OFF` prior deviations off, or at its physical
+    bound. Beside an effect :data:`EXTREME_PRIOR_SD` is enough: such a coefficient compensates for
+    what the effect does not do; alone it may be an error in the parameter file. A coefficient that
+    does the same as an effect may go as far as the effect.
+
+    An effect is implausible with a sign that it cannot have, :data:`FAR_OFF` times as strong as the
+    strongest plausible one, or with a shape far from the plausible ones.
+    """
+    paths = fit.problem.baseline.paths
+    effects_too = {path for effect in fit.problem.known.values() for path in effect.equals}
+    farthest = POLICY.extreme_prior_sd if fit.effects else POLICY.implausible_prior_sd
+    found = [
+        f"{path} {abs(z):.0f} prior standard deviations from where it is known to be"
+        for path, z in zip(paths, fit.point.z, strict=True)
+        if path in set(fit.released) - effects_too and (abs(z) > farthest or path in fit.at_bounds)
+    ]
+    for name in fit.effects:
+        for parameter in fit.problem.known[name].parameters:
+            path = f"{PREFIX}{name}.{parameter.name}"
+            value, unit = fit.point.effects[path], parameter.unit
+            beyond = (
+                _out_of_place(parameter, value)
+                if parameter.shapes
+                else _beyond(parameter, fit.interval(path))
+            )
+            if beyond:
+                found.append(f"{name} with a {parameter.name} of {value:.2g} {unit}")
+    return tuple(found)
+
+
+def _out_of_place(parameter: EffectParameter, value: float) -> bool:
+    """Whether a shape is far from any plausible one, where the effect is a different one."""
+    low, high = parameter.plausible
+    return bool(abs(value - 0.5 * (low + high)) > 1.5 * (high - low))
+
+
+def _beyond(parameter: EffectParameter, interval: tuple[float, float]) -> bool:
+    """Whether an interval lies wholly outside what could be, seen from neutral."""
+    neutral, (low, high) = parameter.neutral, parameter.plausible
+    if not np.isfinite(neutral):
+        return interval[1] < low / POLICY.implausible_prior_sd
+    below, above = min(low - neutral, 0.0), max(high - neutral, 0.0)
+    return bool(
+        interval[0] > neutral + POLICY.implausible_prior_sd * above
+        or interval[1] < neutral + POLICY.implausible_prior_sd * below
+    )
+
+
+def adequacy(fit: Fit, rng: np.random.Generator, tolerated: float = 0.0) -> Adequacy:
+    """Test a fit against forces of no particular origin.
+
+    Args:
+        fit: the explanation.
+        rng: for the null distribution.
+        tolerated: evidence (in -2 log likelihood) that a simulation error may cause.
+    """
+    forces, signals = _indicated(fit)
+    freedom = fit.problem.noise_freedom(fit)
+    threshold = null_threshold([s for _, s in signals], rng, POLICY.adequacy_level, freedom)
+    found = []
+    for column, signal in signals:
+        amount = float(signal.score[0] / signal.projected[0, 0] * forces.unit(column))
+        found.append(Misfit(*forces.words(column), signal.log_p, amount))
+    found.sort(key=lambda m: m.log_p)
+    strongest = max((signal.statistic for _, signal in signals), default=0.0)
+    reached = not found or found[0].log_p >= threshold or strongest < tolerated
+    implausible = (*disturbance_at_limit(fit), *implausible_estimates(fit))
+    lack = fit.problem.lack_of_fit(fit)
+    left = Adequacy(False, threshold, tuple(found[:8]), implausible, lack=lack)
+    return replace(left, reached=reached and not implausible and not left.short)
+
+
+def strongest_alarm(fit: Fit, rng: np.random.Generator) -> tuple[float, float]:
+    """The smallest log p-value, and the threshold it has in white residuals: to calibrate by."""
+    signals = [signal for _, signal in _indicated(fit)[1]]
+    return min(s.log_p for s in signals), null_threshold(signals, rng, POLICY.adequacy_level)
+
+
+def _indicated(fit: Fit) -> tuple[GenericTerms, list[tuple[int, Signal]]]:
+    """Generic forces along the fitted runs, and the test of each."""
+    fit = fit.extrapolated
+    forces = fit.problem.generic_terms(fit)
+    return forces, list(generic_signals(forces, Projector(fit)))
+
+
+def generic_signals(forces: GenericTerms, projector: Projector) -> Iterator[tuple[int, Signal]]:
+    """Each generic force by its column, as a cause that a refit follows as far as it can.
+
+    Args:
+        forces: the forces.
+        projector: of the fit they are added to.
+    """
+    for first in range(0, len(forces.columns), SETTINGS_AT_ONCE):
+        part = forces.columns[first : first + SETTINGS_AT_ONCE]
+        each = [(NOTHING, 0, [i]) for i in range(len(part))]
+        rows = projector.lin.whitened(forces.changes(part).T)
+        signals = projector.signals(each, rows, count_prior=False)
+        for column, signal in zip(part.tolist(), signals, strict=True):
+            if signal is not None:
+                yield column, signal

@@ -1,0 +1,265 @@
+"""Error budget: what share of the misfit goes with each thing that an explanation changes.
+
+The misfit of a model is the energy of its predictions' errors, in units of the sensors' noise and
+beyond it, where the model runs alone over some seconds from states that the accepted model has
+filtered. A component's share is the mean of what it takes away when it comes first and of what it
+gives back when it goes last: the first and last terms of Shapley's value, which they equal where
+components do not interact. The shares are scaled to add up to what all components together close.
+Where the explanation is adequate, what it leaves is noise by the adequacy test, and nothing is
+left. Elsewhere errors count from the sensors' noise: what is left then holds the random disturbance
+and what was not known of the states that predictions begin from, beside what the model lacks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fish_env.arrays import BoolArray, FloatArray, IntArray
+from fish_env.inference.estimate.fit import Fit
+from fish_env.inference.estimate.free import evaluated, spread_of
+from fish_env.inference.hypotheses import PARAMETER, effect_of
+from fish_env.inference.policy import POLICY
+from fish_env.inference.problem import Problem
+
+COEFFICIENTS = "coefficients"
+RUN_VARIATION = "run_variation"
+RESAMPLES = 2000
+
+
+@dataclass(frozen=True)
+class Share:
+    """Part of the misfit that goes with one component.
+
+    Attributes:
+        name: a cause, :data:`COEFFICIENTS` or :data:`RUN_VARIATION`.
+        share: of the nominal model's misfit.
+        ci95: interval over runs; None with fewer than three.
+        alone: what the component closes when it comes first.
+        last: what is lost when it is left out.
+        channels: channel -> share of that channel's misfit.
+    """
+
+    name: str
+    share: float
+    ci95: tuple[float, float] | None
+    alone: float
+    last: float
+    channels: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Budget:
+    """Where the misfit between the nominal simulation and the measurements goes.
+
+    Attributes:
+        runs: ids or numbers of the runs judged on.
+        held_out: whether these runs chose nothing.
+        misfit: energy of the nominal model beyond noise, in units of that of noise.
+        shares: of the components.
+        left: share that no component closes.
+        left_ci95: its interval over runs; None with fewer than three.
+    """
+
+    runs: tuple[str, ...]
+    held_out: bool
+    misfit: float
+    shares: tuple[Share, ...]
+    left: float
+    left_ci95: tuple[float, float] | None
+
+
+def error_budget(
+    problem: Problem,
+    accepted: Fit,
+    causes: Sequence[str],
+    runs: Sequence[str],
+    held_out: bool,
+    adequate: bool,
+    rng: np.random.Generator,
+) -> Budget | None:
+    """Share the misfit of the nominal model among what an explanation changes.
+
+    Args:
+        problem: the runs to judge on.
+        accepted: the explanation, from these or other runs.
+        causes: names of its causes.
+        runs: ids of the runs, in the problem's order.
+        held_out: whether these runs chose nothing.
+        adequate: whether the explanation leaves nothing but noise.
+        rng: for intervals over runs.
+
+    Returns:
+        The budget; None where the nominal model leaves nothing beyond noise, or diverges.
+    """
+    noise = problem.noise_of(accepted)
+    settled, filtered = evaluated(problem, accepted.point, noise)
+    windows, still, run_of_window = settled.without_feedback(filtered, noise)
+    components = [COEFFICIENTS, *causes]
+    if spread_of(accepted.problem, noise).any():
+        components.append(RUN_VARIATION)
+    everything = frozenset(components)
+    sets = [frozenset[str](), everything]
+    sets += [frozenset([c]) for c in components] + [everything - {c} for c in components]
+    squares = _residuals(windows, accepted, noise, still, sets) ** 2
+    names, channel_of = windows.residual_channels()
+    run_of = run_of_window[windows.groups()[0]]
+    energy = _Energy(squares, windows.measured, run_of, channel_of, len(runs), len(names))
+    if adequate:
+        energy.noise = energy.table[1]
+    misfit = (energy.total[0] - energy.noise.sum()) / energy.noise.sum()
+    if not np.isfinite(energy.total).all() or misfit < POLICY.visible_misfit:
+        return None
+    return _shared(energy, components, names, runs, held_out, float(misfit), rng)
+
+
+def _residuals(
+    problem: Problem,
+    accepted: Fit,
+    noise: Any,
+    filtered: Sequence[object],
+    sets: Sequence[frozenset[str]],
+) -> FloatArray:
+    """Whitened residuals (sets, D) of the model with some components in place."""
+    rows: list[FloatArray] = [np.zeros(0)] * len(sets)
+    plain = problem.with_variation(np.zeros_like(problem.variation))
+    varied = spread_of(accepted.problem, noise).any()
+    for chosen, of_set in ((problem, True), (plain, False)):
+        own = [i for i, s in enumerate(sets) if not varied or (RUN_VARIATION in s) == of_set]
+        if not own or (not varied and not of_set):
+            continue
+        points = [_point(accepted, sets[i]) for i in own]
+        z = np.column_stack([p[0] for p in points])
+        effects = {path: np.array([p[1][path] for p in points]) for path in points[0][1]}
+        found = chosen.innovations(z, effects, noise, filtered)
+        for i, row in zip(own, found, strict=True):
+            rows[i] = row
+    return np.array(rows)
+
+
+def _point(accepted: Fit, chosen: frozenset[str]) -> tuple[FloatArray, dict[str, float]]:
+    """Coefficients and effects with some components at their estimates, the others nominal."""
+    problem, point = accepted.problem, accepted.point
+    baseline = problem.baseline
+    values = baseline.values(point.z[:, None])[:, 0]
+    kept = [
+        (f"{PARAMETER}{path}" in chosen) if path in accepted.released else COEFFICIENTS in chosen
+        for path in baseline.paths
+    ]
+    moved = np.where(kept, values, baseline.mean)
+    z = np.linalg.solve(baseline.factor, moved - baseline.mean)
+    neutral = problem.neutral(accepted.effects)
+    effects = {p: v if effect_of(p) in chosen else neutral[p] for p, v in point.effects.items()}
+    return np.asarray(z, float), effects
+
+
+class _Energy:
+    """Energies of residuals by set of components, run and channel, and what noise makes of them.
+
+    Args:
+        squares: (sets, D) squared residuals, in units of the noise.
+        present: (D,) whether each is of a sample that was measured.
+        run_of: (D,) run of each.
+        channel_of: (D,) channel of each.
+        runs: number of runs.
+        channels: number of channels.
+    """
+
+    def __init__(
+        self,
+        squares: FloatArray,
+        present: BoolArray,
+        run_of: IntArray,
+        channel_of: IntArray,
+        runs: int,
+        channels: int,
+    ) -> None:
+        cell, shape = run_of * channels + channel_of, (runs, channels)
+        size = runs * channels
+        self.table = np.array([np.bincount(cell, row, size).reshape(shape) for row in squares])
+        self.noise = np.bincount(cell, present, size).reshape(shape)
+
+    @property
+    def total(self) -> FloatArray:
+        """(sets,) over all runs and channels."""
+        return np.asarray(self.table.sum(axis=(1, 2)))
+
+    def by_channel(self) -> FloatArray:
+        """(sets, channels) over all runs."""
+        return np.asarray(self.table.sum(axis=1))
+
+    def of_runs(self, runs: IntArray) -> tuple[FloatArray, float]:
+        """(sets,) over some runs, counted as often as they are named, and their noise."""
+        return self.table.sum(axis=2)[:, runs].sum(axis=1), float(self.noise[runs].sum())
+
+
+def shares_of(energy: FloatArray, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Shares of each component, what each closes alone, and what is lost without it, (count,) each.
+
+    Args:
+        energy: (2 + 2 count,) of nothing, everything, each alone, everything but each.
+        count: number of components.
+    """
+    nothing, everything = energy[0], energy[1]
+    whole = nothing - everything
+    first = nothing - energy[2 : 2 + count]
+    last = energy[2 + count :] - everything
+    mean = 0.5 * (first + last)
+    total = mean.sum()
+    scaled = mean * (whole / total) if abs(total) > 1e-12 else mean
+    return scaled, first, last
+
+
+def _shared(
+    energy: _Energy,
+    components: Sequence[str],
+    names: Sequence[str],
+    runs: Sequence[str],
+    held_out: bool,
+    misfit: float,
+    rng: np.random.Generator,
+) -> Budget:
+    count = len(components)
+    nominal = energy.total[0] - energy.noise.sum()
+    shares, first, last = (part / nominal for part in shares_of(energy.total, count))
+    floors = energy.noise.sum(axis=0)
+    reference = np.maximum(
+        energy.by_channel()[0] - floors, POLICY.visible_misfit * np.maximum(floors, 1.0)
+    )
+    channels = [shares_of(column, count)[0] for column in energy.by_channel().T]
+    intervals, left_interval = _intervals(energy, count, rng)
+    found = [
+        Share(
+            name,
+            float(shares[i]),
+            intervals[i] if intervals else None,
+            float(first[i]),
+            float(last[i]),
+            {n: float(channels[k][i] / reference[k]) for k, n in enumerate(names)},
+        )
+        for i, name in enumerate(components)
+    ]
+    found.sort(key=lambda share: -share.share)
+    left = 1.0 - float(shares.sum())
+    return Budget(tuple(runs), held_out, misfit, tuple(found), left, left_interval)
+
+
+def _intervals(
+    energy: _Energy, count: int, rng: np.random.Generator
+) -> tuple[list[tuple[float, float]], tuple[float, float] | None]:
+    """Intervals of the shares and of what is left, over runs; none with fewer than three."""
+    runs = energy.table.shape[1]
+    if runs < POLICY.fewest_runs_for_interval:
+        return [], None
+    draws = []
+    for _ in range(RESAMPLES):
+        own, noise = energy.of_runs(np.asarray(rng.integers(0, runs, runs)))
+        if own[0] > noise:
+            draws.append(shares_of(own, count)[0] / (own[0] - noise))
+    low, high = np.quantile(np.array(draws), [0.025, 0.975], axis=0)
+    ends = np.quantile(1.0 - np.array(draws).sum(axis=1), [0.025, 0.975])
+    pairs = [(float(a), float(b)) for a, b in zip(low, high, strict=True)]
+    return pairs, (float(ends[0]), float(ends[1]))

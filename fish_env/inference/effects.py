@@ -1,0 +1,73 @@
+"""How a vehicle declares its effects; light to import, as the physics does."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import inf
+
+
+@dataclass(frozen=True)
+class EffectParameter:
+    """One parameter of an effect.
+
+    Attributes:
+        name: public name, as in files, reports and on the command line.
+        unit: SI unit, ``-`` when it has none.
+        neutral: value at which the effect is off (may be infinite).
+        lower: smallest physically meaningful value.
+        upper: largest physically meaningful value.
+        plausible: range (low, high) that a real vehicle of this size may show.
+        description: what it is.
+        shapes: it only says where, when or how the effect acts; other parameters switch it on.
+    """
+
+    name: str
+    unit: str
+    neutral: float
+    lower: float = -inf
+    upper: float = inf
+    plausible: tuple[float, float] = (-1.0, 1.0)
+    description: str = ""
+    shapes: bool = False
+
+
+class Switched:
+    """Something with parameters that switch it on."""
+
+    parameters: tuple[EffectParameter, ...]
+
+    @property
+    def neutral(self) -> dict[str, float]:
+        """Parameter values that switch the effect off."""
+        return {p.name: p.neutral for p in self.parameters}
+
+    @property
+    def switching(self) -> tuple[EffectParameter, ...]:
+        """The parameters that switch it on; the others only shape it."""
+        return tuple(p for p in self.parameters if not p.shapes)
+
+
+@dataclass(frozen=True, eq=False)
+class DeclaredEffect(Switched):
+    """An effect of a vehicle, for the inference; what it does is the problem's business.
+
+    Attributes:
+        name: public name.
+        parameters: its parameters.
+        confusable_with: names of effects with a similar signature.
+        equals: baseline coefficients (paths) other values of which do exactly the same.
+        step_error: share of its effect that the simulation gets wrong.
+        drifts_in_phase: whether a periodic drive gets ever further out of phase.
+    """
+
+    name: str
+    parameters: tuple[EffectParameter, ...]
+    confusable_with: tuple[str, ...] = ()
+    equals: tuple[str, ...] = ()
+    step_error: float = 0.0
+    drifts_in_phase: bool = False
+
+    def is_followed(self, values: Mapping[str, float], step: float) -> bool:
+        """Whether simulation steps (s) follow it at these values: they do, at any."""
+        return True

@@ -1,0 +1,1 @@
+"""Estimation: bounded Gauss-Newton on whitened residuals under normal priors."""

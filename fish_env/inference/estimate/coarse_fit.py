@@ -1,0 +1,132 @@
+"""Coarse fits: roughly what a fit with one more effect would reach, on a few runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+
+import numpy as np
+
+from fish_env.arrays import FloatArray
+from fish_env.inference.estimate.fit import Fit, quadratic
+from fish_env.inference.estimate.free import Free, linearise, objective_of, objectives_with_gains
+from fish_env.inference.estimate.gauss_newton import descend
+from fish_env.inference.problem import Point, Problem
+
+STEPS = 5
+TOLERANCE = 0.5
+"""A coarse fit ends when no parameter moves by more of its standard deviation."""
+
+
+@dataclass(frozen=True, eq=False)
+class CoarseFit:
+    """A point on the way to a fit.
+
+    Attributes:
+        effects: names of the effects that are free.
+        released: baseline coefficients whose prior is lifted.
+        point: values reached.
+        objective: -2 log likelihood + prior there, on the runs of the coarse fit, but for a
+            constant.
+    """
+
+    effects: tuple[str, ...]
+    released: tuple[str, ...]
+    point: Point
+    objective: float
+
+
+class CoarseFitter:
+    """Coarse fits on a few runs of a fit, with the gains of its filter.
+
+    The gains follow the noise and hardly the parameters; to filter anew at every point takes many
+    times as long, and the full fit does so.
+
+    Args:
+        fit: what is fitted already; its noise model is used.
+        runs: how many of its runs to use, spread over all of them.
+    """
+
+    def __init__(self, fit: Fit, runs: int = 2) -> None:
+        self.fit = fit
+        self._usual = self._few(fit.problem, runs)
+        self._long = self._few(fit.comparing, runs)
+        few = fit.problem.spread(runs)
+        self.filtered = [fit.filtered[i] for i in few]
+        whole = fit.linearised.marginal
+        self.marginal = None if whole is None else whole.some(few)
+
+    def _few(self, problem: Problem, runs: int) -> Problem:
+        if not problem.refines_steps(self.fit.point.effects):
+            problem = (
+                problem.without_refinement()
+            )  # accurate enough to rank causes, and much quicker
+        return problem.subset(runs)
+
+    def _problem_for(self, effects: Sequence[str]) -> Problem:
+        """In long steps, but for effects that make the motion's rate jump."""
+        return self._usual if self.fit.problem.is_nonsmooth(effects) else self._long
+
+    @cached_property
+    def base(self) -> float:
+        """Objective of the fit itself on these runs."""
+        few = self._problem_for(self.fit.effects)
+        own = Free(few, self.fit.effects, self.fit.released)
+        return self._objectives(few, own, [own.pack(self.fit.point)])[0]
+
+    def coarse_fit(
+        self,
+        effects: Sequence[str],
+        released: Sequence[str],
+        starts: Sequence[Point],
+        give_up_above: float = np.inf,
+    ) -> CoarseFit:
+        """A few Gauss-Newton steps from the best of some starts.
+
+        Args:
+            effects: names of effects that are free.
+            released: baseline coefficients whose prior is lifted.
+            starts: values of all effects' parameters.
+            give_up_above: stop early where the objective will not get below this.
+
+        Raises:
+            LinAlgError: the simulation diverges from every start.
+        """
+        few = self._problem_for(effects)
+        free = Free(few, effects, released)
+        vectors = [free.bounds.clip(free.pack(start)) for start in starts]
+        few, vector = self._best(few, free, vectors)
+        survey = partial(self._surveyed, few, free)
+        vector, value, _ = descend(
+            vector, survey, lambda _, known: known, free.bounds, STEPS, TOLERANCE, give_up_above
+        )
+        return CoarseFit(tuple(effects), tuple(released), free.unpack(vector), value)
+
+    def _best(
+        self, few: Problem, free: Free, vectors: Sequence[FloatArray]
+    ) -> tuple[Problem, FloatArray]:
+        """The best of some vectors, and the problem settled there."""
+        noise = self.fit.noise
+        if few.starts_known:
+            values = self._objectives(few, free, vectors)
+            return few, vectors[int(np.argmin(values))]
+        settled = [few.settled(free.unpack(v), noise) for v in vectors]
+        pairs = zip(settled, vectors, strict=True)
+        return min(pairs, key=lambda pair: self._objectives(pair[0], free, [pair[1]])[0])
+
+    def _surveyed(
+        self, problem: Problem, free: Free, vector: FloatArray
+    ) -> tuple[float, tuple[FloatArray, FloatArray]]:
+        """The objective with its half Hessian and gradient, which the next step asks for.
+
+        A whole step is hardly ever refused, and the slopes' lanes hold the objective's.
+        """
+        lin = linearise(problem, free, vector, self.fit.noise, self.filtered, self.marginal)
+        return objective_of(problem, free, vector, lin.residuals), quadratic(free, vector, lin)
+
+    def _objectives(
+        self, problem: Problem, free: Free, vectors: Sequence[FloatArray]
+    ) -> list[float]:
+        noise, filtered = self.fit.noise, self.filtered
+        return objectives_with_gains(problem, free, vectors, noise, filtered, self.marginal)

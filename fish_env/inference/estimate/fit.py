@@ -1,0 +1,379 @@
+"""Gauss-Newton on the whitened prediction errors, under the priors of the coefficients."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+from scipy.special import ndtri
+
+from fish_env.arrays import FloatArray
+from fish_env.inference.estimate.bounds import coefficients_at_bounds
+from fish_env.inference.estimate.covariance import sandwich
+from fish_env.inference.estimate.free import (
+    DIFFERENCE,
+    Free,
+    Linearised,
+    linearise,
+    marginal_of,
+    objective,
+    objective_of,
+    predicted_variation,
+    residuals_at,
+)
+from fish_env.inference.estimate.gauss_newton import descend, predicted_decrease
+from fish_env.inference.estimate.information import gradient, information, leverage, prior_precision
+from fish_env.inference.estimate.run_variation import Likelihood, Marginal, Spread, fit_spread
+from fish_env.inference.policy import POLICY
+from fish_env.inference.problem import Evaluation, Point, Problem
+
+SAME = 0.01
+"""Root mean square of the difference between whitened residuals below which they are the same."""
+MORE = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Result of an identification.
+
+    Attributes:
+        problem: what was fitted.
+        effects: names of the effects that were free.
+        released: baseline coefficients whose prior was lifted.
+        point: estimates.
+        noise: noise model.
+        names: free parameters, baseline paths first.
+        estimates: (n,) in physical units.
+        covariance: (n, n) in physical units, corrected for coloured residuals.
+        log_likelihood: at the estimates, noise included.
+        objective: -2 log likelihood + prior, smaller is better.
+        at_bounds: names that ended at a bound.
+        active: (k, n) gradients of the active constraints (baseline in prior units).
+        condition: condition number of the information in prior units.
+        filtered: filter results at the estimates.
+        linearised: residuals and slopes at the estimates.
+        in_the_limit: whether estimates and residuals are those of steps ever finer.
+        profiles: 95 % intervals by likelihood, of the parameters that have one.
+    """
+
+    problem: Problem
+    effects: tuple[str, ...]
+    released: tuple[str, ...]
+    point: Point
+    noise: Any
+    names: tuple[str, ...]
+    estimates: FloatArray
+    covariance: FloatArray
+    log_likelihood: float
+    objective: float
+    at_bounds: tuple[str, ...]
+    active: FloatArray
+    condition: float
+    filtered: Sequence[Any] = field(repr=False)
+    linearised: Linearised = field(repr=False)
+    in_the_limit: bool = False
+    profiles: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    @cached_property
+    def leverage(self) -> FloatArray:
+        """Share of each residual that the free parameters follow (D,)."""
+        baseline = self.problem.baseline
+        prior = prior_precision(baseline, len(self.names) - len(baseline), self.released)
+        return leverage(self.linearised.slopes, prior)
+
+    @cached_property
+    def comparing(self) -> Problem:
+        """The problem to compare causes with: in long steps, where this fit looks the same in them.
+
+        A vehicle that turns more quickly, or coefficients far off, may need the usual ones.
+        """
+        long = self.problem.with_long_steps()
+        effects = {path: np.array([value]) for path, value in self.point.effects.items()}
+        (seen,) = long.innovations(self.point.z[:, None], effects, self.noise, self.filtered)
+        off = np.sqrt(np.mean((self.marginalised(seen) - self.linearised.residuals) ** 2))
+        return long if off < SAME else self.problem
+
+    @cached_property
+    def extrapolated(self) -> Fit:
+        """This fit with residuals and estimates as ever finer steps have them.
+
+        Where the motion's rate jumps, the discretisation error is a small share of an effect, but
+        may be several standard deviations of its estimate and look like another cause. The error
+        is proportional to the step, so residuals in two step lengths give the limit (Richardson,
+        1911), and one Gauss-Newton step leads to its minimum. Slopes are as good in the usual
+        steps. A fit of smooth motion is returned unchanged.
+        """
+        if self.in_the_limit or not self.problem.refines_steps(self.point.effects):
+            return self
+        return _extrapolated(self)
+
+    def marginalised(self, residuals: FloatArray) -> FloatArray:
+        """Residuals (D,) with what the runs differ in integrated out."""
+        marginal = self.linearised.marginal
+        return residuals if marginal is None else marginal.residuals(residuals)
+
+    def interval(self, name: str, level: float = 0.95) -> tuple[float, float]:
+        """Interval of one parameter: by likelihood where that was worked out, else normal."""
+        if level == 0.95 and name in self.profiles:
+            return self.profiles[name]
+        i = self.names.index(name)
+        half = float(ndtri(0.5 + level / 2)) * np.sqrt(self.covariance[i, i])
+        return float(self.estimates[i] - half), float(self.estimates[i] + half)
+
+
+def fit(
+    problem: Problem,
+    effects: Sequence[str] | None = None,
+    start: Point | None = None,
+    noise: Any | None = None,
+    released: Sequence[str] = (),
+    refit_noise: bool = True,
+    iterations: int = 5,
+    tolerance: float = 0.3,
+    rounds: int = 4,
+    give_up_above: float = np.inf,
+    report: Callable[[str], None] = lambda step: None,
+) -> Fit:
+    """Estimate baseline coefficients and effect parameters.
+
+    Args:
+        problem: what to fit.
+        effects: effects whose parameters are free; default: those of the problem.
+        start: first values; default: nominal.
+        noise: noise model to start from, or to keep.
+        released: baseline coefficients whose prior is lifted.
+        refit_noise: estimate the disturbance again after the first step and at the end.
+        iterations: most Gauss-Newton steps in a round.
+        tolerance: stop when no combination of parameters would move by more of its standard
+            deviation.
+        rounds: most alternations between parameters and disturbance.
+        give_up_above: stop early where the objective will not get below this under the same noise.
+        report: told what is being done.
+    """
+    names = problem.effects if effects is None else tuple(effects)
+    free = Free(problem, names, released)
+    given = start or problem.start
+    values = {**problem.beginning(names), **given.effects}
+    vector = free.bounds.clip(free.pack(Point(given.z, values)))
+    noise = noise or problem.default_noise()
+    filtered: Sequence[Evaluation] = ()
+    for round_ in range(rounds if refit_noise else 1):
+        problem = problem.settled(free.unpack(vector), noise)
+        problem, marginal = predicted_variation(problem, free.unpack(vector), noise)
+        report(f"fitting parameters, round {round_ + 1}")
+        vector, value, filtered = gauss_newton(
+            problem, free, vector, noise, iterations, tolerance, give_up_above, marginal, filtered
+        )
+        if not refit_noise:
+            break
+        report(f"fitting the noise, round {round_ + 1}")
+        last = noise
+        followed = partial(_leverage, problem, free, vector, noise, filtered)
+        point = free.unpack(vector)
+        noise = problem.fitted_noise(point, noise, round_ > 0, filtered, followed)
+        if last.is_close(noise, POLICY.same_noise):
+            break
+    if refit_noise:
+        value, filtered = objective(problem, free, vector, noise, marginal, filtered)
+    marginal = marginal_of(problem, free.unpack(vector), noise, filtered)
+    return _finish(problem, free, names, tuple(released), vector, noise, value, filtered, marginal)
+
+
+def gauss_newton(
+    problem: Problem,
+    free: Free,
+    vector: FloatArray,
+    noise: Any,
+    iterations: int,
+    tolerance: float,
+    give_up_above: float = np.inf,
+    marginal: Marginal | None = None,
+    near: Sequence[Evaluation] = (),
+) -> tuple[FloatArray, float, Sequence[Evaluation]]:
+    """Gauss-Newton steps with the noise model held.
+
+    Args:
+        problem: the problem.
+        free: its free parameters.
+        vector: (n,) where to begin.
+        noise: noise model.
+        iterations: most steps.
+        tolerance: stop when no combination of parameters would move by more of its standard
+            deviation.
+        give_up_above: stop where the objective will not get below this.
+        marginal: integrates out what the runs differ in.
+        near: evaluation at a vector close to where the steps begin, where there is one.
+
+    Returns:
+        The vector reached, the objective there, and the evaluation.
+
+    Raises:
+        LinAlgError: the simulation diverges where the steps begin.
+    """
+    last = near
+
+    def evaluate(at: FloatArray) -> tuple[float, Sequence[Evaluation]]:
+        return objective(problem, free, at, noise, marginal, last)
+
+    def linearised(at: FloatArray, filtered: Sequence[Evaluation]) -> tuple[FloatArray, FloatArray]:
+        nonlocal last
+        last = filtered
+        return quadratic(free, at, linearise(problem, free, at, noise, filtered, marginal))
+
+    return descend(vector, evaluate, linearised, free.bounds, iterations, tolerance, give_up_above)
+
+
+def quadratic(free: Free, vector: FloatArray, lin: Linearised) -> tuple[FloatArray, FloatArray]:
+    """Half the Hessian (n, n) and half the gradient (n,) of the objective, for Gauss-Newton.
+
+    The steps of later slopes are suited to this Hessian.
+    """
+    hessian = information(lin.slopes, free.prior)
+    free.suit_steps(hessian)
+    return hessian, gradient(lin.slopes, lin.residuals, free.prior, vector)
+
+
+def _leverage(
+    problem: Problem, free: Free, vector: FloatArray, noise: Any, filtered: Sequence[Evaluation]
+) -> FloatArray:
+    """Share of each residual that the free parameters follow (D,)."""
+    return leverage(linearise(problem, free, vector, noise, filtered).slopes, free.prior)
+
+
+def finished(own: Fit) -> Fit:
+    """A fit, iterated to convergence.
+
+    A few steps under a few noise models are enough to screen causes by. Published estimates have
+    to be the minimum, for their intervals to be true.
+    """
+    for _ in range(MORE):
+        free = Free(own.problem, own.effects, own.released)
+        vector = free.pack(own.point)
+        lin = own.linearised
+        hessian = information(lin.slopes, free.prior)
+        pull = gradient(lin.slopes, lin.residuals, free.prior, vector)
+        if (
+            predicted_decrease(hessian, pull, free.bounds.step(hessian, pull, vector))
+            < POLICY.converged
+        ):
+            break
+        again = fit(own.problem, own.effects, own.point, own.noise, own.released, rounds=2)
+        if again.objective > own.objective:
+            break
+        own = again
+    return own
+
+
+def run_variation(own: Fit) -> Spread:
+    """What the runs of a fit differ in, as far as it is strongly indicated.
+
+    Args:
+        own: the fit; its weighting is held.
+    """
+    problem, usual = own.problem, np.array([v.usual for v in own.problem.variations])
+    free = Free(problem, own.effects, own.released)
+    vector, lin = free.pack(own.point), own.linearised
+    if lin.marginal is not None:
+        lin = linearise(problem, free, vector, own.noise, own.filtered)
+    steps = DIFFERENCE * usual
+    slopes = problem.variation_slopes(own.point, own.noise, own.filtered, steps) * usual
+    likelihood = Likelihood(
+        lin.residuals, lin.slopes, slopes, problem.variation / usual, lin.run_of,
+        information(lin.slopes, free.prior), free.prior * vector,
+    )  # fmt: skip
+    return fit_spread(likelihood, usual)
+
+
+def with_run_variation(own: Fit) -> Fit:
+    """The fit, made again where its runs differ by more, or less, than it allows for.
+
+    Where the disturbance stays at its limit nevertheless, what the runs seem to differ in stands in
+    for something else that is missing: the fit then is as it was. A few runs tell no spread.
+    """
+    if not own.problem.variations or own.problem.run_count < POLICY.fewest_runs_for_spread:
+        return own
+    found = run_variation(own)
+    if not found.sd.any() and not own.noise.spread.any():
+        return own
+    noise = replace(own.noise, spread=found.sd)
+    problem = own.problem.with_variation(np.where(found.sd > 0.0, found.values, 0.0))
+    varied = fit(problem, own.effects, own.point, noise, own.released, rounds=2)
+    return own if problem.disturbance_at_limit(varied.noise) else varied
+
+
+def _extrapolated(own: Fit) -> Fit:
+    free = Free(own.problem, own.effects, own.released)
+    vector, lin = free.pack(own.point), own.linearised
+    problem = own.problem
+    fine, finer_by = problem.refined()
+    (finer,) = residuals_at(fine, free, vector[:, None], own.noise, own.filtered)
+    defect = (own.marginalised(finer) - lin.residuals) * finer_by / (finer_by - 1)
+    before = lin.residuals + defect
+    pull = gradient(lin.slopes, before, free.prior, vector)
+    moved = free.bounds.clip(
+        vector + free.bounds.step(information(lin.slopes, free.prior), pull, vector)
+    )
+    (usual,) = residuals_at(problem, free, moved[:, None], own.noise, own.filtered)
+    after = own.marginalised(usual) + defect
+    if objective_of(problem, free, moved, after) >= objective_of(problem, free, vector, before):
+        moved, after = vector, before
+    estimates, residuals = _physical(problem, moved), replace(lin, residuals=after)
+    return replace(
+        own, point=free.unpack(moved), estimates=estimates, linearised=residuals, in_the_limit=True
+    )
+
+
+def _physical(problem: Problem, vector: FloatArray) -> FloatArray:
+    """Estimates (n,) in physical units."""
+    count = len(problem.baseline)
+    values = problem.baseline.values(vector[:count, None])[:, 0]
+    return np.asarray(np.r_[values, vector[count:]], float)
+
+
+def objective_at(
+    problem: Problem,
+    effects: Sequence[str],
+    point: Point,
+    noise: Any,
+    released: Sequence[str] = (),
+) -> float:
+    """-2 log likelihood + prior at a point, without any fitting."""
+    free = Free(problem, effects, released)
+    values = {**problem.neutral(effects), **point.effects}
+    vector = free.bounds.clip(free.pack(Point(point.z, values)))
+    problem = problem.settled(free.unpack(vector), noise)
+    return objective(problem, free, vector, noise)[0]
+
+
+def _finish(
+    problem: Problem,
+    free: Free,
+    effects: tuple[str, ...],
+    released: tuple[str, ...],
+    vector: FloatArray,
+    noise: Any,
+    value: float,
+    filtered: Sequence[Evaluation],
+    marginal: Marginal | None,
+) -> Fit:
+    lin = linearise(problem, free, vector, noise, filtered, marginal)
+    hessian = information(lin.slopes, free.prior)
+    pull = gradient(lin.slopes, lin.residuals, free.prior, vector)
+    inverse = np.asarray(np.linalg.inv(hessian), float)
+    covariance = sandwich(lin, inverse, free.prior)
+    scale = free.scale()
+    physical = scale @ covariance @ scale.T
+    point = free.unpack(vector)
+    estimates = _physical(problem, vector)
+    stuck = coefficients_at_bounds(problem.baseline, estimates[: free.count], released)
+    bounds = (*stuck, *free.effects_at_bounds(vector))
+    diagonal = np.sqrt(np.diag(hessian))
+    condition = float(np.linalg.cond(hessian / np.outer(diagonal, diagonal)))
+    return Fit(
+        problem, effects, released, point, noise, free.names, estimates, physical,
+        float(sum(r.log_likelihood for r in filtered)), value, bounds,
+        free.bounds.active(hessian, pull, vector), condition, filtered, lin,
+    )  # fmt: skip

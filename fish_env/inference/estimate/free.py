@@ -1,0 +1,316 @@
+"""The vector of all free parameters: baseline coefficients in prior units, then effect parameters.
+
+With what estimates are made of: the objective at a vector, residuals and their slopes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, TypeVar, cast
+
+import numpy as np
+
+from fish_env.arrays import FloatArray, IntArray
+from fish_env.inference.estimate.bounds import LinearBounds, parameter_bounds
+from fish_env.inference.estimate.information import prior_precision
+from fish_env.inference.estimate.run_variation import Marginal
+from fish_env.inference.problem import Evaluation, Point, Problem
+
+P = TypeVar("P", bound=Problem)
+Z_STEP = 0.05
+SHORTEST = 0.02
+"""Shortest step for differences, as a share of the longest."""
+DIFFERENCE = 0.3
+"""Step for differences by what runs differ in, in usual spreads."""
+LARGEST_SLOPE = 1e9
+"""In standard deviations of the noise per unit; what exceeds it has diverged."""
+
+
+@dataclass(frozen=True, eq=False)
+class Linearised:
+    """Residuals and their slopes at a point: all that estimates and tests need.
+
+    Attributes:
+        residuals: (D,) whitened innovations.
+        slopes: (D, n) derivative by each free parameter, baseline (in prior units) first.
+        run_of: (D,) index of the run of each residual.
+        time_of: (D,) time of each residual in its run (s).
+        marginal: how the runs' own numbers are integrated out, which residuals and slopes are
+            already; None where runs do not differ.
+    """
+
+    residuals: FloatArray
+    slopes: FloatArray
+    run_of: IntArray
+    time_of: FloatArray
+    marginal: Marginal | None = None
+
+    def whitened(self, rows: FloatArray) -> FloatArray:
+        """Changes (m, D) of the residuals with the runs' own numbers integrated out, in place."""
+        return rows if self.marginal is None else self.marginal.rows(rows)
+
+
+class Free:
+    """Bookkeeping of the vector [z, effect parameters].
+
+    Args:
+        problem: the problem.
+        effects: names of effects whose parameters are free.
+        released: baseline coefficients whose prior is lifted.
+        held: effect parameter -> value, of those that are not free.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        effects: Iterable[str],
+        released: Iterable[str],
+        held: Mapping[str, float] | None = None,
+    ) -> None:
+        self.problem = problem
+        self.released = tuple(released)
+        self.held = dict(held or {})
+        self.freedoms = tuple(f for f in problem.freedoms(effects) if f.path not in self.held)
+        self.count = len(problem.baseline)
+        self.names = (*problem.baseline.paths, *(f.path for f in self.freedoms))
+        self.prior = prior_precision(problem.baseline, len(self.freedoms), released)
+        self.largest_steps = np.r_[np.full(self.count, Z_STEP), [f.step for f in self.freedoms]]
+        self.steps = self.largest_steps
+        self.nonsmooth = problem.refines_steps((*(f.path for f in self.freedoms), *self.held))
+
+    def pack(self, point: Point) -> FloatArray:
+        """The vector (n,) of a point."""
+        return np.asarray(np.r_[point.z, [point.effects[f.path] for f in self.freedoms]], float)
+
+    def unpack(self, vector: FloatArray) -> Point:
+        """The point of a vector (n,)."""
+        values = vector[self.count :].tolist()
+        paths = [f.path for f in self.freedoms]
+        own = {**dict(zip(paths, values, strict=True)), **self.held}
+        return Point(vector[: self.count].copy(), own)
+
+    def suit_steps(self, hessian: FloatArray) -> None:
+        """Take differences over one standard error: a longer secant is no slope.
+
+        Where the motion is not smooth the slope of a short step is noise, so those steps stay.
+
+        Args:
+            hessian: (n, n) information.
+        """
+        if self.nonsmooth:
+            return
+        told = 1.0 / np.sqrt(np.maximum(np.diag(hessian), 1e-300))
+        steps = np.clip(told, SHORTEST * self.largest_steps, self.largest_steps)
+        self.steps = np.r_[self.largest_steps[: self.count], steps[self.count :]]
+
+    @cached_property
+    def bounds(self) -> LinearBounds:
+        """Bounds of the vector: of coefficients in physical units, of effects' parameters."""
+        lower, upper = [f.lower for f in self.freedoms], [f.upper for f in self.freedoms]
+        return parameter_bounds(self.problem.baseline, lower, upper, self.released)
+
+    def effects_at_bounds(self, vector: FloatArray) -> list[str]:
+        """Effect parameters that ended at the edge of what they may be."""
+        values = zip(self.freedoms, vector[self.count :], strict=True)
+        return [f.path for f, value in values if value <= f.lower or value >= f.upper]
+
+    def lanes(self, vector: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Perturbed vectors (n, 1 + n), the centre first, and the signed steps (n,).
+
+        A lag that is off is switched on by as much as the simulation can follow: less would
+        diverge, and it would seem to do nothing.
+        """
+        steps = self.steps.copy()
+        for i, freedom in enumerate(self.freedoms, start=self.count):
+            if vector[i] < freedom.least:
+                steps[i] = max(steps[i], freedom.least - vector[i])
+            if vector[i] + steps[i] > freedom.upper:
+                steps[i] = -steps[i]
+        return np.column_stack([vector, vector[:, None] + np.diag(steps)]), steps
+
+    def scale(self) -> FloatArray:
+        """Physical units per unit of the vector, as a matrix (n, n)."""
+        matrix = np.eye(len(self.names))
+        matrix[: self.count, : self.count] = self.problem.baseline.factor
+        return matrix
+
+
+def residuals_at(
+    problem: Problem,
+    free: Free,
+    vectors: FloatArray,
+    noise: Any,
+    filtered: Sequence[Evaluation],
+) -> FloatArray:
+    """Whitened residuals (N, D) of vectors (n, N) with the gains of a filter that has run."""
+    effects = {f.path: vectors[free.count + i] for i, f in enumerate(free.freedoms)}
+    effects |= {path: np.full(vectors.shape[1], value) for path, value in free.held.items()}
+    return problem.innovations(vectors[: free.count], effects, noise, filtered)
+
+
+def linearise(
+    problem: Problem,
+    free: Free,
+    vector: FloatArray,
+    noise: Any,
+    filtered: Sequence[Evaluation],
+    marginal: Marginal | None = None,
+) -> Linearised:
+    """Residuals and slopes by one batch of points.
+
+    A parameter that cannot be moved without the simulation diverging gets no slope: it stays.
+
+    Args:
+        problem: the problem.
+        free: its free parameters.
+        vector: (n,) where to linearise.
+        noise: noise model.
+        filtered: evaluation whose weighting is held.
+        marginal: integrates out what the runs differ in.
+    """
+    lanes, steps = free.lanes(vector)
+    innovations = residuals_at(problem, free, lanes, noise, filtered)
+    rows = innovations[1:]
+    # In place: memory fresh from the system costs as much as the arithmetic.
+    rows -= innovations[0]
+    rows /= steps[:, None]
+    rows[~((rows.min(axis=1) > -LARGEST_SLOPE) & (rows.max(axis=1) < LARGEST_SLOPE))] = 0.0
+    residuals = innovations[0]
+    if marginal is not None:
+        residuals, rows = marginal.residuals(residuals), marginal.rows(rows)
+    return Linearised(residuals, rows.T, *problem.groups(), marginal)
+
+
+def spread_of(problem: Problem, noise: Any) -> FloatArray:
+    """Standard deviation (K,) over runs of what differs between them.
+
+    Args:
+        problem: a problem without variations need not have it in its noise models.
+        noise: noise model.
+    """
+    return np.asarray(noise.spread) if problem.variations else np.zeros(0)
+
+
+def marginal_of(
+    problem: Problem, point: Point, noise: Any, filtered: Sequence[Evaluation]
+) -> Marginal | None:
+    """How to integrate out what the runs differ in; None where they do not.
+
+    Args:
+        problem: the problem.
+        point: values of the shared parameters.
+        noise: noise model with the spreads.
+        filtered: evaluation at the point.
+    """
+    spreads = spread_of(problem, noise)
+    active = np.flatnonzero(spreads)
+    if not active.size:
+        return None
+    spread = spreads[active]
+    steps = DIFFERENCE * np.array([v.usual for v in problem.variations])
+    slopes = problem.variation_slopes(point, noise, filtered, steps)[:, active] * spread
+    return Marginal(slopes, problem.variation[:, active] / spread, problem.groups()[0])
+
+
+def predicted_variation(
+    problem: Problem, point: Point, noise: Any
+) -> tuple[Problem, Marginal | None]:
+    """The problem at the best prediction of what its runs differ in, and how to integrate it out.
+
+    Args:
+        problem: the problem, at an earlier prediction.
+        point: values of the shared parameters.
+        noise: noise model with the spreads.
+    """
+    spreads = spread_of(problem, noise)
+    if not spreads.any():
+        return problem, None
+    active = np.flatnonzero(spreads)
+    filtered = problem.filtered(point, noise)
+    marginal = marginal_of(problem, point, noise, filtered)
+    assert marginal is not None
+    values = problem.variation.copy()
+    residuals = np.concatenate([f.residuals for f in filtered])
+    values[:, active] = marginal.predicted(residuals) * spreads[active]
+    problem = problem.with_variation(values)
+    return problem, replace(marginal, at=values[:, active] / spreads[active])
+
+
+def evaluated(problem: P, point: Point, noise: Any) -> tuple[P, Sequence[Any]]:
+    """Every run with what is unknown of it where it suits these parameters best, and evaluated.
+
+    Runs that were not fitted, or were fitted with other parameters, have another start or none.
+
+    Args:
+        problem: the runs.
+        point: values of the shared parameters.
+        noise: noise model.
+    """
+    settled, _ = predicted_variation(problem.settled(point, noise), point, noise)
+    return cast(P, settled), settled.filtered(point, noise)
+
+
+def objective(
+    problem: Problem,
+    free: Free,
+    vector: FloatArray,
+    noise: Any,
+    marginal: Marginal | None = None,
+    near: Sequence[Evaluation] = (),
+) -> tuple[float, Sequence[Evaluation]]:
+    """-2 log likelihood + prior, and the evaluation it comes from.
+
+    Infinite, and nothing evaluated, where no vehicle can have the coefficients.
+
+    Args:
+        problem: the problem.
+        free: its free parameters.
+        vector: (n,) where to evaluate.
+        noise: noise model.
+        marginal: integrates out what the runs differ in.
+        near: evaluation at a vector close by, where there is one.
+    """
+    if not problem.baseline.possible(vector[: free.count]):
+        return np.inf, []
+    results = problem.filtered(free.unpack(vector), noise, near)
+    value = -2.0 * sum(r.log_likelihood for r in results) + free.prior @ (vector * vector)
+    if marginal is not None:
+        residuals = np.concatenate([r.residuals for r in results])
+        whitened = marginal.residuals(residuals)
+        value += whitened @ whitened - residuals @ residuals + marginal.log_det
+    return float(value), results
+
+
+def objectives_with_gains(
+    problem: Problem,
+    free: Free,
+    vectors: Sequence[FloatArray],
+    noise: Any,
+    filtered: Sequence[Evaluation],
+    marginal: Marginal | None = None,
+) -> list[float]:
+    """-2 log likelihood + prior with the gains of a filter that has run, but for a constant.
+
+    The constant is that of the gains: models can be compared under the same ones. All vectors
+    together take no longer than one filter. Infinite where no vehicle can have the coefficients, or
+    the simulation diverges.
+    """
+    lanes = np.column_stack(vectors)
+    rows = residuals_at(problem, free, lanes, noise, filtered)
+    if marginal is not None:
+        rows = np.array([marginal.residuals(row) for row in rows])
+    able = problem.baseline.all_possible(lanes[: free.count])
+    cases = zip(vectors, rows, able.tolist(), strict=True)
+    return [_objective(free, vector, residuals, can) for vector, residuals, can in cases]
+
+
+def objective_of(problem: Problem, free: Free, vector: FloatArray, residuals: FloatArray) -> float:
+    """The same of a vector whose whitened residuals (D,) are known."""
+    return _objective(free, vector, residuals, problem.baseline.possible(vector[: free.count]))
+
+
+def _objective(free: Free, vector: FloatArray, residuals: FloatArray, possible: bool) -> float:
+    value = float(residuals @ residuals + free.prior @ (vector * vector))
+    return value if possible and np.isfinite(value) else np.inf

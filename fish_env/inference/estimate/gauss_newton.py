@@ -1,0 +1,99 @@
+"""Gauss-Newton within bounds: whole steps, then less of them, until none predicts a decrease."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TypeVar
+
+import numpy as np
+
+from fish_env.arrays import FloatArray
+from fish_env.inference.estimate.bounds import LinearBounds
+
+T = TypeVar("T")
+SHARES = (1.0, 0.5, 0.2)
+DAMPINGS = (0.1, 10.0)
+NEAR, SLIGHT = 1.0, 0.1
+"""If the decrease predicted is below the first (in -2 log likelihood), a shortened step that gains
+less than the second follows the objective's roughness."""
+
+
+def descend(
+    start: FloatArray,
+    evaluate: Callable[[FloatArray], tuple[float, T]],
+    linearise: Callable[[FloatArray, T], tuple[FloatArray, FloatArray]],
+    bounds: LinearBounds,
+    iterations: int,
+    tolerance: float,
+    give_up_above: float = np.inf,
+) -> tuple[FloatArray, float, T]:
+    """Minimise a sum of squares, or what is nearly one.
+
+    Args:
+        start: (n,) where to begin.
+        evaluate: the objective at a vector, and what else was computed there.
+        linearise: half of the objective's Hessian (n, n), positive definite, and half of its
+            gradient (n,) at a vector.
+        bounds: where the vector may go.
+        iterations: most steps.
+        tolerance: stop when no combination of parameters would move by more of its standard
+            deviation, the objective being -2 log likelihood.
+        give_up_above: stop when the objective would stay above this if every step that is left
+            gained the decrease predicted for the next one.
+
+    Returns:
+        The vector reached, the objective there, and what else was computed.
+
+    Raises:
+        LinAlgError: the objective is not finite at the start.
+    """
+    vector = start
+    value, known = evaluate(vector)
+    if not np.isfinite(value):
+        raise np.linalg.LinAlgError("the simulation diverges at the start of the fit")
+    for left in range(iterations, 0, -1):
+        hessian, gradient = linearise(vector, known)
+        whole = bounds.step(hessian, gradient, vector)
+        predicted = predicted_decrease(hessian, gradient, whole)
+        if predicted < tolerance**2 or value - left * predicted > give_up_above:
+            break
+        before, tried = value, 0
+        for trial in _trials(hessian, gradient, vector, whole, bounds):
+            tried += 1
+            trial_value, trial_known = evaluate(trial)
+            if trial_value < value:
+                vector, value, known = trial, trial_value, trial_known
+                break
+        rough = tried > 1 and predicted < NEAR and before - value < SLIGHT
+        if rough or value == before:
+            break
+    return vector, value, known
+
+
+def predicted_decrease(hessian: FloatArray, gradient: FloatArray, step: FloatArray) -> float:
+    """By how much the quadratic model falls with a step.
+
+    It bounds the square of how far any combination of the parameters moves, in its own standard
+    deviations. The parameters one by one would not do: where two act alike both may go far for
+    nothing.
+    """
+    return float(-2.0 * gradient @ step - step @ hessian @ step)
+
+
+def _trials(
+    hessian: FloatArray,
+    gradient: FloatArray,
+    vector: FloatArray,
+    whole: FloatArray,
+    bounds: LinearBounds,
+) -> Iterator[FloatArray]:
+    """Where to look for a lower objective: a whole step further, then less far.
+
+    Shorter steps come before damped ones: damping would hold back directions that only the prior
+    decides, such as the difference of two coefficients that act alike.
+    """
+    for share in SHARES:
+        yield bounds.clip(vector + share * whole)
+    for damping in DAMPINGS:
+        damped = hessian + damping * np.diag(np.diag(hessian))
+        yield bounds.clip(vector + bounds.step(damped, gradient, vector))

@@ -1,0 +1,31 @@
+"""Matrix products over many residuals, in blocks.
+
+A product of tall matrices is short work, but a BLAS that shares it among threads makes them wait
+for each other on a busy machine, and its last bits then depend on their number. Blocks are small
+enough for one thread and always summed in the same order.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fish_env.arrays import FloatArray
+
+BLOCK = 64
+AT_ONCE = 1_000_000
+"""Numbers of the blocks' products held at a time."""
+
+
+def inner(a: FloatArray, b: FloatArray) -> FloatArray:
+    """``a.T @ b`` of tall matrices (D, n) and (D, m)."""
+    count = len(a) // BLOCK
+    whole = count * BLOCK
+    rows_a = a[:whole].T.reshape(a.shape[1], count, BLOCK).transpose(1, 0, 2)
+    rows_b = b[:whole].T.reshape(b.shape[1], count, BLOCK).transpose(1, 2, 0)
+    total: FloatArray = np.zeros((a.shape[1], b.shape[1]))
+    step = max(1, AT_ONCE // max(1, total.size))
+    for first in range(0, count, step):
+        products = rows_a[first : first + step] @ rows_b[first : first + step]
+        products[0] += total  # so that the order of the sum does not depend on the step
+        total = products.sum(axis=0)
+    return np.asarray(total + a[whole:].T @ b[whole:])

@@ -1,0 +1,88 @@
+"""A fit with some causes in it, and what speaks for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+
+from fish_env.arrays import FloatArray
+from fish_env.inference.estimate.fit import Fit, fit
+from fish_env.inference.estimate.information import information, prior_precision
+from fish_env.inference.policy import POLICY
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """A fit with some causes in it.
+
+    Attributes:
+        causes: names, in the order they were added.
+        fit: the fit.
+    """
+
+    causes: tuple[str, ...]
+    fit: Fit
+
+    @cached_property
+    def with_relaxed_noise(self) -> Fit | None:
+        """The fit on a few runs under relaxed noise: a periodic drive's phase is a random walk.
+
+        A drive a little quicker or slower than commanded is soon out of step, and every slope along
+        the simulation is then wrong. With a random-walk phase the filter follows the drive, and
+        what changes its frequency shows. What only shifts the phase, as a delay does, is hidden
+        instead. None where the problem has no such noise, or the simulation diverges.
+        """
+        own = self.fit
+        noise = own.problem.relaxed_noise(own.noise)
+        if noise is None:
+            return None
+        few = own.problem.subset(3)
+        return reached(lambda: fit(few, own.effects, own.point, noise, own.released, rounds=2))
+
+    def extrapolated(self) -> Explanation:
+        """The same causes, with estimates as ever finer steps put them."""
+        return Explanation(self.causes, self.fit.extrapolated)
+
+    @cached_property
+    def score(self) -> float:
+        """-2 log evidence (Laplace's approximation), but for a constant of the problem.
+
+        The misfit and the prior at the best fit, and what it costs that the data narrowed each
+        parameter so far from what was known: an effect may be anywhere in its plausible range, a
+        coefficient whose prior is lifted within ``prior_reach_sd`` deviations. Source: Kass and
+        Raftery (1995), "Bayes factors", JASA 90, eq. 3; differences of 6 they call strong.
+        """
+        own, known = self.fit, known_before(self)
+        lifted = [own.problem.baseline.paths.index(path) for path in own.released]
+        narrowed = np.linalg.slogdet(information(own.linearised.slopes, known))[1]
+        penalty = known[lifted] @ own.point.z[lifted] ** 2
+        return float(own.objective + penalty + narrowed - np.log(known).sum())
+
+
+def known_before(explanation: Explanation) -> FloatArray:
+    """Precision of what was known of each free parameter before the data (n,).
+
+    Any plausible value of an effect's parameter is as likely; a coefficient whose prior is lifted
+    may lie ``prior_reach_sd`` times as far from its nominal value as one whose prior is not.
+    """
+    own = explanation.fit
+    problem = own.problem
+    ranges = [p.plausible for name in own.effects for p in problem.known[name].parameters]
+    known = prior_precision(problem.baseline, len(ranges), ())
+    known[[problem.baseline.paths.index(path) for path in own.released]] = POLICY.prior_reach_sd**-2
+    known[len(problem.baseline) :] = [12.0 / (high - low) ** 2 for low, high in ranges]
+    return known
+
+
+def reached(make: Callable[[], T]) -> T | None:
+    """A fit; None where the simulation diverges before it can begin."""
+    try:
+        return make()
+    except np.linalg.LinAlgError:
+        return None

@@ -1,0 +1,247 @@
+"""The whole inference in its order: from measured runs of any vehicle to a verdict.
+
+The problem hands out residuals, see :class:`~fish_env.inference.problem.Problem`. Nothing here
+knows what moves, or what was measured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from fish_env.inference.adequacy import (
+    Adequacy,
+    adequacy,
+    disturbance_at_limit,
+    implausible_estimates,
+)
+from fish_env.inference.attribution import Attribution, attribute, extended
+from fish_env.inference.budget import Budget, error_budget
+from fish_env.inference.effort import FULL, Effort
+from fish_env.inference.estimate.fit import Fit, finished, fit, with_run_variation
+from fish_env.inference.gain import gap_closed
+from fish_env.inference.parallel import both
+from fish_env.inference.partial import Describe, confirmed
+from fish_env.inference.policy import POLICY
+from fish_env.inference.preconditions import preconditions
+from fish_env.inference.probes import Cause, causes_of
+from fish_env.inference.problem import Problem
+from fish_env.inference.result import ResidualModel, Result
+from fish_env.inference.verdict import EXTENDING, Verdict, decide
+
+Report = Callable[[str], None]
+
+
+def infer(
+    problem: Problem,
+    held_out: Problem | None = None,
+    seed: int = 0,
+    effort: Effort = FULL,
+    report: Report = lambda step: None,
+    describe: Describe | None = None,
+) -> Result:
+    """Find what a model lacks that should explain measured runs.
+
+    Args:
+        problem: the runs to fit, and the model.
+        held_out: the same model on runs kept for judging; None without such runs.
+        seed: of the null distributions and intervals.
+        effort: how much to spend.
+        report: told the name of each step.
+        describe: models what no known cause explains; without it nothing is said of that.
+
+    Raises:
+        LinAlgError: the simulation diverges with the nominal coefficients.
+    """
+    report("refitting the baseline")
+    baseline = refit_baseline(problem)
+    causes = causes_of(baseline.problem)
+    rng = np.random.default_rng(seed)
+    return investigate(baseline, causes, rng, effort, report, held_out, describe)
+
+
+def refit_baseline(problem: Problem) -> Fit:
+    """The refitted baseline.
+
+    It is iterated to convergence unless its disturbance is at the limit: the misfit that causes
+    this is what comes next.
+
+    Raises:
+        LinAlgError: the simulation diverges with the nominal coefficients.
+    """
+    own = with_run_variation(fit(problem, rounds=2, iterations=3))
+    return own if disturbance_at_limit(own) else finished(own)
+
+
+def investigate(
+    baseline: Fit,
+    causes: Sequence[Cause],
+    rng: np.random.Generator,
+    effort: Effort = FULL,
+    report: Report = lambda step: None,
+    held_out: Problem | None = None,
+    describe: Describe | None = None,
+) -> Result:
+    """Everything after the refitted baseline.
+
+    Args:
+        baseline: refitted baseline, with the runs it was fitted to.
+        causes: causes to consider.
+        rng: for null distributions and intervals.
+        effort: how much to spend.
+        report: told the name of each step.
+        held_out: the same model on runs kept for judging; None without such runs.
+        describe: models what no known cause explains; without it nothing is said of that.
+    """
+    problem = baseline.problem
+    report("screening causes")
+    attribution = attribute(problem, baseline, causes, rng, effort, report)
+    report("what the runs could show")
+    report("testing what is left")
+    where = baseline if effort.retries else None
+    left, shown = both(
+        partial(adequacy, attribution.accepted.fit, rng, attribution.tolerated),
+        partial(preconditions, problem, attribution.screens[0], causes, where),
+    )
+    if effort.retries and left.slight and describe:
+        left = cross_validated(attribution, left, describe, report)
+    if effort.retries and not left.reached:
+        attribution, left = with_weaker_causes(attribution, left, causes, rng, report)
+    verdict = decide(attribution, left, shown)
+    partly_known = verdict.name == "outside_library" and bool(attribution.accepted.causes)
+    if effort.retries and partly_known and describe:
+        report("testing which causes act beside what is unknown")
+        attribution, verdict = partly(attribution, left, verdict, describe)
+    attribution = attribution.extrapolated()
+    gap = None
+    if verdict.name in EXTENDING and held_out is not None:
+        report("measuring the gain on final runs")
+        gap = gap_closed(held_out, baseline, attribution.accepted.fit, rng)
+    residual = None
+    if effort.retries and not left.reached and describe:
+        report("describing what is left")
+        residual = described(attribution, left, describe, held_out)
+    report("sharing the misfit among its causes")
+    budget = budget_of(attribution, verdict, left, held_out, rng)
+    return Result(attribution, left, shown, verdict, gap, residual, budget)
+
+
+def partly(
+    attribution: Attribution, left: Adequacy, verdict: Verdict, describe: Describe
+) -> tuple[Attribution, Verdict]:
+    """The verdict ``partial`` where known causes act beside something unknown.
+
+    Args:
+        attribution: what was found.
+        left: adequacy of the accepted explanation, which is not adequate.
+        verdict: the verdict without such causes.
+        describe: models what a fit leaves.
+    """
+    found = confirmed(attribution.accepted, left.threshold, describe)
+    if found is None:
+        return attribution, verdict
+    rivals = tuple(e for e in attribution.rivals if len(e.causes) == len(found.causes))
+    return replace(attribution, accepted=found, rivals=rivals), Verdict("partial", found.causes)
+
+
+def budget_of(
+    attribution: Attribution,
+    verdict: Verdict,
+    left: Adequacy,
+    held_out: Problem | None,
+    rng: np.random.Generator,
+) -> Budget | None:
+    """Where the misfit of the nominal model goes, on held-out runs where there are some.
+
+    Args:
+        attribution: what was found.
+        verdict: only causes that it names have a share of their own.
+        left: adequacy of the accepted explanation.
+        held_out: runs that chose nothing; None without such runs.
+        rng: for intervals over runs.
+    """
+    named = verdict.name in EXTENDING
+    fit = attribution.accepted.fit if named else attribution.baseline.fit
+    problem = fit.problem if held_out is None else held_out
+    causes = attribution.accepted.causes if named else ()
+    held = held_out is not None
+    return error_budget(problem, fit, causes, problem.run_ids, held, left.reached, rng)
+
+
+def described(
+    attribution: Attribution, left: Adequacy, describe: Describe, held_out: Problem | None
+) -> ResidualModel | None:
+    """A model of what the accepted explanation leaves.
+
+    Beside implausible estimates it would be biased: then it is one of what the baseline leaves.
+
+    Args:
+        attribution: what was found.
+        left: adequacy of the accepted explanation.
+        describe: makes the model.
+        held_out: runs that chose nothing, to judge the model on; None without such runs.
+    """
+    accepted = attribution.extrapolated().accepted.fit
+    basis = attribution.baseline.fit if implausible_estimates(accepted) else accepted
+    return describe(basis, left.threshold, held_out)
+
+
+def cross_validated(
+    attribution: Attribution, left: Adequacy, describe: Describe, report: Report
+) -> Adequacy:
+    """The adequacy after the residual's model was tested on runs that did not choose it.
+
+    Each half of the fitted runs is predicted by the model that the other half asks for. Beside
+    causes it stays as it is: the residual may be the only sign of a wrong cause.
+
+    Args:
+        attribution: what was found.
+        left: adequacy of the accepted explanation.
+        describe: models what it leaves.
+        report: told what is being done.
+    """
+    own = attribution.accepted.fit
+    count = own.problem.run_count
+    if attribution.accepted.causes or count < 2:
+        return left
+    report("predicting one half of the runs by the other")
+    halves = [list(range(first, count, 2)) for first in (0, 1)]
+    gain, tested = 0.0, False
+    for mine, other in (halves, halves[::-1]):
+        half = own.problem.some(mine)
+        try:
+            noise = half.noise_of(own)
+            fitted = fit(half, own.effects, own.point, noise, own.released, refit_noise=False)
+        except np.linalg.LinAlgError:
+            return left
+        model = describe(fitted, left.threshold, own.problem.some(other))
+        if model is not None and model.held_out_gain is not None:
+            gain, tested = gain + model.held_out_gain, True
+    return left.judged(gain) if tested else left
+
+
+def with_weaker_causes(
+    attribution: Attribution,
+    left: Adequacy,
+    causes: Sequence[Cause],
+    rng: np.random.Generator,
+    report: Report,
+) -> tuple[Attribution, Adequacy]:
+    """One more search where something is known to be missing; kept if nothing then is.
+
+    Args:
+        attribution: what was found.
+        left: adequacy of the accepted explanation.
+        causes: causes to consider.
+        rng: for null distributions.
+        report: told what is being done.
+    """
+    more = extended(attribution, causes, rng, FULL, report, POLICY.relaxed_log_p)
+    if more.accepted.causes == attribution.accepted.causes:
+        return attribution, left
+    report("testing what is left")
+    after = adequacy(more.accepted.fit, rng, more.tolerated)
+    return (more, after) if after.reached else (attribution, left)

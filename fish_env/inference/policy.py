@@ -1,0 +1,119 @@
+"""Every number that decides an inference, once, with where it comes from.
+
+A number has a source, or was calibrated by a script of the project, or was set by hand, and says
+which. ``docs/policy.md`` is made from this file, and every ``diagnosis.json`` holds the values that
+it was made with.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields
+from typing import Any
+
+import numpy as np
+
+BY_HAND = "set by hand, not calibrated"
+EFFORT = "limits effort; " + BY_HAND
+
+
+def _number(value: float, low: float, high: float, source: str) -> Any:
+    return field(default=value, metadata={"low": low, "high": high, "source": source})
+
+
+@dataclass(frozen=True)
+class DecisionPolicy:
+    """Thresholds of screening, search, adequacy, estimates and intervals.
+
+    Attributes:
+        screen_level: share of data sets without a cause in which any passes the screen.
+        null_draws: draws of the smallest p-value's distribution.
+        power: of the smallest detectable sizes.
+        evidence_doubt: difference of -2 log evidence that decides nothing.
+        most_causes: causes that an explanation may have.
+        thorough_causes: causes that are looked for with all effort.
+        worth_coarse_fit: statistic above which an effect is tried under relaxed noise.
+        most_relaxed: effects tried under relaxed noise.
+        coarse_fit_behind: share of the leader's gain that a finalist may lack.
+        coarse_fit_leeway: difference of coarse fits in -2 log likelihood that excludes nobody.
+        out_of_reach: distance to the leader beyond which a fit is given up.
+        aic_penalty: what a coarse fit gains by a parameter without effect.
+        relaxed_log_p: added to the log p-value of a cause where the adequacy test fails.
+        adequacy_level: share of adequate explanations that the adequacy test rejects.
+        adequacy_certain: multiple of its log p-value that chance does not reach.
+        prior_reach_sd: prior standard deviations that a coefficient may move.
+        extreme_prior_sd: prior standard deviations that are implausible beside an effect.
+        implausible_prior_sd: prior standard deviations, or plausible sizes, that are implausible.
+        far_start_sd: prior standard deviations beyond which nominal coefficients are a start too.
+        score_block_s: length of blocks over which scores are summed (s).
+        long_score_block_s: of the longer blocks (s).
+        converged: predicted decrease of -2 log likelihood at which a fit has converged.
+        same_noise: relative change of a noise model that ends the alternation with it.
+        run_variation_gain: of -2 log likelihood by a spread over runs that is allowed for.
+        fewest_runs_for_spread: runs that a spread over runs needs.
+        fewest_runs_for_interval: runs that an interval over runs needs.
+        beyond_usual: spread over runs, in usual ones, that is a finding.
+        visible_misfit: misfit over noise below which there is nothing to share.
+        smallest_gap: gap of the baseline to the floor below which no share of it is quoted.
+        least_share: share of the gap below which a named answer is called doubtful.
+        prediction_window_s: length of predictions without feedback (s).
+    """
+
+    screen_level: float = _number(0.05, 1e-4, 0.5, "convention (Fisher, 1925)")
+    null_draws: int = _number(
+        4000, 500, 100_000, "the 5 % quantile of 4000 draws is known to 0.3 points"
+    )
+    power: float = _number(0.8, 0.5, 0.99, "convention (Cohen, 1988)")
+    evidence_doubt: float = _number(
+        6.0, 0.0, 20.0, "strong evidence: Kass and Raftery (1995), JASA 90, section 3.2"
+    )
+    most_causes: int = _number(8, 1, 20, "specification of real robots: up to eight")
+    thorough_causes: int = _number(3, 1, 20, EFFORT)
+    worth_coarse_fit: float = _number(20.0, 0.0, 100.0, EFFORT)
+    most_relaxed: int = _number(4, 0, 40, EFFORT)
+    coarse_fit_behind: float = _number(0.25, 0.0, 1.0, EFFORT)
+    coarse_fit_leeway: float = _number(100.0, 0.0, 1e4, EFFORT)
+    out_of_reach: float = _number(1000.0, 0.0, 1e5, EFFORT)
+    aic_penalty: float = _number(2.0, 0.0, 10.0, "Akaike (1974), IEEE TAC 19")
+    relaxed_log_p: float = _number(float(np.log(10.0)), 0.0, 10.0, BY_HAND)
+    adequacy_level: float = _number(0.003, 1e-4, 0.1, "scripts/calibrate_adequacy.py")
+    adequacy_certain: float = _number(2.0, 1.0, 10.0, "scripts/calibrate_adequacy.py: 1.0 at most")
+    prior_reach_sd: float = _number(5.0, 3.0, 12.0, BY_HAND)
+    extreme_prior_sd: float = _number(4.9, 3.0, 12.0, "one coefficient in a million passes it")
+    implausible_prior_sd: float = _number(10.0, 5.0, 50.0, BY_HAND)
+    far_start_sd: float = _number(2.0, 0.5, 5.0, EFFORT)
+    score_block_s: float = _number(3.0, 0.5, 30.0, BY_HAND)
+    long_score_block_s: float = _number(9.0, 1.0, 60.0, BY_HAND)
+    converged: float = _number(0.25, 1e-4, 1.0, "no estimate moves by half its standard error")
+    same_noise: float = _number(0.1, 0.01, 0.5, BY_HAND)
+    run_variation_gain: float = _number(
+        6.0, 0.0, 30.0, "strong evidence: Kass and Raftery (1995), JASA 90, section 3.2"
+    )
+    fewest_runs_for_spread: int = _number(3, 2, 10, "two degrees of freedom")
+    fewest_runs_for_interval: int = _number(3, 2, 10, "two degrees of freedom")
+    beyond_usual: float = _number(3.0, 1.0, 10.0, BY_HAND)
+    visible_misfit: float = _number(0.01, 0.0, 1.0, BY_HAND)
+    smallest_gap: float = _number(0.01, 0.0, 1.0, BY_HAND)
+    least_share: float = _number(0.1, 0.0, 0.5, "specification of real robots: a tenth of the gap")
+    prediction_window_s: float = _number(3.0, 0.5, 60.0, BY_HAND)
+
+    def __post_init__(self) -> None:
+        """Refuse values out of range.
+
+        Raises:
+            ValueError: names the number and its range.
+        """
+        for item in fields(self):
+            value, low, high = getattr(self, item.name), item.metadata["low"], item.metadata["high"]
+            if not low <= value <= high:
+                raise ValueError(f"policy {item.name}: choose a value from {low} to {high}")
+
+    def as_dict(self) -> dict[str, float]:
+        """Name -> value, as written into ``diagnosis.json``."""
+        return {item.name: getattr(self, item.name) for item in fields(self)}
+
+    def table(self) -> list[tuple[str, float, str]]:
+        """Name, value and source of each number, for the documentation."""
+        return [(i.name, getattr(self, i.name), i.metadata["source"]) for i in fields(self)]
+
+
+POLICY = DecisionPolicy()

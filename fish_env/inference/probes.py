@@ -1,0 +1,377 @@
+"""Causes a diagnosis may name: effects of the catalogue, and baseline coefficients set free."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import Protocol, TypeVar
+
+import numpy as np
+
+from fish_env.arrays import FloatArray
+from fish_env.inference.effects import EffectParameter
+from fish_env.inference.hypotheses import PARAMETER, PREFIX
+from fish_env.inference.problem import Problem
+from fish_env.inference.vehicle import Effect
+
+Probe = Mapping[str, float]
+MOST_FREQUENCIES = 96
+QUARTER = (0.0, np.pi / 2)
+MANY = 4
+"""Settings that are also tested one by one."""
+MOST_GRID_SIZES = 96
+"""Of a starting grid."""
+SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Sizes tried between small and large."""
+
+
+@dataclass(frozen=True)
+class Cause:
+    """Something that may be wrong with the simulation.
+
+    Attributes:
+        name: effect name, or ``parameter:<path>``.
+        probes: alternatives; each is a set of small settings whose signals span what the cause
+            can do at that alternative (for a wave: sine and cosine at one frequency).
+        path: baseline coefficient, for a parameter.
+    """
+
+    name: str
+    probes: tuple[tuple[Probe, ...], ...] = ()
+    path: str | None = None
+
+    @property
+    def is_effect(self) -> bool:
+        """Whether it is an effect (else a baseline coefficient)."""
+        return self.path is None
+
+
+class Knowing(Protocol):
+    """A problem that knows effects by name."""
+
+    @property
+    def known(self) -> Mapping[str, Effect]:
+        """Effects by name."""
+        ...
+
+
+class Likening(Knowing, Protocol):
+    """A problem that also knows which coefficients act alike."""
+
+    @property
+    def interchangeable(self) -> tuple[frozenset[str], ...]:
+        """Sets of coefficients that act alike."""
+        ...
+
+
+class Tested(Protocol):
+    """A test of a cause."""
+
+    @property
+    def cause(self) -> Cause:
+        """What was tested."""
+        ...
+
+
+T = TypeVar("T", bound=Tested)
+S = TypeVar("S")
+
+
+def coefficient_sizes(tests: Iterable[T], smallest: Callable[[T], float]) -> dict[str, float]:
+    """How far off each coefficient is found with power 0.8, in prior standard deviations.
+
+    One that the data know little of would have to be further off than any prior allows.
+    """
+    return {test.cause.path: smallest(test) for test in tests if test.cause.path is not None}
+
+
+def best_of_each(tests: Iterable[T], log_p: Callable[[T], float]) -> list[T]:
+    """The most significant test of each cause, the most significant cause first."""
+    chosen: dict[str, T] = {}
+    for test in sorted(tests, key=log_p):
+        chosen.setdefault(test.cause.name, test)
+    return list(chosen.values())
+
+
+def of_visible(
+    test: Callable[[Cause, int, FloatArray], S | None],
+    cause: Cause,
+    probe: int,
+    columns: FloatArray,
+) -> S | None:
+    """The test of those settings of an alternative that change something in what is measured.
+
+    For an alternative whose whole test finds nothing: None where no setting shows, or where each
+    shows and only all at once leave nothing. A camera overhead sees the yaw of a sensor that
+    is mounted askew, and nothing of its roll and pitch.
+
+    Args:
+        test: of a cause at an alternative by what its settings change; None where one of them
+            leaves nothing.
+        cause: the cause.
+        probe: index of the alternative.
+        columns: (D, m) what its m settings change.
+    """
+    settings = range(columns.shape[1])
+    if len(settings) == 1:
+        return None
+    live = [i for i in settings if test(cause, probe, columns[:, [i]]) is not None]
+    if not live or len(live) == len(settings):
+        return None
+    probes = list(cause.probes)
+    probes[probe] = tuple(cause.probes[probe][i] for i in live)
+    return test(replace(cause, probes=tuple(probes)), probe, columns[:, live])
+
+
+def causes_of(problem: Problem) -> tuple[Cause, ...]:
+    """Every cause that can be considered for a problem."""
+    step = problem.longest_step
+    length = problem.longest_run
+    effects = [
+        Cause(effect.name, each_alone(probes_of(effect, step, length)))
+        for effect in problem.known.values()
+    ]
+    coefficients = [Cause(f"{PARAMETER}{p}", path=p) for p in problem.baseline.paths]
+    return (*effects, *coefficients)
+
+
+def probes_of(
+    effect: Effect, step: float = 0.0, length: float = 0.0
+) -> tuple[tuple[Probe, ...], ...]:
+    """Small and large settings that show what an effect does.
+
+    Parameters that switch the effect on are probed one at a time; those that only shape it (a
+    depth, an anchor) take a few values of their plausible range. An oscillation is probed as its
+    sine and its cosine together, at frequencies close enough to each other that none is missed.
+
+    Args:
+        effect: the effect.
+        step: longest RK4 step (s); settings that are too quick for it are moved towards the large
+            ones until they are not.
+        length: of the longest run (s).
+    """
+    if phase_of(effect):
+        return _oscillations(effect, length)
+    switches = effect.switching
+    shapes = [p for p in effect.parameters if p.shapes]
+    alternatives: list[tuple[Probe, ...]] = []
+    for values in product(*(_shape_values(s) for s in shapes)):
+        setting = dict(zip([s.name for s in shapes], values, strict=True))
+        for shares in (SHARES, SHARES[-1:]):
+            candidates = [_alternative(effect, switches, setting, share) for share in shares]
+            slow = [c for c in candidates if all(effect.is_followed(p, step) for p in c)]
+            if slow and slow[0] not in alternatives:
+                alternatives.append(slow[0])
+    if effect.drifts_in_phase:
+        alternatives.insert(0, tuple(_milder(effect, probe) for probe in alternatives[0]))
+    return tuple(alternatives)
+
+
+def each_alone(probes: tuple[tuple[Probe, ...], ...]) -> tuple[tuple[Probe, ...], ...]:
+    """The alternatives and, where many settings are tested together, each by itself as well.
+
+    With every setting that is tested too, one of them has to be larger to be found: six together
+    ask for a quarter more of each than one alone.
+    """
+    mildest = probes[0] if probes else ()
+    return (*probes, *((probe,) for probe in mildest)) if len(mildest) >= MANY else probes
+
+
+def _milder(effect: Effect, probe: Probe) -> Probe:
+    """A third of the setting: with more of it the drive is out of step before a run ends."""
+    third = {p.name: p.neutral + (probe[p.name] - p.neutral) / 3.0 for p in effect.switching}
+    return {**probe, **third}
+
+
+def phase_of(effect: Effect) -> str | None:
+    """The phase (rad) of an effect that oscillates with one amplitude; None of any other."""
+    phases = [p.name for p in effect.parameters if p.shapes and _turns(p)]
+    switches = effect.switching
+    return phases[0] if len(phases) == 1 and len(switches) == 1 else None
+
+
+def _turns(parameter: EffectParameter) -> bool:
+    low, high = parameter.plausible
+    return parameter.unit == "rad" and high - low > 6.0
+
+
+def _oscillations(effect: Effect, length: float) -> tuple[tuple[Probe, ...], ...]:
+    """Sine and cosine at every frequency that runs of a length (s) can tell from its neighbours."""
+    phase = phase_of(effect)
+    (size,) = effect.switching
+    shapes = [p for p in effect.parameters if p.shapes and p.name != phase]
+    values = [_frequencies(s, length) if s.unit == "Hz" else _middle(s) for s in shapes]
+    return tuple(
+        tuple(
+            dict(zip((s.name for s in shapes), chosen, strict=True))
+            | {str(phase): turn, size.name: _small(size)}
+            for turn in QUARTER
+        )
+        for chosen in product(*values)
+    )
+
+
+def _frequencies(parameter: EffectParameter, length: float) -> tuple[float, ...]:
+    """Two thirds of a cycle in a run apart, but no more than :data:`MOST_FREQUENCIES`."""
+    low, high = parameter.plausible
+    count = int(np.clip(1.5 * (high - low) * length, 3, MOST_FREQUENCIES))
+    return tuple(np.linspace(low, high, count).tolist())
+
+
+def _middle(parameter: EffectParameter) -> tuple[float, ...]:
+    low, high = parameter.plausible
+    return (float(np.sqrt(low * high)) if low > 0.0 else 0.5 * (low + high),)
+
+
+def combined(
+    effect: Effect, settings: Sequence[Probe], size: Sequence[float], start: Probe
+) -> Probe:
+    """Parameters that do what so many times each setting does, where effects add.
+
+    Args:
+        effect: the effect.
+        settings: one alternative of :func:`probes_of`.
+        size: multiple of each setting.
+        start: values that the settings depart from.
+    """
+    phase = phase_of(effect)
+    if phase:
+        (amplitude,) = (p.name for p in effect.switching)
+        # One of sine and cosine may be left out: a planar record may hold nothing of it.
+        pairs = zip(size, settings, strict=True)
+        whole = sum(n * setting[amplitude] * np.exp(1j * setting[phase]) for n, setting in pairs)
+        return {**settings[0], amplitude: float(np.abs(whole)), phase: float(np.angle(whole))}
+    values = {**start, **{p.name: settings[0][p.name] for p in effect.parameters if p.shapes}}
+    for factor, setting in zip(size, settings, strict=True):
+        for name in (p.name for p in effect.switching):
+            endless = np.isinf(start[name])
+            values[name] = (
+                setting[name] if endless else values[name] + factor * (setting[name] - start[name])
+            )
+    return values
+
+
+def mirrored(effect: Effect, probe: Probe) -> Probe:
+    """The setting as far on the other side of neutral, within what physics allows."""
+    other = dict(probe)
+    for p in effect.switching:
+        if np.isfinite(p.neutral):
+            other[p.name] = float(np.clip(2.0 * p.neutral - probe[p.name], p.lower, p.upper))
+    return other
+
+
+def phase_grid(effect: Effect, cycles: float) -> tuple[Probe, ...]:
+    """Starting grid of an effect that drifts in phase, on both sides of neutral; else empty.
+
+    The spacing leaves the drive at most a small part of a cycle out of step at one of the sizes:
+    from further away no slope leads to the right one.
+
+    Args:
+        effect: the effect.
+        cycles: of the drive, in the run that has most.
+    """
+    if not effect.drifts_in_phase or len(effect.switching) != 1:
+        return ()
+    (size,) = effect.switching
+    reach = max(abs(end - size.neutral) for end in size.plausible)
+    low, high = max(size.neutral - reach, size.lower), min(size.neutral + reach, size.upper)
+    count = 2 * int(np.clip(0.5 * cycles, 2, MOST_GRID_SIZES // 2))  # none of them neutral
+    return tuple({size.name: float(value)} for value in np.linspace(low, high, count))
+
+
+def finer(effect: Effect, probe: Probe, length: float) -> tuple[tuple[Probe, ...], ...]:
+    """Sine and cosine at frequencies and other shapes around those of a probe.
+
+    Between two frequencies that differ by a small part of a cycle in a run, a fit can get stuck.
+
+    Args:
+        effect: the effect; no alternatives unless it oscillates.
+        probe: its parameters.
+        length: of the longest run (s).
+    """
+    phase = phase_of(effect)
+    if not phase:
+        return ()
+    shapes = [p for p in effect.parameters if p.shapes and p.name != phase]
+    values = [_around(s, probe[s.name], length) for s in shapes]
+    return tuple(
+        tuple(
+            {**probe, **dict(zip((s.name for s in shapes), chosen, strict=True)), phase: turn}
+            for turn in QUARTER
+        )
+        for chosen in product(*values)
+    )
+
+
+def _around(parameter: EffectParameter, value: float, length: float) -> tuple[float, ...]:
+    low, high = parameter.plausible
+    if parameter.unit == "Hz":
+        values = value + np.linspace(-0.7, 0.7, 15) / max(length, 1.0)
+    else:
+        values = value * np.array([0.4, 1.0, 2.5])
+    return tuple(np.unique(np.clip(values, low, high)).tolist())
+
+
+def _alternative(
+    effect: Effect, switches: Sequence[EffectParameter], setting: Probe, share: float
+) -> tuple[Probe, ...]:
+    off = {p.name: p.neutral for p in switches}
+    return tuple({**off, **setting, p.name: _between(p, share)} for p in switches)
+
+
+def _shape_values(parameter: EffectParameter) -> tuple[float, ...]:
+    low, high = parameter.plausible
+    if low > 0 and high / low > 4:
+        return tuple(np.geomspace(low, high, 3).tolist())
+    return tuple(np.linspace(low, high, 3).tolist())
+
+
+def _between(p: EffectParameter, share: float) -> float:
+    """A size from small (share 0) to large (share 1)."""
+    small, large = _ends(p)
+    if small * large > 0.0:
+        return float(small * (large / small) ** share)
+    return small + share * (large - small)
+
+
+def _ends(p: EffectParameter) -> tuple[float, float]:
+    """A small and a large departure from neutral; where neutral is infinite, low is large."""
+    low, high = p.plausible
+    if np.isinf(p.neutral):
+        return high, float(np.sqrt(low * high))
+    far = high if abs(high - p.neutral) >= abs(low - p.neutral) else low
+    return _small(p), p.neutral + 0.6 * (far - p.neutral)
+
+
+def _small(p: EffectParameter) -> float:
+    low, high = p.plausible
+    if low <= p.neutral <= high:
+        return p.neutral + 0.1 * (high - p.neutral if high > p.neutral else low - p.neutral)
+    return low if abs(low - p.neutral) < abs(high - p.neutral) else high
+
+
+def effect_values(problem: Knowing, name: str, probe: Probe) -> dict[str, float]:
+    """A probe as paths of the problem."""
+    neutral = problem.known[name].neutral
+    return {f"{PREFIX}{name}.{key}": probe.get(key, value) for key, value in neutral.items()}
+
+
+def same_causes(problem: Likening, causes: Sequence[str], others: Sequence[str]) -> bool:
+    """Whether two explanations of as many causes say the same, one cause after the other."""
+    return all(a == b or same(problem, a, b) for a, b in zip(causes, others, strict=True))
+
+
+def same(problem: Likening, cause: str, other: str) -> bool:
+    """Whether two causes say the same in other words.
+
+    Args:
+        problem: knows effects, and coefficients that act alike.
+        cause: name of an effect, or ``parameter:<path>``.
+        other: likewise.
+    """
+    if {cause.removeprefix(PARAMETER), other.removeprefix(PARAMETER)} in problem.interchangeable:
+        return True
+    known = problem.known
+    pairs = ((cause, other), (other, cause))
+    return any(a in known and b.removeprefix(PARAMETER) in known[a].equals for a, b in pairs)

@@ -1,0 +1,241 @@
+"""Every cause against a fit: how significant each is, and what chance would make of the best."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from scipy.special import chdtrc
+
+from fish_env.arrays import FloatArray
+from fish_env.inference.estimate.fit import Fit
+from fish_env.inference.estimate.products import inner
+from fish_env.inference.hypotheses import PREFIX
+from fish_env.inference.parallel import side_by_side
+from fish_env.inference.policy import POLICY
+from fish_env.inference.probes import Cause, Probe, best_of_each, effect_values, finer, of_visible
+from fish_env.inference.problem import Problem
+from fish_env.inference.projection import Projector, Signal
+from fish_env.inference.tails import noncentrality
+
+LANES_AT_ONCE = 96
+SETTINGS_AT_ONCE = LANES_AT_ONCE - 1
+"""One lane is that of the fit itself."""
+
+
+@dataclass(frozen=True, eq=False)
+class Screen:
+    """All causes against one fit.
+
+    Attributes:
+        signals: every cause at every alternative.
+        threshold: log p-value that the smallest one falls below by chance in ``level`` of data
+            sets without an effect.
+        level: family-wise error rate.
+    """
+
+    signals: tuple[Signal, ...]
+    threshold: float
+    level: float
+
+    def best(self) -> list[Signal]:
+        """The best alternative of each cause, most significant first."""
+        return best_of_each(self.signals, lambda signal: signal.log_p)
+
+
+def screen(
+    fit: Fit, causes: Sequence[Cause], rng: np.random.Generator, level: float = POLICY.screen_level
+) -> Screen:
+    """Test every cause against a fit.
+
+    Args:
+        fit: baseline, perhaps with effects already in it.
+        causes: what to test; causes already in the fit are left out.
+        rng: for the null distribution of the smallest p-value.
+        level: family-wise error rate.
+    """
+    fit = fit.extrapolated
+    projector = Projector(fit)
+    taken = {*fit.effects, *fit.released}
+    tested = [c for c in causes if c.name not in taken and c.path not in taken]
+    signals = [
+        *_effect_signals(fit, projector, tested),
+        *_coefficient_signals(projector, tested, fit),
+    ]
+    threshold = null_threshold(signals, rng, level, fit.problem.noise_freedom(fit))
+    return Screen(tuple(signals), threshold, level)
+
+
+def zoomed(fit: Fit, signal: Signal) -> Signal:
+    """The best signal around one of an oscillation; any other signal as it is."""
+    problem, cause = fit.problem, signal.cause
+    length = problem.longest_run
+    around = finer(problem.known[cause.name], cause.probes[signal.probe][0], length)
+    if not around:
+        return signal
+    close = Cause(cause.name, around)
+    return min((signal, *_effect_signals(fit, Projector(fit), [close])), key=lambda s: s.log_p)
+
+
+def _effect_signals(fit: Fit, projector: Projector, causes: Sequence[Cause]) -> list[Signal]:
+    jobs = [
+        (cause, index, probe)
+        for cause in causes
+        if cause.is_effect
+        for index, alternative in enumerate(cause.probes)
+        for probe in alternative
+    ]
+    start = np.repeat(fit.point.z[:, None], len(jobs), axis=1)
+    columns = residual_changes(fit, [(cause.name, probe) for cause, _, probe in jobs], start)
+    alternatives: dict[tuple[str, int], list[int]] = {}
+    for i, (cause, index, _) in enumerate(jobs):
+        alternatives.setdefault((cause.name, index), []).append(i)
+
+    tests = [(jobs[own[0]][0], jobs[own[0]][1], own) for own in alternatives.values()]
+    found = projector.signals(tests, columns.T)
+    for i, (cause, index, own) in enumerate(tests):
+        found[i] = found[i] or of_visible(projector.signal, cause, index, columns[:, own])
+    return [signal for signal in found if signal is not None]
+
+
+def residual_changes(fit: Fit, jobs: Sequence[tuple[str, Probe]], z: FloatArray) -> FloatArray:
+    """Change of the residuals (D, n) with each setting of an effect.
+
+    Args:
+        fit: what the change is from.
+        jobs: effect and setting, n of them.
+        z: (coefficients, n) where to simulate each.
+    """
+    rows = _changes_of_kinds(fit, fit.comparing, jobs, z)
+    diverged = np.flatnonzero(~np.isfinite(rows).all(axis=1)).tolist()
+    if diverged and fit.comparing is not fit.problem:
+        again = [jobs[i] for i in diverged]
+        rows[diverged] = _changes_of_kinds(fit, fit.problem, again, z[:, diverged])
+    return fit.linearised.whitened(rows).T
+
+
+def _changes_of_kinds(
+    fit: Fit, problem: Problem, jobs: Sequence[tuple[str, Probe]], z: FloatArray
+) -> FloatArray:
+    """The changes (n, D) of all jobs, each computed by the quickest kernel that can."""
+    rows = np.empty((len(jobs), len(fit.linearised.residuals)))
+    for alike in _kinds(fit, jobs):
+        for first in range(0, len(alike), SETTINGS_AT_ONCE):
+            part = alike[first : first + SETTINGS_AT_ONCE]
+            rows[part] = _changes_at_once(fit, problem, [jobs[i] for i in part], z[:, part])
+    return rows
+
+
+def _kinds(fit: Fit, jobs: Sequence[tuple[str, Probe]]) -> list[list[int]]:
+    """Jobs that one kernel computes, so that none pays for effects of another kind.
+
+    A few jobs stay together: kernels take whole blocks of lanes, however few are filled.
+    """
+    if len(jobs) <= SETTINGS_AT_ONCE:
+        return [list(range(len(jobs)))]
+    kinds: dict[object, list[int]] = {}
+    for i, (name, _) in enumerate(jobs):
+        key = fit.problem.batch_key([*fit.point.effects, f"{PREFIX}{name}"])
+        kinds.setdefault(key, []).append(i)
+    return list(kinds.values())
+
+
+def _changes_at_once(
+    fit: Fit, problem: Problem, jobs: Sequence[tuple[str, Probe]], z: FloatArray
+) -> FloatArray:
+    base = {**problem.neutral(dict.fromkeys(name for name, _ in jobs)), **fit.point.effects}
+    values = [base, *(effect_values(problem, name, probe) for name, probe in jobs)]
+    lanes = {path: np.array([own.get(path, base[path]) for own in values]) for path in base}
+    start = np.column_stack([fit.point.z, z])
+    return problem.changes(start, lanes, fit.noise, fit.filtered)
+
+
+def _coefficient_signals(projector: Projector, causes: Sequence[Cause], fit: Fit) -> list[Signal]:
+    """Lifting the prior of one baseline coefficient.
+
+    Under the prior the posterior mean of z has variance 1 - s^2 (s^2: its posterior variance), so
+    z^2 / (1 - s^2) is chi-squared with one degree of freedom when the prior holds. A coefficient
+    that a bound holds counts with where it would go.
+    """
+    signals = []
+    for cause in causes:
+        if cause.is_effect:
+            continue
+        i = fit.problem.baseline.paths.index(cause.path or "")
+        at, variance = projector.without_own_bound(i)
+        left = 1.0 - variance
+        if left < 0.05:
+            continue
+        column = projector.lin.slopes[:, [i]]
+        score = np.array([at])
+        energy = float((column**2).sum())
+        signals.append(Signal(cause, -1, column, energy, np.array([[left]]), score, 1.0))
+    return signals
+
+
+def null_threshold(
+    signals: Sequence[Signal],
+    rng: np.random.Generator,
+    level: float,
+    freedom: float = np.inf,
+) -> float:
+    """Log p-value below which the smallest of all falls by chance with probability ``level``.
+
+    Draws scores of all causes jointly as white noise would make them; signals that are alike move
+    together, so this is less strict than Bonferroni's bound.
+
+    Args:
+        signals: tests that are made together.
+        rng: for the draws.
+        level: family-wise error rate.
+        freedom: independent residuals that the size of the noise is estimated from.
+    """
+    effects = [s for s in signals if s.probe >= 0]
+    smallest = np.zeros(POLICY.null_draws)
+    size = rng.chisquare(freedom, POLICY.null_draws) / freedom if np.isfinite(freedom) else 1.0
+    largest: dict[int, FloatArray] = {}  # statistic of as many degrees of freedom
+    if effects:
+        stacked = np.concatenate([s.left for s in effects], axis=1)
+        halves = np.array_split(stacked, 2, axis=1)
+        gram = np.hstack(side_by_side(partial(inner, stacked, half) for half in halves))
+        scale = np.sqrt(np.diag(gram))
+        correlation = gram / np.outer(scale, scale)
+        values, vectors = np.linalg.eigh(correlation)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        draws = root @ rng.standard_normal((len(scale), POLICY.null_draws))
+        at = 0
+        for s in effects:
+            part = slice(at, at + s.freedom)
+            block = correlation[part, part] + 1e-9 * np.eye(s.freedom)
+            white = np.linalg.solve(np.linalg.cholesky(block), draws[part])
+            statistic = np.einsum("ij,ij->j", white, white)
+            largest[s.freedom] = np.maximum(largest.get(s.freedom, 0.0), statistic)
+            at += s.freedom
+    for settings, statistic in largest.items():
+        smallest = np.minimum(smallest, np.log(chdtrc(settings, statistic / size)))
+    coefficients = sum(s.probe < 0 for s in signals)
+    if coefficients:
+        uniform = rng.random(POLICY.null_draws)
+        smallest = np.minimum(smallest, np.log1p(-((1 - uniform) ** (1.0 / coefficients))))
+    return float(np.quantile(smallest, level))
+
+
+def smallest_detectable(
+    signal: Signal, setting: int, threshold: float, power: float = POLICY.power
+) -> float:
+    """Multiple of one probed setting that would be found with this power.
+
+    The statistic is then noncentral chi-squared with as many degrees of freedom as settings; its
+    noncentrality is the multiple squared times the projected information.
+    """
+    target = noncentrality(threshold, signal.freedom, power)
+    information = float(signal.projected[setting, setting]) / signal.variance_inflation
+    return float(np.sqrt(target / max(information, 1e-12)))
+
+
+def confusability(a: Signal, b: Signal) -> float:
+    """Largest cosine between what two causes leave after a refit of the baseline (0 to 1)."""
+    cosines = np.linalg.svd(a.span.T @ b.span, compute_uv=False)
+    return float(cosines[0])

@@ -1,0 +1,346 @@
+"""Fits with one more cause: a coarse fit of each candidate, a full fit of the few that lead."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from fish_env.inference.adequacy import disturbance_at_limit
+from fish_env.inference.effort import FULL, Effort
+from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
+from fish_env.inference.estimate.fit import Fit, fit
+from fish_env.inference.explanation import Explanation, reached
+from fish_env.inference.hypotheses import PREFIX
+from fish_env.inference.parallel import side_by_side
+from fish_env.inference.policy import POLICY
+from fish_env.inference.problem import Point, Problem
+from fish_env.inference.projection import Signal
+from fish_env.inference.starts import baselines, probed, starts
+
+Report = Callable[[str], None]
+NamedCoarseFit = tuple[str, CoarseFit]
+"""With the name of the cause that it has added."""
+Way = Callable[[float, Signal], list[NamedCoarseFit]]
+"""Coarse fits of a cause, given up where they will not get below an objective."""
+
+
+def refits(
+    current: Explanation,
+    chosen: Sequence[Signal],
+    report: Report,
+    relaxed: tuple[Fit, Sequence[Signal]] | None = None,
+    effort: Effort = FULL,
+    like: Callable[[str], Sequence[Signal]] = lambda name: (),
+    unseen: Sequence[Signal] = (),
+) -> tuple[list[Explanation], Explanation | None]:
+    """Fits with one more cause each, best first, and the present one under the best one's noise.
+
+    All share the noise model that the best of them leaves, whose disturbance is the smallest: fits
+    can be compared only under one noise model.
+
+    Args:
+        current: causes accepted so far.
+        chosen: causes to add.
+        report: told what is being done.
+        relaxed: fit under relaxed noise, and the effects that it shows.
+        effort: how many causes to try beside the chosen ones, and to fit in full.
+        like: further causes known to look like one, which are tried if it leads.
+        unseen: causes to add that may hide from the screen.
+    """
+    if not chosen:
+        return [], None
+    base = current.fit
+    fitter = CoarseFitter(base)
+    under_relaxed, shown = relaxed or (base, ())
+    follower = CoarseFitter(under_relaxed)
+
+    def followed(enough: float, signal: Signal) -> list[NamedCoarseFit]:
+        report(f"trying {signal.cause.name} under relaxed noise")
+        first = _coarse_fits(follower, base, signal, starts(under_relaxed, signal))
+        return [s for _, f in first for s in _coarse_fits(fitter, base, signal, [f.point], enough)]
+
+    def alone(enough: float, signal: Signal) -> list[NamedCoarseFit]:
+        report(f"trying {signal.cause.name}")
+        return _coarse_fits(fitter, base, signal, starts(base, signal), enough)
+
+    def also(way: Way, signals: Sequence[Signal]) -> list[NamedCoarseFit]:
+        enough = _enough(coarse, fitter.base, POLICY.coarse_fit_behind, effort.finalists)
+        return _all([partial(way, enough, signal) for signal in signals])
+
+    coarse: list[NamedCoarseFit] = []
+    for way, signals in ((alone, chosen), (followed, shown), (alone, unseen)):
+        coarse += also(way, signals)
+    if coarse:
+        ahead = min(coarse, key=lambda s: s[1].objective)[0]
+        coarse += also(alone, like(ahead)[: effort.shortlist])
+    settled = bool(current.causes) and not disturbance_at_limit(base)
+    if settled:
+        coarse = _improving(fitter, coarse, {signal.cause.name for signal in chosen})
+    finalists = _finalists(coarse, fitter.base, POLICY.coarse_fit_behind, effort.finalists)
+    found = (_gaining if settled else _led)(current, finalists, report)
+    if not found:
+        return [], None
+    tried, noise = _best_first(found, None if settled else found[0])
+    # A baseline that diverges under the smaller disturbance keeps the one that suits it.
+    return tried, Explanation(current.causes, _at_noise(base.problem, base, noise, 2) or base)
+
+
+def _all(tasks: Iterable[Callable[[], list[NamedCoarseFit]]]) -> list[NamedCoarseFit]:
+    return [named for found in side_by_side(tasks) for named in found]
+
+
+def restart_from_winner(
+    current: Explanation, tried: list[Explanation], chosen: Sequence[Signal], report: Report
+) -> list[Explanation]:
+    """Restart the other causes from the winner's coefficients and disturbance.
+
+    Those of the first contest began from the baseline's, which the misfit had biased. The ones of
+    a good explanation are near those of a better one.
+
+    Args:
+        current: causes accepted before.
+        tried: result of :func:`refits`, best first.
+        chosen: causes to put in the winner's place.
+        report: told what is being done.
+    """
+    best = tried[0].fit
+    fitter = CoarseFitter(best)
+    enough = fitter.base + POLICY.coarse_fit_leeway
+    done = {e.causes[-1] for e in tried}
+
+    def again(signal: Signal) -> list[NamedCoarseFit]:
+        report(f"trying {signal.cause.name} again")
+        begin = starts(current.fit, signal, best.point.z)
+        return _coarse_fits(fitter, current.fit, signal, begin, enough)
+
+    others = [s for s in chosen if s.cause.is_effect and s.cause.name not in done]
+    coarse = _all(partial(again, s) for s in others)
+    finalists = _finalists(coarse, fitter.base, 0.0, FULL.finalists)
+    finalists = [f for f in finalists if f[1].objective < enough]
+    more = _rest(current, finalists, best, report)
+    return _best_first([*tried, *more], tried[0])[0]
+
+
+def swap_step(current: Explanation, left: Sequence[Signal], report: Report) -> list[Explanation]:
+    """The explanation, and the best with a similar cause in place of an earlier one, best first.
+
+    The first cause is chosen while the others are still missing. A similar one may then win because
+    it compensates for part of them.
+
+    Args:
+        current: at least two causes; the last one was chosen in view of the others.
+        left: what every other effect would still explain.
+        report: told what is being done.
+    """
+    own = current.fit
+    fitter = CoarseFitter(own)
+    found: list[tuple[float, tuple[str, ...], CoarseFit]] = []
+    for name in current.causes[:-1]:
+        alike = own.problem.known[name].confusable_with if name in own.effects else ()
+        for signal in (s for s in left if s.cause.name in alike):
+            report(f"trying {signal.cause.name} instead of {name}")
+            causes = tuple(signal.cause.name if c == name else c for c in current.causes)
+            coarse = _swapped(fitter, own, name, signal)
+            if coarse is not None:
+                found.append((coarse.objective, causes, coarse))
+    if not found:
+        return [current]
+    _, causes, coarse = min(found, key=lambda f: f[0])
+    if coarse.objective >= fitter.base + POLICY.coarse_fit_leeway:
+        return [current]
+    report(f"fitting {' and '.join(causes)}")
+    fitted = _in_full(own.problem, coarse, own.noise)
+    if fitted is None:
+        return [current]
+    both = [current, Explanation(causes, fitted)]
+    return sorted(both, key=lambda e: e.score)
+
+
+def _swapped(fitter: CoarseFitter, own: Fit, name: str, signal: Signal) -> CoarseFit | None:
+    """The coarse fit with one effect in place of another, from all its sizes.
+
+    One that ends switched off had begun too far away, and is tried from each size in turn.
+    """
+    kept = {p: v for p, v in own.point.effects.items() if p.split(".")[1] != name}
+    effects = tuple(signal.cause.name if e == name else e for e in own.effects)
+    sizes = probed(own.problem, signal, every=True)
+    begin = [Point(z, {**kept, **values}) for z in baselines(own) for values in sizes]
+    coarse = [reached(partial(fitter.coarse_fit, effects, own.released, begin))]
+    if coarse[0] is None or _off(own.problem, coarse[0].point, signal.cause.name):
+        coarse += [reached(partial(fitter.coarse_fit, effects, own.released, [b])) for b in begin]
+    return min((s for s in coarse if s), key=lambda s: s.objective, default=None)
+
+
+def without(current: Explanation, name: str) -> Explanation | None:
+    """The fit when one of its causes is dropped, under the same noise model.
+
+    None where the simulation diverges without it.
+    """
+    own = current.fit
+    effects = tuple(e for e in own.effects if e != name)
+    released = tuple(p for p in own.released if f"parameter:{p}" != name)
+    values = {p: v for p, v in own.point.effects.items() if p.split(".")[1] != name}
+    begin = Point(own.point.z, values)
+    smaller = reached(
+        lambda: fit(
+            own.problem, effects, begin, own.noise, released, refit_noise=False, iterations=4
+        )
+    )
+    if smaller is None:
+        return None
+    return Explanation(tuple(c for c in current.causes if c != name), smaller)
+
+
+def _coarse_fits(
+    fitter: CoarseFitter,
+    base: Fit,
+    signal: Signal,
+    begin: Sequence[Point],
+    give_up_above: float = np.inf,
+) -> list[NamedCoarseFit]:
+    """The coarse fit of one cause; none where the simulation diverges from every start.
+
+    Where the few runs of a coarse fit show nothing of an effect it may end switched off. The
+    estimate from all runs, the first start, is then the better start of a full fit.
+    """
+    cause = signal.cause
+    effects = (*base.effects, cause.name) if cause.is_effect else base.effects
+    released = base.released if cause.is_effect else (*base.released, cause.path or "")
+    found = reached(lambda: fitter.coarse_fit(effects, released, begin, give_up_above))
+    if found is None:
+        return []
+    if cause.is_effect and _off(base.problem, found.point, cause.name):
+        found = replace(found, point=begin[0])
+    return [(cause.name, found)]
+
+
+def _off(problem: Problem, point: Point, name: str) -> bool:
+    """Whether an effect does nothing at a point."""
+    switching = problem.known[name].switching
+    return all(point.effects[f"{PREFIX}{name}.{p.name}"] == p.neutral for p in switching)
+
+
+def _finalists(
+    coarse: list[NamedCoarseFit], base: float, behind: float, most: int
+) -> list[NamedCoarseFit]:
+    """Coarse fits that may still lead to the best fit, best first."""
+    if not coarse:
+        return []
+    ranked = sorted(coarse, key=lambda s: s[1].objective)
+    first = {name: i for i, (name, _) in reversed(list(enumerate(ranked)))}
+    ranked = [ranked[i] for i in sorted(first.values())]  # a cause may have several
+    enough = _enough(ranked, base, behind, most)
+    return [s for s in ranked[:most] if s[1].objective <= enough]
+
+
+def _enough(coarse: list[NamedCoarseFit], base: float, behind: float, most: int) -> float:
+    """Objective up to which a coarse fit may be a finalist, however far others will yet get."""
+    best = min((s.objective for _, s in coarse), default=np.inf)
+    return best if most == 1 else best + max(POLICY.coarse_fit_leeway, behind * (base - best))
+
+
+def _improving(
+    fitter: CoarseFitter, coarse: list[NamedCoarseFit], seen: Collection[str]
+) -> list[NamedCoarseFit]:
+    """Coarse fits of significant causes, and of others that gain more than the AIC penalty."""
+    if all(name in seen for name, _ in coarse):
+        return coarse
+    own = fitter.fit
+    alone = fitter.coarse_fit(own.effects, own.released, [own.point])
+    enough = alone.objective - POLICY.aic_penalty
+    return [(name, s) for name, s in coarse if name in seen or s.objective < enough]
+
+
+def _led(
+    current: Explanation, finalists: list[NamedCoarseFit], report: Report
+) -> list[Explanation]:
+    """Full fits under the noise that the likeliest of them leaves, which comes first."""
+    base, left = current.fit, [*finalists]
+    while left:
+        name, coarse = left.pop(0)
+        report(f"fitting {name}")
+        leader = _in_full(base.problem, coarse, base.noise)
+        if leader is not None:
+            first = Explanation((*current.causes, name), leader)
+            return [first, *_rest(current, left, leader, report)]
+    return []
+
+
+def _gaining(
+    current: Explanation, finalists: list[NamedCoarseFit], report: Report
+) -> list[Explanation]:
+    """Full fits under the present noise; none of them where none explains more than there is.
+
+    Where no misfit drives the disturbance, one more cause hardly changes it: its model will do to
+    see whether what showed was chance.
+    """
+    found = _rest(current, finalists, current.fit, report)
+    return found if any(e.score < current.score for e in found) else []
+
+
+def _rest(
+    current: Explanation, finalists: list[NamedCoarseFit], leader: Fit, report: Report
+) -> list[Explanation]:
+    """Full fits under the leader's noise, as far as they may come near the leader's."""
+    give_up_above = leader.objective + POLICY.out_of_reach
+
+    def fitted(name: str, coarse: CoarseFit) -> Explanation | None:
+        report(f"fitting {name}")
+        found = _at_noise(leader.problem, coarse, leader.noise, 4, give_up_above)
+        return None if found is None else Explanation((*current.causes, name), found)
+
+    tasks = [partial(fitted, name, coarse) for name, coarse in finalists]
+    return [explanation for explanation in side_by_side(tasks) if explanation]
+
+
+def _best_first(
+    tried: list[Explanation], leader: Explanation | None
+) -> tuple[list[Explanation], Any]:
+    """Explanations by score, the first with the noise it leaves, and the others under that.
+
+    Args:
+        tried: explanations under one noise model.
+        leader: the one that has left it, if one of them has.
+    """
+    ranked = sorted(tried, key=lambda e: e.score)
+    own = ranked[0].fit
+    problem = own.problem
+    first = None if ranked[0] is leader else _noise_too(problem, own)
+    if first is None:
+        return ranked, own.noise
+    tasks = [partial(_at_noise, problem, e.fit, first.noise, 2) for e in ranked[1:]]
+    pairs = zip(ranked[1:], side_by_side(tasks), strict=True)
+    others = [Explanation(e.causes, fitted) for e, fitted in pairs if fitted]
+    return [Explanation(ranked[0].causes, first), *others], first.noise
+
+
+def _in_full(problem: Problem, coarse: CoarseFit, noise: Any) -> Fit | None:
+    few = problem.subset(3)
+    first = reached(
+        lambda: fit(few, coarse.effects, coarse.point, noise, coarse.released, rounds=1)
+    )
+    return first if first is None or few is problem else _noise_too(problem, first)
+
+
+def _at_noise(
+    problem: Problem,
+    at: CoarseFit | Fit,
+    noise: Any,
+    iterations: int,
+    give_up_above: float = np.inf,
+) -> Fit | None:
+    return reached(
+        lambda: fit(
+            problem, at.effects, at.point, noise, at.released, refit_noise=False,
+            iterations=iterations, give_up_above=give_up_above,
+        )
+    )  # fmt: skip
+
+
+def _noise_too(problem: Problem, own: Fit) -> Fit | None:
+    free = (own.effects, own.point, own.noise, own.released)
+    return reached(lambda: fit(problem, *free, rounds=2))

@@ -1,0 +1,73 @@
+"""Where fits with one more cause begin: the linear estimate, every probe, and sizes between."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fish_env.arrays import FloatArray
+from fish_env.inference.estimate.fit import Fit
+from fish_env.inference.policy import POLICY
+from fish_env.inference.probes import combined, effect_values, mirrored
+from fish_env.inference.problem import Point, Problem
+from fish_env.inference.projection import Signal
+from fish_env.inference.screening import zoomed
+
+
+def starts(base: Fit, signal: Signal, z: FloatArray | None = None) -> list[Point]:
+    """Where to begin: the linear estimate and every probe, with baselines near and far.
+
+    With ``z`` given, that is the only baseline.
+    """
+    problem, cause = base.problem, signal.cause
+    if not cause.is_effect:
+        return [base.point]
+    signal = zoomed(base, signal)
+    size = np.linalg.solve(signal.projected, signal.score)
+    settings = signal.cause.probes[signal.probe]
+    start = {p.rsplit(".", 1)[1]: v for p, v in problem.neutral([cause.name]).items()}
+    estimate = combined(problem.known[cause.name], settings, size.tolist(), start)
+    linear = effect_values(problem, cause.name, estimate)
+    bounds = {f.path: (f.lower, f.upper) for f in problem.freedoms([cause.name])}
+    clipped = [
+        {path: float(np.clip(value, *bounds[path])) for path, value in values.items()}
+        for values in (linear, *probed(problem, signal), *_on_starting_grid(base, signal))
+    ]
+    begin = baselines(base) if z is None else (z,)
+    return [Point(z, {**base.point.effects, **values}) for z in begin for values in clipped]
+
+
+def _on_starting_grid(base: Fit, signal: Signal) -> list[dict[str, float]]:
+    """Sizes of the starting grid, unless the filter follows the drive's phase anyway.
+
+    Nor where the phase at the start is unknown: every size would have its own.
+    """
+    problem, name = base.problem, signal.cause.name
+    if problem.follows_drive(base.noise) or not problem.starts_known:
+        return []
+    return [effect_values(problem, name, size) for size in problem.starting_grid(name)]
+
+
+def baselines(base: Fit) -> tuple[FloatArray, ...]:
+    """Coefficients to begin from.
+
+    Those refitted without a cause may have gone far to make up for it, so the nominal ones are a
+    start of their own.
+    """
+    far = np.abs(base.point.z).max() > POLICY.far_start_sd
+    return (base.point.z, np.zeros_like(base.point.z)) if far else (base.point.z,)
+
+
+def probed(problem: Problem, signal: Signal, every: bool = False) -> list[dict[str, float]]:
+    """Settings to begin from: of the best shape at every size, or of every alternative.
+
+    On either side of neutral where there are two: of a strong effect no linear estimate tells the
+    sign. Never from neutral itself, where many an effect begins too flat to be left again.
+    """
+    cause, effect = signal.cause, problem.known[signal.cause.name]
+    shaped = len(effect.switching) < len(effect.parameters)
+    alternatives = (cause.probes[signal.probe],) if shaped and not every else cause.probes
+    every_one = [p for probes in alternatives for p in probes]
+    settings = [p for i, p in enumerate(every_one) if p not in every_one[:i]]
+    opposite = [o for o in (mirrored(effect, p) for p in settings) if o not in settings]
+    settings += [o for o in opposite if any(o[p.name] != p.neutral for p in effect.switching)]
+    return [effect_values(problem, cause.name, p) for p in settings]

@@ -1,0 +1,179 @@
+"""What a vehicle declares of itself: effects it may show, coefficients with their priors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from scipy.optimize import bisect
+
+from fish_env.arrays import BoolArray, FloatArray
+from fish_env.inference.effects import EffectParameter
+from fish_env.inference.hypotheses import effects_of, parameter_path
+
+
+class Effect(Protocol):
+    """Something a vehicle does beyond its baseline model."""
+
+    @property
+    def name(self) -> str:
+        """Public name."""
+        ...
+
+    @property
+    def parameters(self) -> Sequence[EffectParameter]:
+        """Its parameters, those that switch it on and those that shape it."""
+        ...
+
+    @property
+    def switching(self) -> Sequence[EffectParameter]:
+        """The parameters that switch it on."""
+        ...
+
+    @property
+    def neutral(self) -> dict[str, float]:
+        """Parameter values that switch it off."""
+        ...
+
+    @property
+    def step_error(self) -> float:
+        """Share of its effect that the simulation gets wrong."""
+        ...
+
+    @property
+    def drifts_in_phase(self) -> bool:
+        """Whether a periodic drive gets ever further out of phase, so that large sizes mislead."""
+        ...
+
+    @property
+    def equals(self) -> tuple[str, ...]:
+        """Coefficients (paths) other values of which do exactly the same."""
+        ...
+
+    @property
+    def confusable_with(self) -> tuple[str, ...]:
+        """Names of effects with a similar signature."""
+        ...
+
+    def is_followed(self, values: Mapping[str, float], step: float) -> bool:
+        """Whether simulation steps (s) follow it at these values."""
+        ...
+
+
+@dataclass(frozen=True)
+class EffectFreedom:
+    """A free parameter of an effect.
+
+    Attributes:
+        path: ``effects.<effect>.<parameter>``.
+        lower: smallest value allowed.
+        upper: largest value allowed.
+        step: size for finite differences, about a hundredth of what matters.
+        least: values between neutral and this one are too quick to be simulated; minus infinity
+            where none is.
+    """
+
+    path: str
+    lower: float
+    upper: float
+    step: float
+    least: float
+
+
+def freedoms(effect: Effect, step: float) -> tuple[EffectFreedom, ...]:
+    """All parameters of an effect, free within their physical bounds, for RK4 steps (s)."""
+    return tuple(
+        EffectFreedom(
+            parameter_path(effect.name, p.name),
+            p.lower,
+            p.upper,
+            0.02 * (p.plausible[1] - p.plausible[0]),
+            least_followed(effect, p, step),
+        )
+        for p in effect.parameters
+    )
+
+
+def least_followed(effect: Effect, parameter: EffectParameter, step: float) -> float:
+    """Smallest value of one parameter above neutral that RK4 steps (s) follow.
+
+    Minus infinity where they follow any, and where the effect is as quick at every size: it then
+    has short steps of its own.
+    """
+
+    def is_followed(value: float) -> bool:
+        return effect.is_followed({**effect.neutral, parameter.name: value}, step)
+
+    neutral, far = parameter.neutral, parameter.plausible[1]
+    near = neutral + 1e-9 * (far - neutral)
+    if not np.isfinite(neutral) or is_followed(near) or not is_followed(far):
+        return -np.inf
+    return float(bisect(lambda value: is_followed(value) - 0.5, near, far))
+
+
+def finite_values(known: Mapping[str, Effect], values: Mapping[str, float]) -> dict[str, float]:
+    """Values of effects, with the mildest plausible one where they are infinite.
+
+    No derivative leads away from an infinite rate limit.
+    """
+    mildest = {
+        parameter_path(name, p.name): p.plausible[1]
+        for name in effects_of(values)
+        for p in known[name].parameters
+    }
+    return {path: v if np.isfinite(v) else mildest[path] for path, v in values.items()}
+
+
+class Coefficients:
+    """Baseline coefficients with a normal prior, in units where the prior is a standard normal.
+
+    Args:
+        paths: names of the coefficients, n of them.
+        mean: (n,) centre of the prior.
+        covariance: (n, n) of the prior.
+        bounds: (n,) and (n,) physical bounds.
+        units: of each; default: none.
+        able: whether a vehicle can have these coefficients all together.
+    """
+
+    def __init__(
+        self,
+        paths: Iterable[str],
+        mean: FloatArray,
+        covariance: FloatArray,
+        bounds: tuple[FloatArray, FloatArray],
+        units: Iterable[str] = (),
+        able: Callable[[Mapping[str, float]], bool] = lambda values: True,
+    ) -> None:
+        self.paths = tuple(paths)
+        self._units = dict(zip(self.paths, units, strict=False))
+        self.mean = np.asarray(mean, float)
+        self.sd = np.sqrt(np.diag(covariance))
+        correlation = covariance / np.outer(self.sd, self.sd)
+        self.factor = self.sd[:, None] * np.linalg.cholesky(correlation)
+        self.bounds = bounds
+        self._able = able
+
+    def __len__(self) -> int:
+        """Number of coefficients."""
+        return len(self.paths)
+
+    def unit(self, path: str) -> str:
+        """Unit of a coefficient, ``-`` when it has none."""
+        return self._units.get(path, "-")
+
+    def values(self, z: FloatArray) -> FloatArray:
+        """Coefficients (n, N) of normalised ones (n, N)."""
+        return self.mean[:, None] + self.factor @ z
+
+    def possible(self, z: FloatArray) -> bool:
+        """Whether a vehicle can have normalised coefficients (n,), all together."""
+        values = self.values(z[:, None])[:, 0].tolist()
+        return self._able(dict(zip(self.paths, values, strict=True)))
+
+    def all_possible(self, z: FloatArray) -> BoolArray:
+        """The same of many (n, N): (N,), and no longer for those that are equal."""
+        distinct, which = np.unique(z, axis=1, return_inverse=True)
+        return np.array([self.possible(one) for one in distinct.T])[which.ravel()]

@@ -1,0 +1,1 @@
+"""What any rigid vehicle's record must satisfy: kinematics, clocks, units, noise."""

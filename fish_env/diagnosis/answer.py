@@ -6,14 +6,11 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from fish_env.data.schema import Dataset
-from fish_env.diagnosis import consistency, noise_floor
-from fish_env.diagnosis.attribution import Ranked
 from fish_env.diagnosis.beats import beats_of, by_run, uneven
-from fish_env.diagnosis.causes import PARAMETER, coefficient_sizes
-from fish_env.diagnosis.effort import effort_of
 from fish_env.diagnosis.entries import (
     FORMAT,
     Plain,
+    budget_entry,
     cause_entry,
     coefficient_entries,
     disturbance_entry,
@@ -23,54 +20,76 @@ from fish_env.diagnosis.entries import (
     precondition_entry,
     residual_entry,
 )
-from fish_env.diagnosis.generic_forces import wrench_unit
+from fish_env.diagnosis.input_checks import doubts
 from fish_env.diagnosis.regimes import as_plain
-from fish_env.diagnosis.screening import smallest_detectable
-from fish_env.diagnosis.suitability import doubts
-from fish_env.identification.estimator import Fit
+from fish_env.diagnosis.result import Diagnosed
+from fish_env.identification.generic_forces import wrench_unit
+from fish_env.identification.series import series_of
+from fish_env.inference.attribution import Ranked
+from fish_env.inference.effort import effort_of
+from fish_env.inference.estimate.fit import Fit
+from fish_env.inference.hypotheses import PARAMETER
+from fish_env.inference.policy import POLICY
+from fish_env.inference.probes import coefficient_sizes
+from fish_env.inference.screening import smallest_detectable
+from fish_env.rigidbody import consistency, noise_floor
 
 if TYPE_CHECKING:
     from fish_env.diagnosis.pipeline import Diagnosis
 
 
 def as_dict(diagnosis: Diagnosis) -> Plain:
-    """Everything that ``diagnosis.json`` holds."""
-    verdict = diagnosis.verdict
+    """Everything that ``diagnosis.json`` holds of runs over time."""
+    binds = diagnosis.inputs.binding
+    answer = {
+        **shared_entries(diagnosis),
+        "verdict": "inputs" if binds else diagnosis.verdict.name,
+        "inputs": diagnosis.inputs.as_list(),
+        "verdict_once_corrected": diagnosis.verdict.name,
+        "fish": diagnosis.problem.fish.name,
+        "left_out": list(effort_of(diagnosis.quick).left_out),
+        "noise": _noise(diagnosis.accepted),
+        "noise_floor": [noise_floor.as_dict(floor) for floor in diagnosis.floors],
+        "consistency": consistency.as_dict(diagnosis.consistency),
+        "beats": _beats(diagnosis.inputs.logged),
+        "gain": gain_entry(diagnosis.gain),
+        "localisation": as_plain(diagnosis.localisation),
+        "residual_model": residual_entry(diagnosis.residual),
+        "notes": [*diagnosis.dataset.notes, *_chance(diagnosis)],
+    }
+    return {**answer, "doubts": doubts(answer)}
+
+
+def shared_entries(diagnosis: Diagnosed) -> Plain:
+    """What ``diagnosis.json`` holds of every diagnosis."""
+    verdict, attribution = diagnosis.verdict, diagnosis.attribution
     alternatives = [
         [cause_entry(rival.fit, name) for name in rival.causes]
-        for rival in diagnosis.attribution.rivals
+        for rival in attribution.rivals
         if rival.causes in verdict.alternatives
     ]
-    screen = diagnosis.attribution.screens[0]
+    screen = attribution.screens[0]
     sizes = coefficient_sizes(screen.signals, lambda s: smallest_detectable(s, 0, screen.threshold))
-    answer = {
+    return {
         "format": FORMAT,
         "dataset": diagnosis.dataset.name,
-        "fish": diagnosis.problem.fish.name,
         "seed": diagnosis.seed,
         "quick": diagnosis.quick,
-        "left_out": list(effort_of(diagnosis.quick).left_out),
+        "policy": POLICY.as_dict(),
         "runtime_s": diagnosis.runtime_s,
         "verdict": verdict.name,
         "causes": [cause_entry(diagnosis.accepted, name) for name in verdict.causes],
         "alternatives": alternatives,
         "parameters": coefficient_entries(diagnosis.accepted, sizes),
-        "noise": _noise(diagnosis.accepted),
-        "noise_floor": [noise_floor.as_dict(floor) for floor in diagnosis.floors],
-        "consistency": consistency.as_dict(diagnosis.consistency),
-        "beats": _beats(diagnosis.dataset),
+        "run_variation": run_variation_entry(diagnosis.accepted),
+        "budget": budget_entry(diagnosis.budget),
         "misfit": misfit_entry(diagnosis.misfit),
-        "gain": gain_entry(diagnosis.gain),
         "preconditions": [precondition_entry(p) for p in diagnosis.preconditions],
-        "ranking": [_rank(ranked) for ranked in diagnosis.attribution.ranking],
-        "localisation": as_plain(diagnosis.localisation),
+        "ranking": [_rank(ranked) for ranked in attribution.ranking],
         "unexplained": [] if diagnosis.adequacy.reached else _unexplained(diagnosis),
-        "residual_model": residual_entry(diagnosis.residual),
         "next_experiment": experiment_entry(diagnosis.next_experiment),
-        "strained": list(diagnosis.adequacy.strained),
-        "notes": [*diagnosis.dataset.notes, *_chance(diagnosis)],
+        "strained": list(diagnosis.adequacy.implausible),
     }
-    return {**answer, "doubts": doubts(answer)}
 
 
 def _beats(dataset: Dataset) -> Plain:
@@ -85,14 +104,28 @@ def _rank(ranked: Ranked) -> Plain:
 
 
 def _noise(fit: Fit) -> Plain:
-    sensors = zip(fit.problem.channels, fit.noise.sensor_sd.tolist(), strict=True)
+    sensors = zip(series_of(fit).channels, fit.noise.sensor_sd.tolist(), strict=True)
     return {
         "sensor_sd": dict(sensors),
         "disturbance": disturbance_entry(fit.noise),
     }
 
 
-def _unexplained(diagnosis: Diagnosis) -> list[Plain]:
+def run_variation_entry(fit: Fit) -> list[Plain]:
+    """What the runs differ in: spread over runs beside the usual one, and each run's value."""
+    problem, entries = fit.problem, []
+    for i, known in enumerate(problem.variations):
+        sd = float(fit.noise.spread[i])
+        if sd > 0.0:
+            values = problem.variation[:, i].tolist()
+            entries.append(
+                {"name": known.name, "unit": known.unit, "sd": sd, "usual_sd": known.usual,
+                 "beyond_usual": sd > POLICY.beyond_usual * known.usual, "values": values}
+            )  # fmt: skip
+    return entries
+
+
+def _unexplained(diagnosis: Diagnosed) -> list[Plain]:
     """Forces the data still ask for, over and above the best explanation."""
     return [
         {"depends_on": m.function, "direction": m.direction, "rms": float(m.size), "log_p": m.log_p}
@@ -115,6 +148,22 @@ def _chance(diagnosis: Diagnosis) -> list[str]:
 
 def words(answer: Plain) -> str:
     """The verdict in two sentences for somebody who builds robots."""
+    if answer["verdict"] == "inputs":
+        rest = words(
+            {**answer, "verdict": answer.get("verdict_once_corrected", "no_misfit"), "inputs": []}
+        )
+        return f"{_inputs(answer)} With that put right: {rest}"
+    told = _inputs(answer)
+    return f"{told} {_said(answer)}" if told else _said(answer)
+
+
+def _inputs(answer: Plain) -> str:
+    """What is wrong with the data, in sentences."""
+    return " ".join(fault["words"] for fault in answer.get("inputs", ()) if fault["decisive"])
+
+
+def _said(answer: Plain) -> str:
+    """The verdict on the model, in sentences."""
     say: dict[str, Sequence[str]] = {
         "no_misfit": (
             "The simulation explains these runs down to the noise once its coefficients are "
@@ -135,12 +184,54 @@ def words(answer: Plain) -> str:
             f"{_others(answer)}.",
             "Fly the next experiment to separate them.",
         ),
+        "partial": (
+            "These known causes act, beside something that no known cause explains: "
+            f"{_named(answer)}.",
+            _gained(answer),
+            _asked(answer),
+        ),
         "outside_library": (
             "Something is missing that none of the known causes explains.",
             _asked(answer),
         ),
     }
-    return " ".join(sentence for sentence in say[answer["verdict"]] if sentence)
+    sentences = (_doubt(answer), *say[answer["verdict"]], _budgeted(answer))
+    return " ".join(sentence for sentence in sentences if sentence)
+
+
+def _doubt(answer: Plain) -> str:
+    """What speaks against a named answer, ahead of it."""
+    share = ((answer.get("gain") or {}).get("share_of_reachable") or {}).get("estimate")
+    if not answer["causes"] or share is None or share >= POLICY.least_share:
+        return ""
+    if share <= 0.0:
+        return "Doubtful: held-out runs are predicted no better with what is named here."
+    return (
+        f"Doubtful: what is named here closes {100 * share:.0f} % of the gap to the noise on "
+        "held-out runs."
+    )
+
+
+def _budgeted(answer: Plain) -> str:
+    """The error budget in one sentence."""
+    budget = answer.get("budget")
+    if not budget:
+        return ""
+    names = {
+        "coefficients": "re-estimated coefficients",
+        "run_variation": "what the runs differ in",
+    }
+    parts = [
+        f"{100 * max(entry['share'], 0.0):.0f} % goes with "
+        f"{names.get(entry['name'], entry['name'].removeprefix(PARAMETER))}"
+        for entry in budget["shares"]
+    ]
+    where = "held-out runs" if budget["held_out"] else "the fitted runs"
+    left = 100 * max(budget["left"], 0.0)
+    return (
+        f"Of the misfit of the nominal simulation on {where}, {', '.join(parts)}; "
+        f"{left:.0f} % is left."
+    )
 
 
 def _named(answer: Plain) -> str:

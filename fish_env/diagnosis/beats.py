@@ -11,14 +11,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import minimize_scalar
 from scipy.special import chdtrc, fdtrc
 
+from fish_env.arrays import FloatArray
 from fish_env.data.schema import CommandSteps, Dataset, Run
 from fish_env.data.vocabulary import COMMANDS
+from fish_env.params.schema import FishParams
 
-FloatArray = npt.NDArray[np.float64]
 SWAYING = ("r", "yaw", "v", "y")
 """Channels in which a beat shows, the clearest first."""
 FEWEST_BEATS, FEWEST_SAMPLES = 6.0, 30
@@ -148,14 +148,20 @@ def uneven(beats: Sequence[Beat]) -> bool:
     return bool(np.std(ratios, ddof=1) > UNEVEN and not by_chance)
 
 
-def with_measured_beats(dataset: Dataset) -> Dataset:
-    """The dataset as if the measured frequencies had been commanded.
+def with_measured_beats(dataset: Dataset, fish: FishParams) -> Dataset:
+    """The dataset as if this fish had been commanded to beat at the measured frequencies.
 
-    A stretch too short to tell gets the ratio of its run, a run without any the mean of all.
+    A stretch too short to tell gets the ratio of its run, a run without any the mean of all. What
+    the fish itself makes of a commanded frequency is divided out: its model multiplies by it.
+
+    Args:
+        dataset: measured runs.
+        fish: whose model reads the commands.
     """
     beats = beats_of(dataset)
     if not beats:
         return dataset
+    own = own_ratio(fish)
     ratios = by_run(beats)
     mean = float(np.mean([ratio for ratio, _ in ratios.values()]))
     known = {(beat.run, beat.row): beat.measured for beat in beats}
@@ -165,6 +171,16 @@ def with_measured_beats(dataset: Dataset) -> Dataset:
         values[:, _FREQUENCY] *= ratios.get(run.id, (mean, 0.0))[0]
         for row in range(len(values)):
             values[row, _FREQUENCY] = known.get((run.id, row), values[row, _FREQUENCY])
+        values[:, _FREQUENCY] /= own
         runs.append(replace(run, commands=CommandSteps(run.commands.times_s, values)))
     note = f"tail frequencies are measured ones, {mean:.3f} times the commanded ones in the mean"
+    if own != 1.0:
+        note += f"; commands are divided by {own:.3f}, which {fish.name} multiplies them by"
     return replace(dataset, runs=tuple(runs), notes=(*dataset.notes, note))
+
+
+def own_ratio(fish: FishParams) -> float:
+    """Recorded over commanded frequency by the fish's own tail and its recorder's clock."""
+    pace = fish.effects.get("frequency_scale", {}).get("scale", 1.0)
+    # Recorded time is true time over the clock's scale.
+    return float(pace * fish.effects.get("clock_scale", {}).get("scale", 1.0))

@@ -11,17 +11,16 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import ndtri
 
-from fish_env.diagnosis.causes import PARAMETER
 from fish_env.diagnosis.gain import Gain, Pair
-from fish_env.diagnosis.generic_forces import wrench_unit
 from fish_env.diagnosis.next_experiment import Proposal
-from fish_env.diagnosis.preconditions import Precondition
 from fish_env.diagnosis.residual_model import ResidualModel, Term
 from fish_env.effects.extended import PREFIX
 from fish_env.identification.filtering import NoiseModel
-from fish_env.identification.parameters import Baseline
-from fish_env.model.effect import Effect
-from fish_env.params.schema import FishParams
+from fish_env.identification.generic_forces import wrench_unit
+from fish_env.inference.budget import Budget
+from fish_env.inference.hypotheses import PARAMETER
+from fish_env.inference.preconditions import Precondition
+from fish_env.inference.vehicle import Coefficients, Effect
 
 FORMAT = "robofish-diagnosis/1"
 Plain = dict[str, Any]
@@ -30,9 +29,13 @@ Plain = dict[str, Any]
 class Identifiable(Protocol):
     """What is read of a problem."""
 
-    fish: FishParams
-    known: dict[str, Effect]
-    baseline: Baseline
+    @property
+    def known(self) -> Mapping[str, Effect]:
+        """Effects by name."""
+
+    @property
+    def baseline(self) -> Coefficients:
+        """Baseline coefficients."""
 
 
 class Identified(Protocol):
@@ -58,7 +61,7 @@ def cause_entry(fit: Identified, name: str) -> Plain:
     """A cause with its parameters: estimate, interval, unit."""
     if name.startswith(PARAMETER):
         path = name.removeprefix(PARAMETER)
-        units: Mapping[str, tuple[str, str]] = {"value": (path, fit.problem.fish.info(path).unit)}
+        units: Mapping[str, tuple[str, str]] = {"value": (path, fit.problem.baseline.unit(path))}
     else:
         parameters = fit.problem.known[name].parameters
         units = {p.name: (f"{PREFIX}{name}.{p.name}", p.unit) for p in parameters}
@@ -91,7 +94,7 @@ def coefficient_entries(fit: Identified, detectable: Mapping[str, float]) -> lis
             "prior_sd": float(baseline.sd[i]),
             "prior_sds_off": float((fit.estimates[i] - baseline.mean[i]) / baseline.sd[i]),
             "smallest_detectable": _in_units(detectable.get(path), float(baseline.sd[i])),
-            "unit": fit.problem.fish.info(path).unit,
+            "unit": baseline.unit(path),
         }
         for i, path in enumerate(baseline.paths)
     ]
@@ -125,6 +128,31 @@ def gain_entry(gain: Gain | None, units: Mapping[str, str] | None = None) -> Pla
         "rmse": {name: {**asdict(pair), **named.get(name, {})} for name, pair in gain.rmse.items()},
         "misfit": misfit_entry(gain.misfit),
         "share_of_reachable": share,
+    }
+
+
+def budget_entry(budget: Budget | None) -> Plain | None:
+    """The error budget: shares of the nominal simulation's misfit."""
+    if budget is None:
+        return None
+    shares = [
+        {
+            "name": share.name,
+            "share": share.share,
+            "ci95": None if share.ci95 is None else list(share.ci95),
+            "alone": share.alone,
+            "last": share.last,
+            "channels": share.channels,
+        }
+        for share in budget.shares
+    ]
+    return {
+        "runs": list(budget.runs),
+        "held_out": budget.held_out,
+        "misfit": budget.misfit,
+        "shares": shares,
+        "left": budget.left,
+        "left_ci95": None if budget.left_ci95 is None else list(budget.left_ci95),
     }
 
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.data.vocabulary import COMMANDS
 
-FloatArray = npt.NDArray[np.float64]
 Rows = tuple[tuple[float, float, float, float, float, float], ...]
 DURATION_S = 30.0
 STROKE = 0.5

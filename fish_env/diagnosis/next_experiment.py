@@ -9,23 +9,24 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from fish_env.diagnosis import open_loop
-from fish_env.diagnosis.attribution import Attribution
-from fish_env.diagnosis.causes import effect_values
+from fish_env.arrays import FloatArray
 from fish_env.diagnosis.manoeuvres import DURATION_S, MENU, Manoeuvre
-from fish_env.diagnosis.preconditions import Precondition
-from fish_env.diagnosis.verdict import Verdict
-from fish_env.identification.estimator import Fit
-from fish_env.identification.free import Z_STEP
-from fish_env.identification.problem import Point, Problem
+from fish_env.identification import open_loop
 from fish_env.identification.runs import RunData
-from fish_env.model.effect import Effect
+from fish_env.identification.series import SeriesProblem, series_of
+from fish_env.inference.attribution import Attribution
+from fish_env.inference.estimate.fit import Fit
+from fish_env.inference.estimate.free import Z_STEP
+from fish_env.inference.preconditions import Precondition
+from fish_env.inference.probes import effect_values
+from fish_env.inference.problem import Point, Problem
+from fish_env.inference.vehicle import Effect
+from fish_env.inference.verdict import Verdict
 
-FloatArray = npt.NDArray[np.float64]
 RATE_HZ = 25.0
 STEP_S = 0.02
 SHOWN = 25.0
@@ -56,7 +57,7 @@ def propose(
     """The manoeuvre of the menu that separates rivals, or shows causes the runs could not."""
     fit = attribution.accepted.fit
     others = {r.causes: r.fit.point for r in attribution.rivals}
-    rivals = rivals_of(verdict, others, shown, lambda name: _plausible(fit, name))
+    rivals = rivals_of(verdict, others, shown, lambda name: plausible(fit, name))
     if not rivals:
         return None
     points = list(rivals.values())
@@ -102,7 +103,7 @@ def plausible_sizes(effect: Effect) -> dict[str, float]:
     return sizes
 
 
-def _plausible(fit: Fit, name: str) -> Point:
+def plausible(fit: Fit, name: str) -> Point:
     """The present explanation with an effect at a plausible size."""
     values = effect_values(fit.problem, name, plausible_sizes(fit.problem.known[name]))
     bounds = {f.path: (f.lower, f.upper) for f in fit.problem.freedoms([name])}
@@ -112,14 +113,27 @@ def _plausible(fit: Fit, name: str) -> Point:
 
 def separation(fit: Fit, rivals: Sequence[Point], manoeuvre: Manoeuvre) -> FloatArray:
     """Squared distance of each rival that a refit cannot close, shape (rivals,)."""
-    problem = flown(fit, manoeuvre)
-    filtered = problem.filtered(fit.point, fit.noise)
+    slopes, differences = changes_on(flown(fit, manoeuvre), fit, fit.noise, rivals)
+    return unfollowed(slopes, differences, information_of(fit))
+
+
+def changes_on(
+    problem: Problem, fit: Fit, noise: Any, rivals: Sequence[Point]
+) -> tuple[FloatArray, FloatArray]:
+    """Slopes by the coefficients (D, n), and what each rival changes (D, m), on other data.
+
+    Args:
+        problem: the other data.
+        fit: the present explanation.
+        noise: its noise on them.
+        rivals: points, m of them.
+    """
+    filtered = problem.filtered(fit.point, noise)
     count = len(problem.baseline)
     nudged = [replace(fit.point, z=fit.point.z + Z_STEP * np.eye(count)[i]) for i in range(count)]
     z, effects = _lanes(problem, [fit.point, *nudged, *rivals])
-    changes = problem.changes(z, effects, fit.noise, filtered)
-    slopes, differences = changes[:count].T / Z_STEP, changes[count:].T
-    return unfollowed(slopes, differences, _information(fit, count))
+    changes = problem.changes(z, effects, noise, filtered)
+    return changes[:count].T / Z_STEP, changes[count:].T
 
 
 def unfollowed(slopes: FloatArray, differences: FloatArray, information: FloatArray) -> FloatArray:
@@ -136,7 +150,9 @@ def unfollowed(slopes: FloatArray, differences: FloatArray, information: FloatAr
     return np.asarray(np.einsum("dm,dm->m", left, left) + held)
 
 
-def _information(fit: Fit, count: int) -> FloatArray:
+def information_of(fit: Fit) -> FloatArray:
+    """What holds the coefficients already, priors included (n, n)."""
+    count = len(fit.problem.baseline)
     slopes = fit.linearised.slopes[:, :count]
     return np.asarray(slopes.T @ slopes + np.eye(count))
 
@@ -151,15 +167,15 @@ def _lanes(problem: Problem, points: Sequence[Point]) -> tuple[FloatArray, dict[
     return np.column_stack([point.z for point in points]), effects
 
 
-def flown(fit: Fit, manoeuvre: Manoeuvre) -> Problem:
+def flown(fit: Fit, manoeuvre: Manoeuvre) -> SeriesProblem:
     """The manoeuvre as the present explanation would swim it, without noise."""
-    blank = _blank(fit.problem, manoeuvre)
-    on_blank = fit.problem.with_runs([blank])
+    blank = _blank(series_of(fit), manoeuvre)
+    on_blank = series_of(fit).with_runs([blank])
     predicted = -open_loop.errors(on_blank, fit.point, fit.noise)[0]
-    return fit.problem.with_runs([replace(blank, measured=predicted)])
+    return series_of(fit).with_runs([replace(blank, measured=predicted)])
 
 
-def _blank(problem: Problem, manoeuvre: Manoeuvre) -> RunData:
+def _blank(problem: SeriesProblem, manoeuvre: Manoeuvre) -> RunData:
     """A run of zeros: prediction errors on it are the prediction, negative."""
     clock = np.arange(0.0, DURATION_S, 1.0 / RATE_HZ)
     substeps = np.full(len(clock), int(np.ceil(1.0 / RATE_HZ / STEP_S - 1e-9)), np.int64)

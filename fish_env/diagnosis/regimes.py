@@ -17,14 +17,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from fish_env.arrays import BoolArray, FloatArray, IntArray
 from fish_env.data.vocabulary import COMMANDS
 from fish_env.identification.filtering import Filtered
-from fish_env.identification.problem import Problem
 from fish_env.identification.runs import RunData
+from fish_env.identification.series import SeriesProblem
 from fish_env.model.state import BASE_STATES
 from fish_env.sensing import channels_from_states
 
-FloatArray = npt.NDArray[np.float64]
 DRAWS = 499
 FEWEST_SAMPLES = 20
 """A bin with fewer is shown but not judged."""
@@ -123,7 +123,7 @@ class Localisation:
     channels: tuple[str, ...]
     regimes: tuple[Regime, ...]
     energy: Mapping[str, FloatArray]
-    counts: Mapping[str, npt.NDArray[np.int64]]
+    counts: Mapping[str, IntArray]
     p_values: Mapping[str, FloatArray]
     overall: Mapping[str, float]
 
@@ -184,8 +184,8 @@ class Localisation:
 
 
 def localise_fits(
-    problem: Problem,
-    judged: tuple[list[Filtered], list[Filtered]],
+    problem: SeriesProblem,
+    judged: tuple[Sequence[Filtered], Sequence[Filtered]],
     rng: np.random.Generator,
 ) -> Localisation:
     """Where the baseline's one-step errors are larger than the noise that the accepted fit found.
@@ -320,7 +320,7 @@ def _shuffled(energies: Sequence[FloatArray], rng: np.random.Generator) -> Float
     return np.concatenate(turned)
 
 
-def _family_wise(energy: FloatArray, null: FloatArray, judged: npt.NDArray[np.bool_]) -> FloatArray:
+def _family_wise(energy: FloatArray, null: FloatArray, judged: BoolArray) -> FloatArray:
     """P-value of each cell against the largest departure of all cells in each shuffle."""
     p_values: FloatArray = np.full(energy.shape, np.nan)
     # The data are one of the arrangements that could have been, so they count among them.

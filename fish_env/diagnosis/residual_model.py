@@ -13,27 +13,26 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from fish_env.diagnosis.gain import by_window
-from fish_env.diagnosis.generic_forces import (
-    NOTHING,
+from fish_env.arrays import FloatArray, IntArray
+from fish_env.identification.filtering import Filtered, NoiseModel
+from fish_env.identification.generic_forces import (
+    BoundForces,
     GenericForces,
-    changes,
     generic_forces,
-    generic_signals,
     probes,
 )
-from fish_env.diagnosis.projection import Projector
-from fish_env.diagnosis.tails import chi2_log_tail
-from fish_env.identification.estimator import Fit, fit
-from fish_env.identification.filtering import Filtered, NoiseModel
-from fish_env.identification.phases import in_step
-from fish_env.identification.problem import Problem
 from fish_env.identification.runs import RunData
+from fish_env.identification.series import SeriesProblem, series_of
+from fish_env.inference.adequacy import NOTHING, generic_signals
+from fish_env.inference.estimate.fit import Fit, fit
+from fish_env.inference.estimate.free import evaluated
+from fish_env.inference.gain import by_window
+from fish_env.inference.problem import Problem
+from fish_env.inference.projection import Projector
+from fish_env.inference.tails import chi2_log_tail
 
-FloatArray = npt.NDArray[np.float64]
-Columns = npt.NDArray[np.int64]
+Columns = IntArray
 POOL = 32
 """Wrenches to choose from: those that the data ask for most, each alone."""
 MOST = 8
@@ -48,7 +47,7 @@ class Term:
     """One wrench: coefficient times function over its scale.
 
     Attributes:
-        function: what it depends on, see :func:`~fish_env.diagnosis.generic_forces.regressors`.
+        function: what it depends on, see ``generic_forces.regressors``.
         direction: which force or moment of the hull.
         scale: root mean square of the function over the fitted runs, in SI units (angles in rad,
             frequencies in Hz).
@@ -78,7 +77,7 @@ class Judged:
     gain_ci95: tuple[float, float]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ResidualModel:
     """A sum of wrenches.
 
@@ -87,12 +86,19 @@ class ResidualModel:
         beside: effects of the catalogue that are in the model too.
         noise: noise model without and with them.
         judged: how they do on other runs; None without any.
+        fit: everything else fitted with them in place.
     """
 
     terms: tuple[Term, ...]
     beside: tuple[str, ...]
     noise: tuple[NoiseModel, NoiseModel]
     judged: Judged | None
+    fit: Fit
+
+    @property
+    def held_out_gain(self) -> float | None:
+        """Log likelihood that the final runs gain; None without such runs."""
+        return None if self.judged is None else self.judged.gain
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +133,7 @@ def residual_model(
         None where the data ask for no wrench beyond chance, or where they are not explained better
         with those that they ask for: then no sum of simple functions is what is missing.
     """
-    like = forces = generic_forces(explanation.problem.runs, explanation.filtered)
+    like = forces = generic_forces(series_of(explanation).runs, explanation.filtered)
     state = _State(explanation, np.zeros(0, np.int64), np.zeros(0), np.zeros(0))
     for _ in range(rounds):
         chosen = _enlarged(state, forces, threshold)
@@ -143,7 +149,7 @@ def residual_model(
         if again is None:
             break
         state = replace(chosen, fit=again)
-        forces = generic_forces(again.problem.runs, again.filtered, like)
+        forces = generic_forces(series_of(again).runs, again.filtered, like)
     if not len(state.columns):
         return None
     terms = tuple(
@@ -151,18 +157,23 @@ def residual_model(
         for c, a, e in zip(state.columns, state.sizes, state.errors, strict=True)
     )
     judged = None if final is None else _judged(explanation, state, like, final)
-    return ResidualModel(terms, explanation.effects, (explanation.noise, state.fit.noise), judged)
+    return ResidualModel(
+        terms, explanation.effects, (explanation.noise, state.fit.noise), judged, state.fit
+    )
 
 
 def _enlarged(state: _State, forces: GenericForces, threshold: float) -> _State:
     """With the wrenches that are still asked for, without those no longer needed."""
     own, present = state.fit, list(state.columns)
     projector = Projector(own)
-    asked = sorted(generic_signals(own, forces, projector), key=lambda signal: signal[1].log_p)
+    bound = BoundForces(own, forces)
+    asked = sorted(generic_signals(bound, projector), key=lambda signal: signal[1].log_p)
     others = [column for column, _ in asked[:POOL] if column not in present]
     pool = np.array([*present, *others], np.int64)
     before = np.r_[state.sizes, np.zeros(len(others))] / probes(pool)
-    chooser = _Chooser(own, projector, changes(own, forces, pool), before, threshold)
+    chooser = _Chooser(
+        own, projector, own.linearised.whitened(bound.changes(pool).T).T, before, threshold
+    )
     chosen = chooser.chosen(list(range(len(present))))
     sizes, errors = chooser.sizes(chosen)
     unit = probes(pool[chosen])
@@ -213,7 +224,7 @@ class _Chooser:
         inverse = np.linalg.inv(self.all.projected[np.ix_(own, own)])
         more = inverse @ self.all.score[own]
         left = self.all.left[:, own]
-        inflation = self.projector.inflation(left, self.residuals + left @ more)
+        inflation = self.projector.variance_inflation(left, self.residuals + left @ more)
         return self.before[own] + more, np.sqrt(inflation * np.diag(inverse))
 
     def _log_p(self, chosen: Sequence[int]) -> FloatArray:
@@ -237,7 +248,8 @@ def _refitted(state: _State, forces: GenericForces) -> Fit | None:
     The objective is comparable, as it counts the disturbance that each needs.
     """
     own = state.fit
-    problem = own.problem.with_runs(_carrying(own.problem.runs, forces, state))
+    series = series_of(own)
+    problem = series.with_runs(_carrying(series.runs, forces, state))
     try:
         again = fit(problem, own.effects, own.point, own.noise, own.released, rounds=2)
     except np.linalg.LinAlgError:
@@ -256,20 +268,21 @@ def _carrying(runs: Sequence[RunData], forces: GenericForces, state: _State) -> 
     return result
 
 
-def _judged(explanation: Fit, state: _State, like: GenericForces, final: Problem) -> Judged:
+def _judged(explanation: Fit, state: _State, like: GenericForces, runs: Problem) -> Judged:
     """One-step predictions of other runs without and with the wrenches.
 
     The wrench follows from the motion, and the filtered motion from the wrench: filtered twice,
     both agree.
     """
-    before = in_step(final, explanation.point, explanation.noise)
+    assert isinstance(runs, SeriesProblem)
+    final, before = evaluated(runs, explanation.point, explanation.noise)
     own, after = state.fit, before
     for _ in range(2):
         forces = generic_forces(final.runs, after, like)
         carrying = final.with_runs(_carrying(final.runs, forces, state))
-        after = in_step(carrying, own.point, own.noise)
+        _, after = evaluated(carrying, own.point, own.noise)
     scores = [
-        np.concatenate(by_window(final.runs, [log_likelihoods(f) for f in filtered], np.nansum))
+        np.concatenate(by_window(final, log_likelihoods(final, filtered), np.nansum))
         for filtered in (before, after)
     ]
     gains = scores[1] - scores[0]
@@ -277,7 +290,16 @@ def _judged(explanation: Fit, state: _State, like: GenericForces, final: Problem
     return Judged(tuple(r.id for r in final.runs), gain, (gain - spread, gain + spread))
 
 
-def log_likelihoods(filtered: Filtered) -> FloatArray:
-    """Log likelihood of each sample and channel given all before (T, C), without the constant."""
-    scale = np.einsum("tii->ti", filtered.whitening)
-    return np.asarray(np.log(np.where(scale > 0.0, scale, 1.0)) - 0.5 * filtered.innovations**2)
+def log_likelihoods(problem: SeriesProblem, filtered: Sequence[Filtered]) -> FloatArray:
+    """Log likelihood of each value given all before (D,), NaN where nothing was measured.
+
+    Without the constant.
+
+    Args:
+        problem: the runs.
+        filtered: the same runs filtered.
+    """
+    scale = np.concatenate([np.einsum("tii->ti", own.whitening).ravel() for own in filtered])
+    residuals = np.concatenate([own.residuals for own in filtered])
+    values = np.log(np.where(scale > 0.0, scale, 1.0)) - 0.5 * residuals**2
+    return np.where(problem.measured, values, np.nan)

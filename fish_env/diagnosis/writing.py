@@ -7,11 +7,23 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from fish_env.params.io import save_fish
+from fish_env.diagnosis.written import replace_part
+from fish_env.files import write_text
+from fish_env.params.io import fish_outputs, save_fish
 from fish_env.params.schema import FishParams
 
-EXTENDING = ("cause", "parameters", "ambiguous")
-"""Verdicts that come with an extended model."""
+EXTENDED = "extended.yaml"
+
+
+def outputs(fish: FishParams, folder: Path) -> list[Path]:
+    """The files that a diagnosis of a fish writes into a folder, beside its figures.
+
+    Args:
+        fish: the fish; the extended one has the same tables.
+        folder: where they go.
+    """
+    names = ("diagnosis.json", "report.html")
+    return [*(folder / name for name in names), *fish_outputs(fish, folder / EXTENDED).values()]
 
 
 def write_answer(answer: Mapping[str, Any], extended: FishParams | None, folder: Path) -> None:
@@ -19,15 +31,14 @@ def write_answer(answer: Mapping[str, Any], extended: FishParams | None, folder:
 
     Args:
         answer: content of the first.
-        extended: the extended model; without one, a file of an earlier diagnosis is removed, as it
-            would contradict this one.
+        extended: the extended model; without one, that of an earlier diagnosis is removed, as it
+            would contradict this one. A file that no diagnosis wrote stays.
         folder: made if it is not there.
+
+    Raises:
+        OutputError: a file cannot be written.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     text = json.dumps(answer, indent=1, allow_nan=False)
-    (folder / "diagnosis.json").write_text(text + "\n", encoding="utf-8")
-    file = folder / "extended.yaml"
-    if extended is None:
-        file.unlink(missing_ok=True)
-    else:
-        save_fish(extended, file)
+    write_text(folder / "diagnosis.json", text + "\n")
+    written = [] if extended is None else save_fish(extended, folder / EXTENDED)
+    replace_part(folder, "extended model", written)

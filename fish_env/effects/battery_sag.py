@@ -31,7 +31,7 @@ EFFECT = Effect(
         ),
     ),
     hooks={"inputs": slow_down},
-    detunes=True,
+    drifts_in_phase=True,
     confusable_with=(
         "clock_scale",
         "frequency_scale",

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.effects.registry import catalogue, get_effect, load_effect_file
 from fish_env.errors import EffectError, ParameterError
 from fish_env.model.compose import Composition
@@ -17,7 +18,6 @@ from fish_env.model.runtime import Kernels, kernels
 from fish_env.params.packing import PATHS, pack_tables, pack_values
 from fish_env.params.schema import FishParams
 
-FloatArray = npt.NDArray[np.float64]
 EffectValues = Mapping[str, Mapping[str, float]]
 PREFIX = "effects."
 
@@ -136,12 +136,13 @@ def build_model(
         fish: parameters; its own ``effects`` are on.
         effects: further effects or other values, by name; they win over the file's.
         user_effects: effects of the caller's own. An unknown name in the fish's file is looked for
-            as ``<name>.py`` beside that file.
+            as ``<name>.py`` beside that file, which is run only if ``fish.trust_effects``.
         whole_catalogue: use the kernel with every effect even if all are off, so that parameters
             of any effect can be changed later without another kernel.
 
     Raises:
-        EffectError: an unknown effect or parameter, or a value out of bounds.
+        EffectError: an unknown effect or parameter, a value out of bounds, or an effect file that
+            is not trusted.
     """
     own = {effect.name: effect for effect in user_effects}
     for name in own.keys() & catalogue().keys():
@@ -163,9 +164,15 @@ def build_model(
 
 
 def _beside(fish: FishParams, name: str) -> Effect:
-    if fish.source_file is not None:
+    if fish.source_file is not None and name.isidentifier():
         candidate = fish.source_file.with_name(f"{name}.py")
         if candidate.is_file():
+            if not fish.trust_effects:
+                raise EffectError(
+                    f"{fish.source_file}: its effect '{name}' would run the Python file "
+                    f"{candidate}. Code beside data is run only if you trust it: read that file, "
+                    "then add --trust-effects (in Python: trust_effects=True)"
+                )
             effect = load_effect_file(candidate)
             if effect.name != name:
                 raise EffectError(f"{candidate} defines '{effect.name}', its file says '{name}'")

@@ -25,7 +25,7 @@ EFFECT = Effect(
         EffectParameter("scale", "-", 1.0, 0.2, 3.0, (0.9, 1.05), "beat over commanded beat"),
     ),
     hooks={"inputs": scale_frequency},
-    detunes=True,
+    drifts_in_phase=True,
     confusable_with=(
         "battery_sag",
         "clock_scale",

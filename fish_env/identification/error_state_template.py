@@ -10,10 +10,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from fish_env.identification.filter_algebra import BASE, N_ERROR, PHASE, angle, innovation
+from fish_env.identification.filter_algebra import BASE, PHASE, angle, innovation
+from fish_env.identification.state_blocks import N_ERROR, PHASE_COLUMN
 
 # --- completed by compose ---
 from fish_env.model.composed import (
+    ANGLE,
     DX,
     N_PARAMETERS,
     N_STATES,
@@ -32,6 +34,8 @@ from fish_env.model.composed import (
 # --- end ---
 
 WRENCH = PAR + N_PARAMETERS - 6
+STATE, EULER, DRIVE = 0, 1, 2  # kinds of channels
+PERTURB = 1e-5
 DIVERGED = 1e4
 STEP_S = 0.01
 SETTLING_STEPS = 100
@@ -89,12 +93,12 @@ def step_lanes_once(work, width, elapsed, h, pace, late, history, tables):
 def innovations_of(work, width, measured, codes, gain, bias, e):
     """Measured minus predicted channels of every lane, e (C, width).
 
-    Codes: 0-2 x y z, 3-5 roll pitch yaw, 6-8 u v w, 9-11 p q r.
+    A channel's code is its kind, its index and its column (see ``channels``).
     """
     for i in range(codes.shape[0]):
-        code = codes[i]
-        if (code < 3) | (code > 5):
-            row = X0 + code + (1 if code > 5 else 0)
+        kind, index = codes[i, 0], codes[i, 1]
+        if kind != EULER:
+            row = X0 + index if kind == STATE else ANGLE
             for k in range(width):
                 predicted = gain[i, k] * work[row * width + k] + bias[i, k]
                 e[i, k] = innovation(measured[i], predicted, False)
@@ -104,17 +108,17 @@ def innovations_of(work, width, measured, codes, gain, bias, e):
                 qx = work[(X0 + 4) * width + k]
                 qy = work[(X0 + 5) * width + k]
                 qz = work[(X0 + 6) * width + k]
-                if code == 3:
+                if index == 0:
                     sine = 2.0 * (qy * qz + qw * qx)
                     cosine = 1.0 - 2.0 * (qx * qx + qy * qy)
-                elif code == 4:
+                elif index == 1:
                     sine = min(max(2.0 * (qw * qy - qx * qz), -1.0), 1.0)
                     cosine = np.sqrt(1.0 - sine * sine)
                 else:
                     sine = 2.0 * (qx * qy + qw * qz)
                     cosine = 1.0 - 2.0 * (qy * qy + qz * qz)
                 predicted = gain[i, k] * angle(sine, cosine) + bias[i, k]
-                e[i, k] = innovation(measured[i], predicted, code != 4)
+                e[i, k] = innovation(measured[i], predicted, index != 1)
 
 
 @kernel
@@ -128,11 +132,11 @@ def turn_tail(work, width, error):
         row = TAIL_ROWS[j]
         for k in range(width):
             turning = work[(DX + PHASE) * width + k]
-            if (turning > 0.0) & (error[18, k] != 0.0):
+            if (turning > 0.0) & (error[PHASE_COLUMN, k] != 0.0):
                 per_phase = work[(DX + row) * width + k] / turning
-                work[(X0 + row) * width + k] += per_phase * error[18, k]
+                work[(X0 + row) * width + k] += per_phase * error[PHASE_COLUMN, k]
     for k in range(width):
-        work[(X0 + PHASE) * width + k] += error[18, k]
+        work[(X0 + PHASE) * width + k] += error[PHASE_COLUMN, k]
 
 
 @kernel
@@ -188,7 +192,11 @@ def difference(work, width, into):
 
 @kernel
 def observation_rows(work, width, codes, gain, measured, rows):
-    """d(channel)/d(error state) of lane 0, (C, 19); zero for a missing sample."""
+    """d(channel)/d(error state) of lane 0, (C, 19); zero for a missing sample.
+
+    What drives the fish shows its phase alone. That stays as it is over an interval, so the lane
+    that began with another phase shows the slope, that of what follows the phase included.
+    """
     qw = work[(X0 + 3) * width]
     qx = work[(X0 + 4) * width]
     qy = work[(X0 + 5) * width]
@@ -201,20 +209,23 @@ def observation_rows(work, width, codes, gain, measured, rows):
     for i in range(codes.shape[0]):
         for j in range(N_ERROR):
             rows[i, j] = 0.0
-        code = codes[i]
+        kind, index, column = codes[i, 0], codes[i, 1], codes[i, 2]
         size = gain[i] if measured[i] == measured[i] else 0.0
-        if code == 3:
-            rows[i, 3] = size
-            rows[i, 4] = size * sin_roll * tan_pitch
-            rows[i, 5] = size * cos_roll * tan_pitch
-        elif code == 4:
-            rows[i, 4] = size * cos_roll
-            rows[i, 5] = -size * sin_roll
-        elif code == 5:
-            rows[i, 4] = size * sin_roll / cosine
-            rows[i, 5] = size * cos_roll / cosine
+        if kind == STATE:
+            rows[i, column] = size
+        elif kind == DRIVE:
+            gap = work[ANGLE * width + column + 1] - work[ANGLE * width]
+            rows[i, column] = size * gap * (1.0 / PERTURB)
+        elif index == 0:
+            rows[i, column] = size
+            rows[i, column + 1] = size * sin_roll * tan_pitch
+            rows[i, column + 2] = size * cos_roll * tan_pitch
+        elif index == 1:
+            rows[i, column + 1] = size * cos_roll
+            rows[i, column + 2] = -size * sin_roll
         else:
-            rows[i, code] = size
+            rows[i, column + 1] = size * sin_roll / cosine
+            rows[i, column + 2] = size * cos_roll / cosine
 
 
 @kernel

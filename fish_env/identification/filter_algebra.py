@@ -6,16 +6,13 @@ import math
 
 import numpy as np
 
+from fish_env.identification.state_blocks import N_ERROR, N_MOVING
 from fish_env.model.jit import kernel
 from fish_env.model.state import BASE_STATES
 
 PHASE = BASE_STATES.index("tail_phase")
 BASE = len(BASE_STATES)  # rows of the fish itself, before those of effects
-N_ERROR = 19
-"""Error state: position 3, rotation 3, velocity 3, rates 3, wrench 6, tail phase."""
-N_MOVING = 12
-"""Its first rows, which the equations of motion move; wrench and phase follow by themselves."""
-WIDE, MOVING_WIDE = 24, 16
+WIDE, MOVING_WIDE = -(-N_ERROR // 8) * 8, -(-N_MOVING // 8) * 8
 """The same as whole vector registers. Columns beyond are zero: sums over a row are taken column by
 column at once, in registers, which pays only if no column is left over."""
 TOGETHER = 3
@@ -168,7 +165,7 @@ def update_covariance(p, rows, measured, noise_variance, s, w, seen, gain):
     for j in range(channels):
         for i in range(WIDE):
             seen[j, i] = 0.0
-        for m in range(N_MOVING):
+        for m in range(N_ERROR):
             slope = rows[j, m]
             if slope != 0.0:  # a channel shows one to three of them
                 for i in range(WIDE):
@@ -176,7 +173,7 @@ def update_covariance(p, rows, measured, noise_variance, s, w, seen, gain):
     for i in range(channels):
         for j in range(i + 1):
             s[i, j] = 0.0
-        for m in range(N_MOVING):
+        for m in range(N_ERROR):
             slope = rows[i, m]
             if slope != 0.0:
                 for j in range(i + 1):

@@ -13,19 +13,19 @@ import math
 import numpy as np
 
 from fish_env.identification.filter_algebra import (
-    N_ERROR,
-    N_MOVING,
     predict_covariance,
     room,
     update_covariance,
     widened,
 )
+from fish_env.identification.state_blocks import N_ERROR, N_MOVING
 
 # --- completed by compose ---
 from fish_env.model.composed import (
     DX,
     LATE_TAIL,
     N_STATES,
+    PERTURB,
     WORK_ROWS,
     WRENCH,
     X0,
@@ -45,7 +45,6 @@ from fish_env.model.composed import (
 
 FILTER_LANES = 24  # a fish's coefficients and an effect or two, each moved once
 EKF_LANES = 24  # the estimate and 19 neighbours, rounded up to whole vector registers
-PERTURB = 1e-5
 
 
 @kernel
@@ -105,7 +104,7 @@ def ekf_run(
         times: (m,) command times (s).
         values: (m, 5) commands.
         measured: (T, C), NaN where missing.
-        codes: (C,) channel codes.
+        codes: (C, 3) kind, index and column of each channel.
         noise_variance: (C,).
         covariance0: (19, 19) of the initial error state.
         wrench_variance: (6,) stationary variance of the wrench.
@@ -302,7 +301,7 @@ def filter_lanes(
         times: (m,) command times (s).
         values: (m, 5) commands.
         measured: (T, C), NaN where missing.
-        codes: (C,) channel codes.
+        codes: (C, 3) kind, index and column of each channel.
         k_in: (T, 19, C) gains.
         w_in: (T, C, C) whitening.
         wrench_decay_s: correlation time of the wrench.

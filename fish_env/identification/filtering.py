@@ -5,23 +5,30 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from threading import Lock
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray, IntArray
 from fish_env.effects.extended import ExtendedModel
 from fish_env.identification.applied_wrench import EFFECT as APPLIED_WRENCH
-from fish_env.identification.filter_algebra import N_ERROR, N_MOVING
-from fish_env.identification.runs import CHANNEL_CODES, RunData
+from fish_env.identification.channels import codes_of
+from fish_env.identification.runs import RunData
+from fish_env.identification.state_blocks import N_ERROR, N_MOVING
+from fish_env.identification.variation import (
+    COUNT,
+    varied_bias,
+    varied_delay,
+    varied_records,
+)
 from fish_env.model.history import history_rows
-from fish_env.model.runtime import Kernels, default_threads, kernels
+from fish_env.model.runtime import Kernels, kernels
 from fish_env.model.state import BASE_STATES
+from fish_env.threads import default_threads
 
-FloatArray = npt.NDArray[np.float64]
 POSITIONS = {"x": 0, "y": 1, "z": 2}
 TEMPLATES = tuple(
     Path(__file__).with_name(f"{name}_template.py") for name in ("error_state", "filter", "replay")
@@ -39,7 +46,8 @@ class NoiseModel:
         force_sd: stationary standard deviation of the disturbance force, each axis (N).
         moment_sd: of the disturbance moment, each axis (N m).
         correlation_s: correlation time of the disturbance (s).
-        phase_sd: how far the tail's phase wanders from its command in a second (rad/s^0.5).
+        phase_sd: random walk of the tail's phase about its command (rad/s^0.5).
+        spread: (K,) standard deviation over runs of what differs between them.
     """
 
     sensor_sd: FloatArray
@@ -47,6 +55,16 @@ class NoiseModel:
     moment_sd: float
     correlation_s: float
     phase_sd: float = 0.0
+    spread: FloatArray = field(default_factory=lambda: np.zeros(COUNT))
+
+    def is_close(self, other: NoiseModel, share: float) -> bool:
+        """Whether the disturbance of another noise model differs by less than a share of this."""
+        pairs = [
+            (self.force_sd, other.force_sd),
+            (self.moment_sd, other.moment_sd),
+            (self.correlation_s, other.correlation_s),
+        ]
+        return all(abs(np.log(b / a)) < share for a, b in pairs)
 
     @property
     def wrench_variance(self) -> FloatArray:
@@ -77,6 +95,11 @@ class Filtered:
     log_likelihood: float
     slopes: Slopes | None = None
     corners: bool = False
+
+    @property
+    def residuals(self) -> FloatArray:
+        """(T C,) whitened innovations, sample after sample."""
+        return self.innovations.ravel()
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,6 +133,14 @@ class Measurement:
     gain: FloatArray
     bias: FloatArray
 
+    def of_run(self, own: FloatArray, channels: Sequence[str]) -> Measurement:
+        """The same for a run with numbers of its own (K, N or 1)."""
+        bias = np.ascontiguousarray(varied_bias(self.bias, own, channels))
+        return Measurement(self.pace, varied_delay(self.delay, own), self.gain, bias)
+
+
+Job = tuple[RunData, "Filtered", int, FloatArray, FloatArray, Measurement, FloatArray, int, int]
+
 
 class RunFilter:
     """The filter of one model on some runs.
@@ -126,7 +157,7 @@ class RunFilter:
         self.model = model
         self.runs = tuple(runs)
         self.channels = tuple(channels)
-        self.codes = np.array([CHANNEL_CODES[name] for name in channels], np.int64)
+        self.codes = codes_of(channels)
         self.kernels = filter_kernels(model)
 
     def _history_rows(self, records: FloatArray, data: RunData) -> int:
@@ -149,10 +180,24 @@ class RunFilter:
                 states[3:7] = turned(states[3:7], -bias)
         return states
 
+    def _of_run(
+        self,
+        data: RunData,
+        records: FloatArray,
+        sensors: Measurement,
+        more: FloatArray | None = None,
+    ) -> tuple[FloatArray, Measurement]:
+        """Records and sensors of all lanes as a run's own numbers, and more of them, make them."""
+        own = data.variation[:, None] if more is None else data.variation[:, None] + more
+        if not own.any():
+            return records, sensors
+        varied = np.ascontiguousarray(varied_records(records, own))
+        return varied, sensors.of_run(own, self.channels)
+
     def run(
         self,
-        record: FloatArray,
-        measurement: Measurement,
+        records: FloatArray,
+        sensors: Measurement,
         noise: NoiseModel,
         keep_slopes: bool = False,
         corners: bool = False,
@@ -160,8 +205,8 @@ class RunFilter:
         """Filter every run with one parameter set.
 
         Args:
-            record: (parameters, 1).
-            measurement: for one lane.
+            records: (parameters, 1).
+            sensors: for one lane.
             noise: noise model.
             keep_slopes: keep what :meth:`replay` needs.
             corners: take the steps of motion with corners.
@@ -169,6 +214,7 @@ class RunFilter:
         entry = self.kernels.entry("ekf_run")
 
         def one(data: RunData) -> Filtered:
+            record, measurement = self._of_run(data, records, sensors)
             samples, channels = data.measured.shape
             states = len(self.kernels.state_names)
             k = np.zeros((samples, N_ERROR, channels))
@@ -228,10 +274,12 @@ class RunFilter:
         noise: NoiseModel,
         filtered: Sequence[Filtered],
         pushes: Pushes | None = None,
+        variation: FloatArray | None = None,
     ) -> FloatArray:
         """Whitened innovations of many parameter sets with given gains (N, residuals).
 
-        Run after run, sample after sample. ``pushes`` adds a prescribed wrench to each lane.
+        Run after run, sample after sample. ``pushes`` adds a prescribed wrench to each lane,
+        ``variation`` (K, N) adds to every run's own numbers.
         """
         entry, lanes = self.kernels.entry("filter_lanes"), self.kernels.module.FILTER_LANES
         count = records.shape[1]
@@ -244,20 +292,21 @@ class RunFilter:
         jobs = []
         places = [0, *ends[:-1]]
         for data, gains, place, basis in zip(self.runs, filtered, places, bases, strict=True):
-            state0 = self._starts(data, measurement)
+            record, sensors = self._of_run(data, records, measurement, variation)
+            state0 = self._starts(data, sensors)
             step = lanes * max(1, -(-count // (4 * lanes)))
             for first in range(0, count, step):
                 last = min(count, first + step)
-                jobs.append((data, gains, place, basis, state0, first, last))
+                jobs.append((data, gains, place, basis, record, sensors, state0, first, last))
 
-        def one(job: tuple[RunData, Filtered, int, FloatArray, FloatArray, int, int]) -> None:
-            data, gains, place, basis, state0, first, last = job
+        def one(job: Job) -> None:
+            data, gains, place, basis, record, sensors, state0, first, last = job
             entry(
-                state0, data.swimming, records, measurement.pace, measurement.delay,
-                measurement.gain, measurement.bias, data.clock,
+                state0, data.swimming, record, sensors.pace, sensors.delay,
+                sensors.gain, sensors.bias, data.clock,
                 steps_of(data, gains.corners), data.command_times, data.command_values,
                 data.measured, self.codes, gains.gains, gains.whitening,
-                noise.correlation_s, self._history_rows(records, data), data.known_wrench, basis,
+                noise.correlation_s, self._history_rows(record, data), data.known_wrench, basis,
                 column, size, self.model.tables, out, place, first, last,
             )  # fmt: skip
 
@@ -276,7 +325,7 @@ class Pushes:
     """
 
     bases: Sequence[FloatArray]
-    column: npt.NDArray[np.int64]
+    column: IntArray
     size: FloatArray
 
 
@@ -287,7 +336,7 @@ def turned(quaternion: FloatArray, angle: FloatArray) -> FloatArray:
     return np.array([c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w])
 
 
-def steps_of(data: RunData, corners: bool) -> npt.NDArray[np.int64]:
+def steps_of(data: RunData, corners: bool) -> IntArray:
     """(T,) RK4 steps up to each sample."""
     return data.corner_substeps if corners else data.substeps
 

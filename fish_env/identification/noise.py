@@ -8,14 +8,12 @@ from functools import cache
 from math import comb
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import minimize
 
+from fish_env.arrays import FloatArray
 from fish_env.data.schema import Dataset
 from fish_env.identification.filtering import NoiseModel
 from fish_env.params.schema import FishParams
-
-FloatArray = npt.NDArray[np.float64]
 
 ORDER = 4
 WINDOW = 30
@@ -85,6 +83,15 @@ class DisturbanceRange:
         pairs = ((force, self.force), (moment, self.moment), (correlation, self.correlation))
         return tuple(float(np.clip(value, *bounds)) for value, bounds in pairs)
 
+    def left_by(self, noise: NoiseModel) -> tuple[str, ...]:
+        """How a noise model's disturbance is at the end of this range, in words."""
+        found = []
+        if noise.force_sd > 0.98 * self.force[1]:
+            found.append(f"a disturbing force of {1e3 * noise.force_sd:.0f} mN or more")
+        if noise.moment_sd > 0.98 * self.moment[1]:
+            found.append(f"a disturbing moment of {1e3 * noise.moment_sd:.2g} mN m or more")
+        return tuple(found)
+
 
 def disturbance_range(fish: FishParams) -> DisturbanceRange:
     """Up to a thousandth of the weight, at a quarter of the hull's width, for up to ten seconds.
@@ -96,6 +103,11 @@ def disturbance_range(fish: FishParams) -> DisturbanceRange:
     force = 1e-3 * mass * fish.get("water.gravity")
     moment = 0.25 * float(np.cbrt(mass / fish.get("water.density"))) * force
     return DisturbanceRange((1e-4, force), (1e-6, moment), (0.05, 10.0))
+
+
+def small_disturbance(sensor_sd: FloatArray) -> NoiseModel:
+    """A disturbance of a few millinewton beside sensor noise (C,)."""
+    return NoiseModel(sensor_sd, 3e-3, 1e-4, 1.0)
 
 
 def fit_noise(
@@ -119,7 +131,7 @@ def fit_noise(
 
     def model(x: FloatArray, sensor: FloatArray) -> NoiseModel:
         force, moment, correlation = within.nearest(*np.exp(x))
-        return NoiseModel(sensor, force, moment, correlation, start.phase_sd)
+        return NoiseModel(sensor, force, moment, correlation, start.phase_sd, start.spread)
 
     def disturbance(noise: NoiseModel, effort: int) -> NoiseModel:
         known = np.log([noise.force_sd, noise.moment_sd, noise.correlation_s])

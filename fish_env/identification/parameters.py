@@ -1,83 +1,27 @@
-"""Free parameters of a problem: baseline coefficients under their priors, and effect parameters."""
+"""Baseline coefficients of a fish under their priors, and what effects do to its sensors."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
-from scipy.optimize import bisect
 
+from fish_env.arrays import FloatArray
 from fish_env.effects.extended import PREFIX, ExtendedModel
 from fish_env.errors import ParameterError
 from fish_env.identification.filtering import Measurement
-from fish_env.model.effect import Effect, EffectParameter
+from fish_env.inference.hypotheses import effects_of
+from fish_env.inference.vehicle import Coefficients
+from fish_env.model.effect import Effect
 from fish_env.params.packing import PATHS
 from fish_env.params.schema import FishParams
 
-FloatArray = npt.NDArray[np.float64]
+ALIKE = (frozenset({"body.plane_xz.drag.c0", "body.plane_xy.drag.c0"}),)
+"""Coefficients that act alike: both planes' drags at zero incidence brake along the fish."""
 
 
-def effects_of(paths: Iterable[str]) -> set[str]:
-    """Names of the effects that some effect parameters belong to."""
-    return {path.removeprefix(PREFIX).split(".")[0] for path in paths}
-
-
-@dataclass(frozen=True)
-class EffectFreedom:
-    """A free parameter of an effect.
-
-    Attributes:
-        path: ``effects.<effect>.<parameter>``.
-        lower: smallest value allowed.
-        upper: largest value allowed.
-        step: size for finite differences, about a hundredth of what matters.
-        least: values between neutral and this one are too quick to be simulated; minus infinity
-            where none is.
-    """
-
-    path: str
-    lower: float
-    upper: float
-    step: float
-    least: float
-
-
-def freedoms(effect: Effect, step: float) -> tuple[EffectFreedom, ...]:
-    """All parameters of an effect, free within their physical bounds, for RK4 steps (s)."""
-    return tuple(
-        EffectFreedom(
-            f"{PREFIX}{effect.name}.{p.name}",
-            p.lower,
-            p.upper,
-            0.02 * (p.plausible[1] - p.plausible[0]),
-            least_followed(effect, p, step),
-        )
-        for p in effect.parameters
-    )
-
-
-def least_followed(effect: Effect, parameter: EffectParameter, step: float) -> float:
-    """Smallest value of one parameter above neutral that RK4 steps (s) follow.
-
-    Minus infinity where they follow any, and where the effect is as quick at every size: it then
-    has short steps of its own.
-    """
-
-    def is_followed(value: float) -> bool:
-        return effect.is_followed({**effect.neutral, parameter.name: value}, step)
-
-    neutral, far = parameter.neutral, parameter.plausible[1]
-    near = neutral + 1e-9 * (far - neutral)
-    if not np.isfinite(neutral) or is_followed(near) or not is_followed(far):
-        return -np.inf
-    return float(bisect(lambda value: is_followed(value) - 0.5, near, far))
-
-
-class Baseline:
-    """Baseline coefficients with a prior, in units where the prior is a standard normal.
+class Baseline(Coefficients):
+    """Baseline coefficients of a fish with a prior.
 
     Args:
         fish: nominal parameters and priors.
@@ -88,40 +32,61 @@ class Baseline:
         self.fish = fish
         read = set(PATHS.values()) - {"weight_block.crank.l1", "weight_block.crank.l2"}
         free = [p for p in fish.values() if p in read and fish.prior_sd(p) > 0]
-        self.paths = tuple(free if paths is None else paths)
-        self.mean = np.array([fish.get(path) for path in self.paths])
-        covariance = fish.prior_covariance(list(self.paths))
-        self.sd = np.sqrt(np.diag(covariance))
-        correlation = covariance / np.outer(self.sd, self.sd)
-        self.factor = self.sd[:, None] * np.linalg.cholesky(correlation)
+        chosen = tuple(free if paths is None else paths)
+        known = [fish.info(path) for path in chosen]
+        super().__init__(
+            chosen,
+            np.array([fish.get(path) for path in chosen]),
+            fish.prior_covariance(list(chosen)),
+            (np.array([i.lower for i in known]), np.array([i.upper for i in known])),
+            [i.unit for i in known],
+            self._is_a_fish,
+        )
 
-    def __len__(self) -> int:
-        """Number of coefficients."""
-        return len(self.paths)
-
-    def values(self, z: FloatArray) -> FloatArray:
-        """Coefficients (n, N) of normalised ones (n, N)."""
-        return self.mean[:, None] + self.factor @ z
-
-    def possible(self, z: FloatArray) -> bool:
-        """Whether a fish can have normalised coefficients (n,), each by itself and all together."""
-        values = self.values(z[:, None])[:, 0].tolist()
+    def _is_a_fish(self, values: Mapping[str, float]) -> bool:
         try:
-            self.fish.replace(dict(zip(self.paths, values, strict=True)), "identified")
+            self.fish.replace(dict(values), "identified")
         except ParameterError:
             return False
         return True
 
-    def all_possible(self, z: FloatArray) -> npt.NDArray[np.bool_]:
-        """The same of many (n, N): (N,), and no longer for those that are equal."""
-        distinct, which = np.unique(z, axis=1, return_inverse=True)
-        return np.array([self.possible(one) for one in distinct.T])[which.ravel()]
 
-    @cached_property
-    def bounds(self) -> tuple[FloatArray, FloatArray]:
-        """Physical bounds (n,), (n,)."""
-        known = [self.fish.info(path) for path in self.paths]
-        return np.array([i.lower for i in known]), np.array([i.upper for i in known])
+def neutral_values(
+    model: ExtendedModel, known: Mapping[str, Effect], names: Iterable[str]
+) -> dict[str, float]:
+    """Parameters of effects as the fish's file has them, neutral where it says nothing."""
+    values: dict[str, float] = {}
+    for name in names:
+        own = model.effects.get(name, known[name].neutral)
+        values |= {f"{PREFIX}{name}.{p}": v for p, v in own.items()}
+    return values
+
+
+def changes_of(
+    model: ExtendedModel,
+    known: Mapping[str, Effect],
+    baseline: Coefficients,
+    z: FloatArray,
+    effects: Mapping[str, FloatArray],
+    channels: Sequence[str],
+) -> tuple[dict[str, FloatArray], Measurement]:
+    """Values of parameters by path, each (N,), and what the sensors do, for N points.
+
+    Args:
+        model: the fish.
+        known: effects by name.
+        baseline: free coefficients.
+        z: (n, N) coefficients in units of their prior.
+        effects: effect parameter -> (N,).
+        channels: measured channels.
+    """
+    values = dict(zip(baseline.paths, baseline.values(z), strict=True))
+    names = effects_of(effects)
+    moving = {n for n in names if known[n].acts_on_motion}
+    values |= {path: own for path, own in effects.items() if effects_of([path]) <= moving}
+    sensing = [known[n] for n in sorted(names - moving)]
+    own = [e for e in model.measurement if e.name not in names]
+    return values, measurement_of(model, [*own, *sensing], effects, channels, z.shape[1])
 
 
 def measurement_of(

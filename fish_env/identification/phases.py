@@ -6,17 +6,18 @@ puts right. So each run's beginning is filtered from phases all round and then a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import Protocol, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
-from fish_env.identification.filtering import Filtered, NoiseModel, RunFilter
-from fish_env.identification.problem import Point, Problem
+from fish_env.arrays import FloatArray
+from fish_env.identification.filtering import Measurement, NoiseModel, RunFilter
 from fish_env.identification.runs import FREQUENCY, RunData
+from fish_env.identification.state_blocks import PHASE_COLUMN
+from fish_env.inference.problem import Point
 
-FloatArray = npt.NDArray[np.float64]
 COARSE = np.arange(24, dtype=np.float64) * (np.pi / 12.0)
 FINE = np.arange(-2, 3, dtype=np.float64) * 0.065
 """Phases tried: all round, then around the best (rad)."""
@@ -24,10 +25,36 @@ COARSE_SD, FINE_SD = 0.15, 0.08
 """How far the filter may take the phase to be off (rad). Where that is much, the first samples turn
 it by what else they do not fit, and it has been settled wrongly before they are understood."""
 WINDOW_S = 3.0
-AMPLITUDE, PHASE, PHASE_ERROR = 1, 13, 18
+AMPLITUDE, PHASE = 1, 13
 
 
-def settle_phases(problem: Problem, point: Point, noise: NoiseModel) -> Problem:
+class Filtering(Protocol):
+    """Runs and the filter on them."""
+
+    runs: tuple[RunData, ...]
+    channels: tuple[str, ...]
+
+    def lane(self, point: Point) -> tuple[FloatArray, Measurement]:
+        """Parameter record (parameters, 1) of a point, and what its sensors do."""
+        ...
+
+    def filter_for(self, effects: Iterable[str]) -> RunFilter:
+        """The quickest filter that computes with these effect parameters."""
+        ...
+
+    def refines_steps(self, effects: Iterable[str]) -> bool:
+        """Whether one of these effect parameters makes the tail's rate jump."""
+        ...
+
+    def with_runs(self: S, runs: Sequence[RunData]) -> S:
+        """The same on other runs."""
+        ...
+
+
+S = TypeVar("S", bound=Filtering)
+
+
+def settle_phases(problem: S, point: Point, noise: NoiseModel) -> S:
     """The problem with the likeliest starting phase of every run whose phase is unknown.
 
     Args:
@@ -47,16 +74,8 @@ def settle_phases(problem: Problem, point: Point, noise: NoiseModel) -> Problem:
     return problem.with_runs(runs)
 
 
-def in_step(problem: Problem, point: Point, noise: NoiseModel) -> list[Filtered]:
-    """Every run filtered from the starting phase that suits these parameters best.
-
-    Runs that were not fitted, or were fitted with other parameters, have another phase or none.
-    """
-    return settle_phases(problem, point, noise).filtered(point, noise)
-
-
 def _likeliest(
-    problem: Problem,
+    problem: Filtering,
     point: Point,
     noise: NoiseModel,
     tried: Sequence[tuple[RunData, FloatArray]],
@@ -66,7 +85,7 @@ def _likeliest(
     trials = [_starting(_beginning(run), phase, spread) for run, own in tried for phase in own]
     judge = RunFilter(problem.filter_for(point.effects).model, trials, problem.channels)
     record, measurement = problem.lane(point)
-    corners = problem.has_corners(point.effects)
+    corners = problem.refines_steps(point.effects)
     values = [r.log_likelihood for r in judge.run(record, measurement, noise, corners=corners)]
     best = np.argmax(np.reshape(values, (len(tried), -1)), axis=1)
     return [float(own[i]) for (_, own), i in zip(tried, best, strict=True)]
@@ -76,7 +95,7 @@ def _starting(run: RunData, phase: float, spread: float) -> RunData:
     """The run with a starting phase (rad), known to within a spread (rad)."""
     state, covariance = run.state0.copy(), run.covariance0.copy()
     state[PHASE] = phase
-    covariance[PHASE_ERROR, PHASE_ERROR] = spread**2
+    covariance[PHASE_COLUMN, PHASE_COLUMN] = spread**2
     return replace(run, state0=state, covariance0=covariance)
 
 

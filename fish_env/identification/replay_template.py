@@ -13,13 +13,12 @@ import numpy as np
 
 from fish_env.identification.filter_algebra import (
     MOVING_WIDE,
-    N_ERROR,
-    N_MOVING,
     predict_covariance,
     room,
     update_covariance,
     widened,
 )
+from fish_env.identification.state_blocks import N_ERROR, N_MOVING
 
 # --- completed by compose ---
 from fish_env.model.composed import entry_point
@@ -80,7 +79,7 @@ def replay_run(
         log_likelihood -= 0.5 * log_det
         for i in range(channels):
             total = raw_in[sample, i]
-            for j in range(N_MOVING):
+            for j in range(N_ERROR):
                 total -= h_in[sample, i, j] * stray[j]
             e[i] = total
         for i in range(channels):

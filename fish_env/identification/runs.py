@@ -3,30 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import BoolArray, FloatArray, IntArray
 from fish_env.data.schema import Run
 from fish_env.data.vocabulary import COMMANDS
 from fish_env.errors import DatasetError
-from fish_env.identification.filter_algebra import N_ERROR
+from fish_env.identification.channels import BY_NAME, Kind
+from fish_env.identification.state_blocks import N_ERROR, PHASE_COLUMN, columns
+from fish_env.identification.variation import COUNT
 from fish_env.model.frames import quaternion_from_euler
 from fish_env.model.state import BASE_STATES
 
-FloatArray = npt.NDArray[np.float64]
-CHANNEL_CODES = {
-    name: code
-    for code, name in enumerate(
-        ("x", "y", "z", "roll", "pitch", "yaw", "u", "v", "w", "p", "q", "r")
-    )
-}
-"""Channels the filter uses, with the code its kernel knows them by."""
-POSITION, ROTATION, VELOCITY, RATE, PHASE = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), 18
-
-
+POSITION, ROTATION = columns("position"), columns("rotation")
+VELOCITY, RATE = columns("velocity"), columns("rate")
+PHASE = PHASE_COLUMN
 UNTOLD_S = 0.15
 """A record does not say what a servo was told before it begins, and a late one still follows that:
 of a run from rest, the first samples judge nothing (s)."""
@@ -78,13 +72,14 @@ class RunData:
             with whatever distorts those; otherwise they are true.
         wrench: (T, 6) known force (N) and moment (N m) on the hull, body frame, from each sample to
             the next; None for none.
+        variation: (K,) what this run differs in from the others, see ``variation.VARIATIONS``.
     """
 
     id: str
     condition: str | None
     clock: FloatArray
-    substeps: npt.NDArray[np.int64]
-    fresh: npt.NDArray[np.bool_]
+    substeps: IntArray
+    fresh: BoolArray
     command_times: FloatArray
     command_values: FloatArray
     measured: FloatArray
@@ -94,6 +89,7 @@ class RunData:
     swimming: bool = False
     as_measured: bool = True
     wrench: FloatArray | None = None
+    variation: FloatArray = field(default_factory=lambda: np.zeros(COUNT))
 
     @property
     def known_wrench(self) -> FloatArray:
@@ -101,7 +97,7 @@ class RunData:
         return self.wrench if self.wrench is not None else np.zeros((0, 6))
 
     @property
-    def corner_substeps(self) -> npt.NDArray[np.int64]:
+    def corner_substeps(self) -> IntArray:
         """(T,) steps for motion with corners: finer everywhere."""
         return CORNERS * self.substeps
 
@@ -154,11 +150,6 @@ class RunData:
         return float(self.clock[-1])
 
 
-def usable_channels(names: Sequence[str]) -> tuple[str, ...]:
-    """Channels among those measured that the filter uses, in its order."""
-    return tuple(name for name in CHANNEL_CODES if name in names)
-
-
 def prepare_run(
     run: Run, channels: Sequence[str], noise_sd: FloatArray, dt: float = 0.01
 ) -> RunData:
@@ -174,7 +165,7 @@ def prepare_run(
         DatasetError: the run has none of the channels.
     """
     if not channels:
-        raise DatasetError(f"run {run.id}: none of {', '.join(CHANNEL_CODES)} is measured")
+        raise DatasetError(f"run {run.id}: none of {', '.join(BY_NAME)} is measured")
     clock, measured = _merged(
         run.time_s - run.time_s[0], np.column_stack([run.channels[name] for name in channels])
     )
@@ -184,6 +175,8 @@ def prepare_run(
     state0, covariance0 = _initial(run, channels, measured, clock, noise_sd)
     if run.start == "rest":
         measured[clock < UNTOLD_S] = np.nan
+    # Where the tail is at the first sample is known only once it has moved.
+    measured[0, [BY_NAME[name].kind == Kind.DRIVE for name in channels]] = np.nan
     return RunData(
         run.id,
         run.condition,
@@ -213,19 +206,19 @@ def _commands(run: Run, switches: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.ascontiguousarray(switches), np.ascontiguousarray(values)
 
 
-def _steps(clock: FloatArray, longest: float | FloatArray) -> npt.NDArray[np.int64]:
+def _steps(clock: FloatArray, longest: float | FloatArray) -> IntArray:
     spans = np.diff(clock, prepend=0.0)
     return np.maximum(1, np.ceil(spans / longest - 1e-9)).astype(np.int64)
 
 
-def _jumped(commands: FloatArray) -> npt.NDArray[np.bool_]:
+def _jumped(commands: FloatArray) -> BoolArray:
     """Which switches (m,) of commands (m, 5) are jumps; the first one comes out of the unknown."""
     least = np.array([JUMPS[name] for name in COMMANDS])
     large = np.abs(np.diff(commands, axis=0)) > least
     return np.concatenate([[True], large.any(axis=1)])
 
 
-def _after(switches: FloatArray, clock: FloatArray) -> npt.NDArray[np.bool_]:
+def _after(switches: FloatArray, clock: FloatArray) -> BoolArray:
     """Whether the interval before each sample lies, in part, in the moment after a jump."""
     last = np.searchsorted(switches, clock - SAME_INSTANT_S) - 1
     begin = np.concatenate([clock[:1], clock[:-1]])

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fish_env.identification.estimator import default_noise, objective_at
-from fish_env.identification.problem import Point, Problem
+from fish_env.identification.series import SeriesProblem
+from fish_env.inference.estimate.fit import objective_at
+from fish_env.inference.problem import Point
 from fish_env.model.effect import Effect
 
 SHARES = (0.1, 0.4, 1.0)
@@ -15,14 +16,14 @@ SHARES = (0.1, 0.4, 1.0)
 RUNS = 3
 
 
-def likely_start(problem: Problem, effects: Sequence[str]) -> Point:
+def likely_start(problem: SeriesProblem, effects: Sequence[str]) -> Point:
     """The likeliest of some points over the plausible range of each effect, one effect at a time.
 
     Args:
         problem: some of its runs are judged with nominal coefficients.
         effects: effects that will be free.
     """
-    few, noise = problem.subset(RUNS), default_noise(problem)
+    few, noise = problem.subset(RUNS), problem.default_noise()
     best = Point(np.zeros(len(problem.baseline)), problem.neutral(effects))
     for name in effects:
         points = [best, *(_moved(best, problem.known[name], share) for share in SHARES)]

@@ -6,14 +6,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.effects.extended import PREFIX
-from fish_env.identification.estimator import Fit
+from fish_env.identification.series import series_of
+from fish_env.inference.estimate.fit import Fit
 from fish_env.params.provenance import Posterior
 from fish_env.params.schema import FishParams
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def identified_fish(fit: Fit, name: str) -> FishParams:
@@ -25,9 +24,10 @@ def identified_fish(fit: Fit, name: str) -> FishParams:
         fit: result of an identification.
         name: name of the new fish.
     """
-    source = f"identified from {fit.problem.dataset.name}, {len(fit.problem.runs)} runs"
+    problem = series_of(fit)
+    source = f"identified from {problem.dataset.name}, {len(problem.runs)} runs"
     posterior = posterior_of(fit.names, fit.estimates, fit.covariance, validity(fit))
-    return with_posterior(fit.problem.fish, posterior, name, source)
+    return with_posterior(problem.fish, posterior, name, source)
 
 
 def posterior_of(
@@ -54,7 +54,7 @@ def with_posterior(fish: FishParams, posterior: Posterior, name: str, source: st
 def validity(fit: Fit) -> dict[str, Any]:
     """Ranges of the motion and of the commands behind a fit, (lowest, highest), SI."""
     states = np.concatenate([f.states for f in fit.filtered])
-    commands = np.concatenate([run.commands[1] for run in fit.problem.runs])
+    commands = np.concatenate([run.commands[1] for run in series_of(fit).runs])
     rows = {"surge": 7, "sway": 8, "heave": 9, "depth": 2, "roll_rate": 10, "pitch_rate": 11}
     rows["yaw_rate"] = 12
     ranges: dict[str, Any] = {name: _range(states[:, row]) for name, row in rows.items()}

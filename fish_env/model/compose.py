@@ -8,15 +8,19 @@ from __future__ import annotations
 
 import hashlib
 import importlib.util
-import os
 import sys
+import warnings
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
+from fish_env.errors import OutputError
+from fish_env.files import write_text
 from fish_env.model import jit
 from fish_env.model.effect import STAGES, Effect
 from fish_env.model.emit import BASE_TERMS, HEADER, Emitter
+from fish_env.model.kernel_cache import cache_root
 from fish_env.model.state import BASE_STATES
 from fish_env.params.packing import RECORD_FIELDS
 
@@ -108,7 +112,7 @@ def cache_folder(composition: Composition) -> Path:
         if effect.file is None
         for hook in (*effect.hooks.values(), effect.initial_states)
     ]
-    return jit.cache_root() / jit.source_hash(files, codes)
+    return cache_root() / jit.source_hash(files, codes)
 
 
 def load(composition: Composition) -> ModuleType:
@@ -117,12 +121,31 @@ def load(composition: Composition) -> ModuleType:
     name = f"robofish_composed_{composition.label}_{folder.name}"
     if name in sys.modules:
         return sys.modules[name]
-    path = folder / f"{composition.label}.py"
-    if not path.exists():
-        folder.mkdir(parents=True, exist_ok=True)
-        temporary = path.with_suffix(f".{os.getpid()}-{id(composition)}.tmp")
-        temporary.write_text(composition.source(), encoding="utf-8")
-        temporary.replace(path)
+    path, source = folder / f"{composition.label}.py", composition.source()
+    kept = _kept(path, source)
+    try:
+        module = _executed(composition, name, path, None if kept else source)
+    except (EOFError, ValueError, TypeError):  # a damaged bytecode file; the source is as it should
+        Path(importlib.util.cache_from_source(str(path))).unlink(missing_ok=True)
+        module = _executed(composition, name, path, None if kept else source)
+    return module
+
+
+def _kept(path: Path, source: str) -> bool:
+    """Whether the source stands in its file; it is put there if it is missing or damaged."""
+    with suppress(OSError, UnicodeDecodeError):
+        if path.read_text(encoding="utf-8") == source:
+            return True
+    try:
+        write_text(path, source)
+    except OutputError as error:
+        warnings.warn(f"{error}; the kernels are compiled for this process alone", stacklevel=2)
+        return False
+    return True
+
+
+def _executed(composition: Composition, name: str, path: Path, source: str | None) -> ModuleType:
+    """The module of a file, or of a text that stands for it."""
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None
     assert spec.loader is not None
@@ -130,7 +153,14 @@ def load(composition: Composition) -> ModuleType:
     for effect in composition.effects:
         _inject(module, effect)
     sys.modules[name] = module
-    spec.loader.exec_module(module)
+    try:
+        if source is None:
+            spec.loader.exec_module(module)
+        else:
+            exec(compile(source, str(path), "exec"), vars(module))
+    except BaseException:
+        del sys.modules[name]
+        raise
     return module
 
 

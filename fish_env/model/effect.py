@@ -37,11 +37,13 @@ from collections import namedtuple
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from math import inf, isfinite, isnan
+from math import isfinite, isnan
 from pathlib import Path
 from typing import Any
 
 from fish_env.errors import EffectError
+from fish_env.inference.effects import EffectParameter as EffectParameter
+from fish_env.inference.effects import Switched
 
 STAGES = (
     "inputs",
@@ -66,33 +68,8 @@ FOLLOWED = 0.9
 """Steps of RK4 that a time constant has to last to be followed."""
 
 
-@dataclass(frozen=True)
-class EffectParameter:
-    """One parameter of an effect.
-
-    Attributes:
-        name: public name, as in files, reports and on the command line.
-        unit: SI unit, ``-`` when it has none.
-        neutral: value at which the effect is off (may be infinite).
-        lower: smallest physically meaningful value.
-        upper: largest physically meaningful value.
-        plausible: range (low, high) that a real robot of this size may show.
-        description: what it is.
-        shapes: it only says where, when or how the effect acts; other parameters switch it on.
-    """
-
-    name: str
-    unit: str
-    neutral: float
-    lower: float = -inf
-    upper: float = inf
-    plausible: tuple[float, float] = (-1.0, 1.0)
-    description: str = ""
-    shapes: bool = False
-
-
 @dataclass(frozen=True, eq=False)
-class Effect:
+class Effect(Switched):
     """A physical effect that the baseline model leaves out.
 
     Attributes:
@@ -114,8 +91,8 @@ class Effect:
         time_scale: parameters -> its fastest time constant (s); a physics step must not be longer.
         step_error: share of its effect that the identification gets wrong, in its finer steps and
             extrapolated, for an effect that makes the tail's rate jump. Above zero, it takes those.
-        detunes: whether the tail runs ever further out of step with its command, so that what a
-            large size does says little of what a small one does.
+        drifts_in_phase: whether the tail runs ever further out of step with its command, so that
+            what a large size does says little of what a small one does.
         equals: baseline coefficients (paths) other values of which do exactly the same.
         confusable_with: names of effects with a similar signature.
         file: source file, for effects that users bring.
@@ -137,7 +114,7 @@ class Effect:
     measure: Callable[..., Any] | None = None
     time_scale: Callable[[Mapping[str, float]], float] | None = None
     step_error: float = 0.0
-    detunes: bool = False
+    drifts_in_phase: bool = False
     equals: tuple[str, ...] = ()
     confusable_with: tuple[str, ...] = ()
     file: Path | None = None
@@ -171,16 +148,6 @@ class Effect:
     def record_type(self) -> type:
         """Named tuple that hooks receive as ``e``."""
         return namedtuple(f"{self.name}_parameters", [p.name for p in self.parameters])
-
-    @property
-    def neutral(self) -> dict[str, float]:
-        """Parameter values that switch the effect off."""
-        return {p.name: p.neutral for p in self.parameters}
-
-    @property
-    def switching(self) -> tuple[EffectParameter, ...]:
-        """The parameters that switch it on; the others only shape it."""
-        return tuple(p for p in self.parameters if not p.shapes)
 
     @property
     def acts_on_motion(self) -> bool:

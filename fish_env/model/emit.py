@@ -101,7 +101,8 @@ class Emitter:
 
     def derivative(self) -> str:
         """d(state)/dt of one lane."""
-        lines = [*self.evaluation(), *self.total(), *self.accelerations(), *self.rates()]
+        lines = [*self.evaluation(), "work[ANGLE * width + k] = tail.angle"]
+        lines += [*self.total(), *self.accelerations(), *self.rates()]
         return self.function("lane_derivative", "k, width, elapsed, shift, work, tables", lines)
 
     def terms(self) -> str:

@@ -14,8 +14,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray, IntArray
 from fish_env.model.inputs import with_tail_command
 from fish_env.model.jit import kernel
 
@@ -38,7 +38,6 @@ TOLD = (*HEARD, "delay")
 RECORD = len(TOLD)
 """Numbers of a slot: the time at which a step began (s), then what was told."""
 
-FloatArray = npt.NDArray[np.float64]
 _TWO_PI = 6.283185307179586
 _ROUNDING = 1e-9  # s; times closer than this are one
 
@@ -140,7 +139,7 @@ def history_rows_on(grid: Grid, longest_delay: float) -> int:
     """Rows of a history that reaches back far enough on this grid."""
     if longest_delay <= 0.0:
         return 0
-    counts: npt.NDArray[np.int64] = grid.steps
+    counts: IntArray = grid.steps
     index = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
     begins = np.repeat(grid.starts, counts) + index * np.repeat(grid.sizes, counts)
     reached = np.searchsorted(begins, begins - longest_delay - 2 * _ROUNDING)
@@ -151,7 +150,7 @@ def _rows(slots: int) -> int:
     return 1 + RECORD * (1 << (slots - 1).bit_length())
 
 
-def forget(history: FloatArray, lanes: npt.NDArray[np.int64], rows: int) -> FloatArray:
+def forget(history: FloatArray, lanes: IntArray, rows: int) -> FloatArray:
     """Let fish begin anew, as told nothing yet.
 
     Args:

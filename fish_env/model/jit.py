@@ -1,4 +1,4 @@
-"""The only place that decorates kernels, and the folder their machine code is cached in.
+"""The only place that decorates kernels, and what names the folder of their machine code.
 
 numba's cache does not notice an edited callee in another file (numba issue 1833). Every kernel
 source therefore enters the hash that names the cache folder: an edit of any of them starts a fresh
@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import ast
 import hashlib
-import os
-import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+
+from fish_env.model.kernel_cache import keep_machine_code
 
 F = TypeVar("F", bound=Callable[..., Any])
 PACKAGE = Path(__file__).resolve().parent.parent
@@ -41,8 +41,7 @@ def kernel(function: F) -> F:
 
 def entry_point(function: F) -> F:
     """Compile a function that Python calls; its machine code is kept on disk."""
-    compile_: Callable[[F], F] = numba.njit(cache=True, **_COMMON)
-    return compile_(function)
+    return _kept(function, _COMMON)
 
 
 def lean_entry_point(function: F) -> F:
@@ -50,36 +49,19 @@ def lean_entry_point(function: F) -> F:
 
     It then need not count references to the arrays it is given, half a microsecond a call.
     """
-    compile_: Callable[[F], F] = numba.njit(cache=True, **_COUNTLESS)
-    return compile_(function)
+    return _kept(function, _COUNTLESS)
+
+
+def _kept(function: F, options: dict[str, Any]) -> F:
+    compile_: Callable[[F], F] = numba.njit(**options)
+    compiled = compile_(function)
+    keep_machine_code(compiled)
+    return compiled
 
 
 def py_function(function: Callable[..., Any]) -> Callable[..., Any]:
     """The plain Python function behind a compiled one."""
     return getattr(function, "py_func", function)
-
-
-def cache_root() -> Path:
-    """Folder for compiled kernels: ``$ROBOFISH_CACHE_DIR``, else the user's cache folder."""
-    named = os.environ.get("ROBOFISH_CACHE_DIR")
-    if named:
-        return Path(named)
-    base = os.environ.get("XDG_CACHE_HOME") or str(Path.home() / ".cache")
-    root = Path(base) / "robofish"
-    return root if _writable(root) else Path(tempfile.gettempdir()) / f"robofish-{_user()}"
-
-
-def _user() -> str:
-    """Tells users of a shared folder apart; on Windows that folder is each user's own."""
-    return str(os.getuid()) if hasattr(os, "getuid") else "user"
-
-
-def _writable(folder: Path) -> bool:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        return False
-    return os.access(folder, os.W_OK)
 
 
 def fingerprint(value: Any) -> str:

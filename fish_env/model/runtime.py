@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -13,15 +14,15 @@ from typing import Any, NamedTuple
 
 import numba
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray, IntArray
 from fish_env.model import compose
 from fish_env.model.compose import Composition
 from fish_env.model.emit import OUTPUTS
 from fish_env.model.history import history_rows_on
 from fish_env.model.state import BASE_STATES
+from fish_env.threads import default_threads
 
-FloatArray = npt.NDArray[np.float64]
 NO_TRACE = np.zeros((0, 0, 0))
 
 
@@ -33,19 +34,6 @@ def _pool(threads: int) -> ThreadPoolExecutor:
 if hasattr(os, "register_at_fork"):
     # Threads do not survive a fork: a child that kept the pool would wait for them forever.
     os.register_at_fork(after_in_child=_pool.cache_clear)
-
-
-def default_threads() -> int:
-    """Threads for batches: ``$ROBOFISH_THREADS``, else the cores this process may use."""
-    named = os.environ.get("ROBOFISH_THREADS")
-    return max(1, int(named)) if named else _cores()
-
-
-def _cores() -> int:
-    """Cores this process may use; all of them where the system does not say (macOS, Windows)."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def run_in_threads(task: Callable[[int, int], int], count: int, lanes: int, threads: int) -> int:
@@ -77,11 +65,11 @@ class Grid(NamedTuple):
         every: (segments,) a sample is stored after every this many steps.
     """
 
-    slots: npt.NDArray[np.int64]
+    slots: IntArray
     starts: FloatArray
-    steps: npt.NDArray[np.int64]
+    steps: IntArray
     sizes: FloatArray
-    every: npt.NDArray[np.int64]
+    every: IntArray
 
 
 class Kernels:
@@ -243,7 +231,8 @@ def announce_compilation(function: Any, file: Path, name: str) -> None:
         file=sys.stderr,
         flush=True,
     )
-    marker.touch()
+    with suppress(OSError):  # what cannot be kept is said elsewhere
+        marker.touch()
 
 
 @cache

@@ -8,6 +8,7 @@ import numpy as np
 import yaml
 
 from fish_env.errors import ParameterError
+from fish_env.files import write_text
 
 
 class StrictLoader(yaml.SafeLoader):
@@ -68,4 +69,4 @@ def write_yaml(data: dict[str, Any], path: Path) -> None:
     text = yaml.dump(
         data, Dumper=PlainDumper, sort_keys=False, default_flow_style=None, allow_unicode=True
     )
-    path.write_text(text, encoding="utf-8")
+    write_text(path, text)

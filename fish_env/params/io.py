@@ -5,6 +5,7 @@ merged key by key, anything else replaces what the base says. Paths of bases and
 to the file that names them.
 """
 
+import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -39,8 +40,13 @@ def list_fish() -> list[str]:
     return sorted(path.stem for path in (config_root() / "fish").glob("*.yaml"))
 
 
-def load_fish(name_or_path: str | Path) -> FishParams:
+def load_fish(name_or_path: str | Path, trust_effects: bool = False) -> FishParams:
     """Reads a fish: a preset by its name, or any YAML file by its path.
+
+    Args:
+        name_or_path: A preset's name, or a file.
+        trust_effects: Let the models of this fish run the effect files (Python code) that lie
+            beside the file and that it names. Reading alone never runs code.
 
     Raises:
         ParameterError: There is no such fish, or its file is not a possible one; names file, key
@@ -49,7 +55,61 @@ def load_fish(name_or_path: str | Path) -> FishParams:
     file = find_fish(name_or_path, Path())
     fish = build_fish(read_merged(file, ()), file)
     warn_of_effective_inertia(fish)
-    return fish
+    return dataclasses.replace(fish, trust_effects=trust_effects)
+
+
+def as_fish(fish: FishParams | str | Path, trust_effects: bool = False) -> FishParams:
+    """Returns the parameters that an argument means: as they are, or read by name or path.
+
+    Args:
+        fish: Parameters, a preset's name, or a file.
+        trust_effects: As for :func:`load_fish`; what the parameters say already stays.
+
+    Raises:
+        ParameterError: There is no such fish, or its file is not a possible one.
+    """
+    if not isinstance(fish, FishParams):
+        return load_fish(fish, trust_effects)
+    return dataclasses.replace(fish, trust_effects=True) if trust_effects else fish
+
+
+def fish_files(fish: FishParams | str | Path) -> list[Path]:
+    """Returns the files that a fish is read from: its own, its bases', tables and effect files.
+
+    Args:
+        fish: Parameters, a preset's name, or a file.
+
+    Raises:
+        ParameterError: There is no such fish, or a file cannot be read.
+    """
+    file = fish.source_file if isinstance(fish, FishParams) else find_fish(fish, Path())
+    found: list[Path] = []
+    while file is not None and file not in found:
+        found.append(file)
+        data = read_yaml(file)
+        resolve_tables(data, file.parent)
+        found += tables_in(data)
+        effects = data.get("effects")
+        if isinstance(effects, Mapping):
+            found += [file.parent / f"{name}.py" for name in effects]
+        base = data.get("base")
+        file = find_base(base, file) if isinstance(base, str) else None
+    return found
+
+
+def tables_in(data: Any) -> list[Path]:
+    """Returns the tables that nested data name, once `resolve_tables` has made them absolute."""
+    if not isinstance(data, dict):
+        return []
+    own = [Path(data["table"])] if isinstance(data.get("table"), str) else []
+    return own + [path for value in data.values() for path in tables_in(value)]
+
+
+def fish_outputs(fish: FishParams, path: str | Path) -> dict[str, Path]:
+    """Returns the files that `save_fish` writes: that of the fish as "", tables by their curve."""
+    file = Path(path)
+    tables = {key: file.with_name(f"{file.stem}.{key}.csv") for key in fish.tables()}
+    return {"": file, **tables}
 
 
 def find_fish(name_or_path: str | Path, folder: Path) -> Path:
@@ -122,20 +182,29 @@ def merged_value(old: Any, new: Any) -> Any:
     return merged(old, new) if ("table" in old) == ("table" in new) else new
 
 
-def save_fish(fish: FishParams, path: str | Path) -> None:
+def save_fish(fish: FishParams, path: str | Path) -> list[Path]:
     """Writes a fish to a file that loads equal to it, without reference to a base.
 
     Coefficient tables are copied beside it as `<stem>.<curve>.csv` and move along with it.
 
+    Args:
+        fish: The parameters.
+        path: The file to write, ending in .yaml or .yml.
+
+    Returns:
+        The files written: that of the fish, and its tables.
+
     Raises:
-        ParameterError: The path does not end in .yaml or .yml.
+        ParameterError: The path has another ending.
+        OutputError: A file cannot be written.
     """
     file = Path(path)
     if file.suffix not in SUFFIXES:
         raise ParameterError(f"{file}: give the file the ending .yaml")
     warn_of_effective_inertia(fish)
     data: dict[str, Any] = {"name": fish.name, **trees.to_plain(fish)}
-    save_tables(fish, data, file)
+    written = fish_outputs(fish, file)
+    save_tables(fish, data, written)
     data["prior"] = trees.to_plain(fish.prior)
     data["provenance"] = plain_provenance(fish.provenance)
     if fish.effects:
@@ -143,12 +212,13 @@ def save_fish(fish: FishParams, path: str | Path) -> None:
     if fish.posterior is not None:
         data["posterior"] = plain_posterior(fish.posterior)
     write_yaml(data, file)
+    return list(written.values())
 
 
-def save_tables(fish: FishParams, data: dict[str, Any], file: Path) -> None:
-    """Writes the tables beside the file and puts their names into its data."""
+def save_tables(fish: FishParams, data: dict[str, Any], copies: Mapping[str, Path]) -> None:
+    """Writes the tables to their copies and puts the names of these into the fish's data."""
     for key, table in fish.tables().items():
-        copy = file.with_name(f"{file.stem}.{key}.csv")
+        copy = copies[key]
         write_table(table, copy)
         *parents, last = key.split(".")
         section = data

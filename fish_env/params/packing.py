@@ -11,12 +11,12 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
+
+from fish_env.arrays import FloatArray
 
 if TYPE_CHECKING:
     from fish_env.params.schema import FishParams
 
-FloatArray = npt.NDArray[np.float64]
 
 PATHS: dict[str, str] = {
     "density": "water.density",

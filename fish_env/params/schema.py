@@ -58,6 +58,8 @@ class FishParams:
         provenance: Status and source of every value.
         posterior: What an identification found, carried by extended models.
         source_file: File the fish was read from; None for one made in Python.
+        trust_effects: Whether effect files beside that file may be run. Only a caller says so,
+            never a file.
 
     Raises:
         ParameterError: A value is impossible; names the file, the key and the remedy.
@@ -75,6 +77,7 @@ class FishParams:
     provenance: Provenance = dataclasses.field(default_factory=lambda: Provenance(UNSTATED))
     posterior: Posterior | None = None
     source_file: Path | None = dataclasses.field(default=None, compare=False)
+    trust_effects: bool = dataclasses.field(default=False, compare=False)
 
     def __post_init__(self) -> None:
         checks.check_fish(self)

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fish_env.errors import ParameterError
+from fish_env.files import write_text
 
 TableKind = Literal["drag", "lift", "impact_moment"]
 
@@ -206,4 +207,4 @@ def read_row(path: Path, line: int, row: list[str]) -> tuple[float, float]:
 def write_table(table: CoefficientTable, path: Path) -> None:
     """Writes a table to a CSV file, in radians, with every digit."""
     lines = [f"{a!r},{c!r}" for a, c in zip(table.alpha, table.value, strict=True)]
-    path.write_text("\n".join(["alpha_rad,C", *lines, ""]), encoding="utf-8")
+    write_text(path, "\n".join(["alpha_rad,C", *lines, ""]))

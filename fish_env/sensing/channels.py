@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.model.frames import euler_from_quaternion
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def channels_from_states(states: FloatArray) -> dict[str, FloatArray]:

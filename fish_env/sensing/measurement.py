@@ -7,9 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.effects.extended import ExtendedModel
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def true_times(model: ExtendedModel, recorded_s: npt.ArrayLike) -> FloatArray:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.model.state import INPUTS
 from fish_env.params import FishParams
 from fish_env.plotting.forces import Breakdown
@@ -15,7 +15,6 @@ from fish_env.simulator import Simulator
 from fish_env.steady import steady_motion
 from fish_env.studies.portrait import trim_pitch, trim_roll
 
-FloatArray = npt.NDArray[np.float64]
 AMPLITUDE = np.radians(20.0)
 OFFSET = np.radians(20.0)
 DISPLACEMENT_M = -0.008

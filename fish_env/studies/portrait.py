@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.model.frames import quaternion_from_euler
 from fish_env.params import FishParams
 from fish_env.simulator import Simulator
 from fish_env.steady import steady_motion
 
-FloatArray = npt.NDArray[np.float64]
 AMPLITUDES_DEG = (10.0, 20.0, 30.0, 40.0)
 FREQUENCIES_HZ = (0.5, 1.0, 1.5, 2.0, 3.0)
 BRACKET_ANGLES_DEG = (-40.0, -20.0, 0.0, 20.0, 40.0)

@@ -6,13 +6,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.data.schema import Dataset, Run
 from fish_env.data.vocabulary import COMMANDS
 from fish_env.errors import DatasetError
 
-FloatArray = npt.NDArray[np.float64]
 CHANNELS = ("x", "y", "yaw")
 FREQUENCY = tuple(COMMANDS).index("tail_frequency")
 START_S = 2.0

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.data.vocabulary import COMMANDS
-from fish_env.diagnosis.causes import PARAMETER
 from fish_env.diagnosis.regimes import LEVEL, Localisation
 from fish_env.diagnosis.report.series import RunSeries, SteadySeries
 from fish_env.diagnosis.report.units import label, shown_unit
+from fish_env.files import file_name, replacing
+from fish_env.inference.hypotheses import PARAMETER
 from fish_env.plotting.comparison import COMMAND_UNITS
 from fish_env.plotting.style import BLUE, DOTS_PER_INCH, MEASURED, VERMILION, drawing
 
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
     from matplotlib.colors import LogNorm
     from matplotlib.figure import Figure
 
-FloatArray = npt.NDArray[np.float64]
 BASELINE, EXTENDED = VERMILION, BLUE
 Plain = Mapping[str, Any]
 MAPS, PITCH = 4, 1.15
@@ -47,10 +47,12 @@ class Album:
     Attributes:
         folder: Their folder.
         bitmaps: Whether each is a PNG too, not only an SVG.
+        written: The files written so far.
     """
 
     folder: Path
     bitmaps: bool = True
+    written: list[Path] = field(default_factory=list)
 
 
 @contextmanager
@@ -67,16 +69,20 @@ def _page(width: float, height: float) -> Iterator[Figure]:
 
 def _saved(figure: Figure, album: Album, name: str) -> Path:
     """Writes the figure and returns the path of the SVG."""
-    album.folder.mkdir(parents=True, exist_ok=True)
     vector = album.folder / f"{name}.svg"
     engine = figure.get_layout_engine()
     if engine is not None:
         # What was laid out stays. With an engine, even one that does nothing, it is drawn twice.
         engine.execute(figure)
         figure.set_layout_engine(None)
-    figure.savefig(vector)
+    with replacing(vector) as part:
+        figure.savefig(part)
+    album.written.append(vector)
     if album.bitmaps:
-        figure.savefig(vector.with_suffix(".png"), dpi=DOTS_PER_INCH)
+        bitmap = album.folder / f"{name}.png"
+        with replacing(bitmap) as part:
+            figure.savefig(part, dpi=DOTS_PER_INCH)
+        album.written.append(bitmap)
     return vector
 
 
@@ -120,7 +126,7 @@ def draw_run(run: RunSeries, window_s: float, album: Album) -> Path:
             bottom.tick_params(labelbottom=True)
         handles, words = axes[0, 0].get_legend_handles_labels()
         figure.legend(handles, words, loc="outside upper center", ncols=3)
-        return _saved(figure, album, f"run_{run.id}")
+        return _saved(figure, album, f"run_{file_name(run.id)}")
 
 
 def _draw_channel(ax: Axes, run: RunSeries, name: str, window_s: float) -> None:

@@ -13,6 +13,25 @@ from fish_env.diagnosis.report.units import shown_unit
 Answer = Mapping[str, Any]
 
 
+def input_checks(answer: Answer, series: ReportSeries | SteadySeries | None, album: Album) -> str:
+    """What is wrong with the data or their description, and the line that puts it right."""
+    rows = []
+    for fault in answer.get("inputs", ()):
+        gain, interval = fault["gain"], fault["ci95"]
+        value = "–" if fault["value"] is None else f"{number(fault['value'])} {fault['unit']}"
+        rows.append(
+            (
+                text(fault["target"]), text(fault["kind"].replace("_", " ")), text(value),
+                f"{number(interval[0])} to {number(interval[1])}" if interval else "–",
+                f"<code>{text(fault['fix'])}</code>",
+                f"{number(gain['before'])} to {number(gain['after'])}" if gain else "–",
+                "certain" if fault["decisive"] else "possible",
+            )
+        )  # fmt: skip
+    heads = ("what", "mistake", "value", "95 % interval", "write", "disagreement", "standing")
+    return section("Input checks", table(heads, rows) if rows else "", key="inputs")
+
+
 def measurements(answer: Answer, series: ReportSeries | SteadySeries | None, album: Album) -> str:
     """Whether the channels agree among themselves, and how noisy each of them is."""
     agreed = (answer.get("consistency") or {}).get("sentences", [])

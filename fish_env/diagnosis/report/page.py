@@ -10,8 +10,10 @@ from fish_env.diagnosis.report import sections
 from fish_env.diagnosis.report.blind import unseen
 from fish_env.diagnosis.report.figures import Album
 from fish_env.diagnosis.report.html import text
-from fish_env.diagnosis.report.measurements import measurements
+from fish_env.diagnosis.report.measurements import input_checks, measurements
 from fish_env.diagnosis.report.series import ReportSeries, SteadySeries
+from fish_env.diagnosis.written import replace_part
+from fish_env.files import write_text
 from fish_env.replay import component_scripts, component_style
 
 Answer = Mapping[str, Any]
@@ -20,6 +22,7 @@ Part = Callable[[Answer, Series, Album], str]
 STYLE = Path(__file__).with_name("report.css")
 PARTS: tuple[Part, ...] = (
     sections.verdict,
+    input_checks,
     sections.cause_values,
     sections.swimming,
     sections.channels,
@@ -39,7 +42,8 @@ PARTS: tuple[Part, ...] = (
 def write_report(answer: Answer, series: Series, out: str | Path) -> Path:
     """Writes ``report.html`` and its figures into a folder.
 
-    Figures are SVG and PNG; a first look has no PNG and no map of where the misfit sits.
+    Figures are SVG and PNG; a first look has no PNG and no map of where the misfit sits. Those of
+    an earlier diagnosis that this one lacks are removed; other files in the folder stay.
 
     Args:
         answer: Content of ``diagnosis.json``; what it lacks is left out of the page.
@@ -50,14 +54,12 @@ def write_report(answer: Answer, series: Series, out: str | Path) -> Path:
         The path of the page.
     """
     folder = Path(out)
-    figures = folder / "figures"
-    figures.mkdir(parents=True, exist_ok=True)
-    for old in (*figures.glob("*.svg"), *figures.glob("*.png")):
-        old.unlink()  # figures of an earlier diagnosis would contradict this one
-    album = Album(figures, bitmaps=not answer.get("quick"))
+    album = Album(folder / "figures", bitmaps=not answer.get("quick"))
     body = "\n".join(filter(None, (part(answer, series, album) for part in PARTS)))
     page = folder / "report.html"
-    page.write_text(_page(answer, body), encoding="utf-8")
+    write_text(page, _page(answer, body))
+    # Figures of an earlier diagnosis would contradict this one.
+    replace_part(folder, "figures", album.written)
     return page
 
 

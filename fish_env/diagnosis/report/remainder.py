@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from fish_env.diagnosis.generic_forces import wrench_unit
 from fish_env.diagnosis.report.html import number, paragraph, table, text
+from fish_env.identification.generic_forces import wrench_unit
 
 Answer = Mapping[str, Any]
 

@@ -6,10 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from fish_env.diagnosis.answer import words
-from fish_env.diagnosis.causes import PARAMETER
 from fish_env.diagnosis.report import figures as draw
 from fish_env.diagnosis.report.figures import Album
 from fish_env.diagnosis.report.html import (
@@ -24,19 +22,21 @@ from fish_env.diagnosis.report.html import (
 from fish_env.diagnosis.report.remainder import asked_for, residual_model
 from fish_env.diagnosis.report.series import SETTLED_S, ReportSeries, RunSeries, SteadySeries
 from fish_env.diagnosis.report.units import shown_unit
+from fish_env.inference.hypotheses import PARAMETER
 from fish_env.plotting.comparison import COMMAND_UNITS
 from fish_env.replay import Group, component
 
 Answer = Mapping[str, Any]
 Series = ReportSeries | SteadySeries | None
-FloatArray = npt.NDArray[np.float64]
 MOST_DRAWN = 2
 """Runs with a drawing of their own; the replay has them all."""
 VERDICTS = {
+    "inputs": "The data, or their description, are wrong",
     "no_misfit": "Nothing is wrong that these runs could show",
     "parameters": "Right structure, wrong numbers",
     "cause": "A cause is found",
     "ambiguous": "Several explanations fit alike",
+    "partial": "Known causes act, beside something unknown",
     "outside_library": "Something no known cause explains",
     "not_excited": "These runs cannot show it",
 }

@@ -6,31 +6,31 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from fish_env.arrays import BoolArray, FloatArray
 from fish_env.data.schema import CommandSteps, Dataset
 from fish_env.data.units import unwrap_angle
-from fish_env.diagnosis import open_loop
-from fish_env.diagnosis.effort import FULL
 from fish_env.diagnosis.extended_file import extended_fish
-from fish_env.diagnosis.gain import ANGLES, WINDOW_S
+from fish_env.diagnosis.gain import ANGLES
 from fish_env.diagnosis.regimes import Localisation
 from fish_env.effects import catalogue
 from fish_env.effects.extended import build_model
 from fish_env.errors import SimulationDiverged
-from fish_env.identification.estimator import Fit
+from fish_env.identification import open_loop
 from fish_env.identification.filtering import Filtered
-from fish_env.identification.phases import in_step
-from fish_env.identification.problem import Problem
 from fish_env.identification.runs import RunData
+from fish_env.identification.series import SeriesProblem, series_of
+from fish_env.inference.effort import FULL
+from fish_env.inference.estimate.fit import Fit
+from fish_env.inference.estimate.free import evaluated
+from fish_env.inference.policy import POLICY
 from fish_env.params.schema import FishParams
 from fish_env.replay import Motion, motion_from_channels, motion_from_trajectory
 from fish_env.replay.motion import Role
 from fish_env.sensing import measured_channels, true_times
 from fish_env.simulator import InitialState, Simulator
 
-FloatArray = npt.NDArray[np.float64]
 SETTLED_S = 1.0
 """After this time the filter knows velocities that were not measured: whole runs start here."""
 LONGEST_STEP_S = 0.01
@@ -79,7 +79,7 @@ class ReportSeries:
     fish: FishParams
     runs: tuple[RunSeries, ...]
     localisation: Localisation | None = None
-    window_s: float = WINDOW_S
+    window_s: float = POLICY.prediction_window_s
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +100,7 @@ class SteadySeries:
     measured: Mapping[str, FloatArray]
     baseline: Mapping[str, FloatArray]
     extended: Mapping[str, FloatArray] = field(default_factory=dict)
-    left_out: npt.NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, bool))
+    left_out: BoolArray = field(default_factory=lambda: np.zeros(0, bool))
 
 
 def series_from(
@@ -121,20 +121,21 @@ def series_from(
         localisation: of the misfit.
         most_runs: how many runs to show, the final ones first.
     """
-    problem = baseline.problem
+    problem = series_of(baseline)
     kept = list(final_runs)[:most_runs]
     fitted = list(problem.runs)[: most_runs - len(kept)]
-    judged = Problem(dataset, problem.fish, kept).runs if kept else ()
+    judged = SeriesProblem(dataset, problem.fish, kept).runs if kept else ()
     shown = problem.with_runs([*judged, *fitted])
     models = {"baseline": baseline} if accepted is baseline else {
         "baseline": baseline, "extended": accepted,
     }  # fmt: skip
-    filtered = {name: in_step(shown, fit.point, fit.noise) for name, fit in models.items()}
+    settled = {name: evaluated(shown, fit.point, fit.noise) for name, fit in models.items()}
     simulators = {name: _simulator(fit, dataset) for name, fit in models.items()}
     runs = []
     for i, run in enumerate(shown.runs):
-        states = {name: results[i] for name, results in filtered.items()}
-        predicted = {n: predicted_windows(shown, run, models[n], states[n]) for n in models}
+        states = {name: results[i] for name, (_, results) in settled.items()}
+        own = {name: varied.runs[i] for name, (varied, _) in settled.items()}
+        predicted = {n: predicted_windows(shown, own[n], models[n], states[n]) for n in models}
         runs.append(_series(shown, run, predicted, simulators, states, i < len(judged)))
     return ReportSeries(problem.fish, tuple(runs), localisation)
 
@@ -152,12 +153,14 @@ class Predicted:
     fit_percent: float
 
 
-def predicted_windows(problem: Problem, run: RunData, fit: Fit, filtered: Filtered) -> Predicted:
+def predicted_windows(
+    problem: SeriesProblem, run: RunData, fit: Fit, filtered: Filtered
+) -> Predicted:
     """Channels of a run, predicted over windows from filtered states.
 
     The same predictions as :func:`fish_env.diagnosis.gain.measure_gain` judges.
     """
-    cut = problem.with_runs(open_loop.windows(run, filtered, WINDOW_S))
+    cut = problem.with_runs(open_loop.windows(run, filtered, POLICY.prediction_window_s))
     errors = open_loop.errors(cut, fit.point, fit.noise)
     missed = np.full(run.measured.shape, np.nan)
     for window, error in zip(cut.runs, errors, strict=True):
@@ -168,7 +171,7 @@ def predicted_windows(problem: Problem, run: RunData, fit: Fit, filtered: Filter
     return Predicted(channels, _fit_percent(cut, errors))
 
 
-def _fit_percent(cut: Problem, errors: Sequence[FloatArray]) -> float:
+def _fit_percent(cut: SeriesProblem, errors: Sequence[FloatArray]) -> float:
     fits = []
     for i, name in enumerate(cut.channels):
         missed = spread = 0.0
@@ -184,13 +187,13 @@ def _fit_percent(cut: Problem, errors: Sequence[FloatArray]) -> float:
     return float(np.mean(fits)) if fits else float("nan")
 
 
-def _measured(problem: Problem, run: RunData) -> dict[str, FloatArray]:
+def _measured(problem: SeriesProblem, run: RunData) -> dict[str, FloatArray]:
     columns = dict(zip(problem.channels, run.measured.T, strict=True))
     return {n: unwrap_angle(v) if n in ANGLES else v for n, v in columns.items()}
 
 
 def _series(
-    problem: Problem,
+    problem: SeriesProblem,
     run: RunData,
     predicted: Mapping[str, Predicted],
     simulators: Mapping[str, Simulator],
@@ -220,7 +223,7 @@ def _series(
 def _simulator(fit: Fit, dataset: Dataset) -> Simulator:
     """The fish of a fit, swimming alone, with a step that its fastest effect allows."""
     fish = extended_fish(fit, dataset)
-    own = [effect for name, effect in fit.problem.known.items() if name not in catalogue()]
+    own = [effect for name, effect in series_of(fit).known.items() if name not in catalogue()]
     longest = build_model(fish, user_effects=own).longest_step()
     return Simulator(fish, min(LONGEST_STEP_S, longest), user_effects=own)
 

@@ -5,33 +5,34 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.data.schema import SteadyDataset
 from fish_env.diagnosis.report.series import SteadySeries
-from fish_env.diagnosis.steady.fitting import SteadyFit
-from fish_env.diagnosis.steady.judging import predictions
-from fish_env.diagnosis.steady.table import Table, table_of
-
-FloatArray = npt.NDArray[np.float64]
+from fish_env.diagnosis.tables.gain import predictions
+from fish_env.identification.tables.problem import TableProblem
+from fish_env.identification.tables.table import Table, table_of
+from fish_env.inference.estimate.fit import Fit
 
 
 def steady_series_from(
     dataset: SteadyDataset,
-    baseline: SteadyFit,
-    accepted: SteadyFit,
+    problem: TableProblem,
+    baseline: Fit,
+    accepted: Fit,
     final_conditions: Sequence[str] = (),
 ) -> SteadySeries:
     """Measured and predicted averages of every condition, repeats taken together.
 
     Args:
         dataset: the measured table.
+        problem: what was fitted of it.
         baseline: refitted baseline.
         accepted: accepted explanation; the same object where nothing was added.
         final_conditions: names of those kept for judging, as the gain has them.
     """
     table = table_of(dataset)
-    whole = baseline.problem.with_table(table)
+    whole = problem.with_table(table)
 
     def named(values: FloatArray) -> dict[str, FloatArray]:
         return dict(zip(table.observations, values.T, strict=True))

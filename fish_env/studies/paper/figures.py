@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.plotting.style import (
     BLACK,
     BLUE,
@@ -26,7 +26,6 @@ from fish_env.trajectory import Trajectory
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-FloatArray = npt.NDArray[np.float64]
 DEG = 180.0 / np.pi
 F1, OFFSET, DISPLACEMENT = "$f_1$ (Hz)", "tail offset (deg)", "$\\Delta d$ (cm)"
 TIME = "time (s)"

@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.effects.extended import EffectValues, build_model
 from fish_env.params import load_fish
 from fish_env.simulator import Simulator
@@ -21,7 +21,6 @@ from fish_env.steady import steady_motion
 from fish_env.studies.paper import ranges
 from fish_env.trajectory import Trajectory
 
-FloatArray = npt.NDArray[np.float64]
 Motion = dict[str, FloatArray]
 SERIES_S, SERIES_HZ = 60.0, 50.0
 

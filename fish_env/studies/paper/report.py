@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fish_env.comparison.errors import plain
+from fish_env.files import write_text
 from fish_env.studies.paper import ranges
 from fish_env.studies.paper.motions import Study
 from fish_env.studies.paper.statements import (
@@ -110,10 +111,7 @@ def _statement(statement: Statement) -> dict[str, Any]:
 
 def write_report(study: Study, folder: Path) -> list[Path]:
     """Writes `statements.md` and `paper.json`; returns their paths."""
-    folder.mkdir(parents=True, exist_ok=True)
     words, numbers = folder / "statements.md", folder / "paper.json"
-    words.write_text(statements_markdown(study), encoding="utf-8")
-    numbers.write_text(
-        json.dumps(study_json(study), indent=1, allow_nan=False) + "\n", encoding="utf-8"
-    )
+    write_text(words, statements_markdown(study))
+    write_text(numbers, json.dumps(study_json(study), indent=1, allow_nan=False) + "\n")
     return [words, numbers]

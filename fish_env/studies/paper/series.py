@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.studies.paper.motions import SERIES_HZ
 from fish_env.trajectory import Trajectory
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def steady_part(trajectory: Trajectory, name: str) -> FloatArray:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.studies.paper import ranges
 from fish_env.studies.paper.motions import Map, Study
 from fish_env.studies.paper.series import (
@@ -17,7 +17,6 @@ from fish_env.studies.paper.series import (
     velocity_inertial,
 )
 
-FloatArray = npt.NDArray[np.float64]
 DEG = 180.0 / np.pi
 HELD, NOT_HELD = "held", "not held by this model"
 

@@ -1,0 +1,1 @@
+"""Checks of what a diagnosis is given, before any force model is fitted."""

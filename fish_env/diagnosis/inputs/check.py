@@ -1,0 +1,186 @@
+"""The input step of a diagnosis: what is wrong with the data, before any force model is fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.special import ndtri
+
+from fish_env.data.retiming import Clocks, retimed
+from fish_env.data.schema import Dataset
+from fish_env.diagnosis.beats import own_ratio
+from fish_env.diagnosis.inputs.changes import Change
+from fish_env.diagnosis.inputs.clocks import strokes_of
+from fish_env.diagnosis.inputs.fine import BIAS, Fine, fine_clock
+from fish_env.diagnosis.inputs.ratios import ratio_near
+from fish_env.diagnosis.inputs.search import Found, search
+from fish_env.diagnosis.inputs.weighing import BEAT, Scales
+from fish_env.diagnosis.recorded import recorded
+from fish_env.errors import DatasetError
+from fish_env.inference.input_faults import InputFault
+from fish_env.params.io import load_fish
+from fish_env.params.schema import FishParams
+from fish_env.rigidbody.derived import Derived, derived_channels
+from fish_env.rigidbody.noise_floor import noise_floors
+
+ORDINARY_BEAT = 0.15
+"""A tail that beats so much faster or slower than it was told is a servo's doing: the effect
+`frequency_scale` describes it, and runs of a real robot differ as much. Beyond, a command or a
+clock is wrong."""
+TIMES = ("clock", "clock_skew", "beat")
+PACES = ("frequency_scale", "clock_scale")
+"""Effects by which a fish makes another frequency of the commanded one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Inputs:
+    """What the input step found.
+
+    Attributes:
+        faults: mistakes, the clearest first.
+        dataset: the data with what is decisive put right.
+        logged: the data as they were given.
+    """
+
+    faults: tuple[InputFault, ...]
+    dataset: Dataset
+    logged: Dataset
+
+    @property
+    def binding(self) -> bool:
+        """Whether the verdict is `inputs`."""
+        return any(fault.binds for fault in self.faults)
+
+    def as_list(self) -> list[Mapping[str, Any]]:
+        """What ``diagnosis.json`` holds under ``inputs``."""
+        return [fault.as_dict() for fault in self.faults]
+
+
+def check_inputs(dataset: Dataset, fish: FishParams | None = None, seed: int = 0) -> Inputs:
+    """Look for wrong signs, units, columns, frames, clocks and beats, and for derived channels.
+
+    Args:
+        dataset: measured runs.
+        fish: the nominal fish; default: the dataset's own.
+        seed: of the resampling.
+    """
+    logged = dataset
+    floors = noise_floors(recorded(dataset))
+    derived = derived_channels(recorded(dataset), floors)
+    faults = [_derived_fault(one) for one in derived]
+    dataset = without(dataset, [one.channel for one in derived])
+    nominal, told = as_told(dataset, fish or load_fish(dataset.fish))
+    found, right = search(told, Scales(nominal))
+    for one in found:
+        fault = _fault(one, right)
+        faults.append(fault)
+        if fault.corrected:
+            dataset = one.change.applied(dataset)
+    fine = fine_clock(right, np.random.default_rng([seed, 2]))
+    if fine is not None:
+        fault = _fine_fault(fine)
+        faults.append(fault)
+        if fault.corrected:
+            dataset = fine.change.applied(dataset)
+    return Inputs(tuple(faults), _noted(dataset, faults), logged)
+
+
+def as_told(dataset: Dataset, fish: FishParams) -> tuple[FishParams, Dataset]:
+    """The fish without pace of its own, and the commands as it beats to them.
+
+    A fish file that knows its frequency is off makes no fault of it.
+    """
+    own = own_ratio(fish)
+    if own == 1.0:
+        return fish, dataset
+    effects = {name: values for name, values in fish.effects.items() if name not in PACES}
+    runs = tuple(retimed(run, Clocks(beat=own)) for run in dataset.runs)
+    return replace(fish, effects=effects), replace(dataset, runs=runs)
+
+
+def refuse_wrong_inputs(dataset: Dataset, fish: FishParams | None = None) -> None:
+    """Refuse data with a mistake that no fit survives.
+
+    Args:
+        dataset: measured runs.
+        fish: the nominal fish; default: the dataset's own.
+
+    Raises:
+        DatasetError: Names the mistake and the line of dataset.yaml to write.
+    """
+    for fault in check_inputs(dataset, fish).faults:
+        if fault.binds:
+            raise DatasetError(f"{dataset.name}: {fault.said}")
+
+
+def without(dataset: Dataset, channels: Sequence[str]) -> Dataset:
+    """A dataset without some of its channels."""
+    if not channels:
+        return dataset
+    runs = tuple(
+        replace(run, channels={n: a for n, a in run.channels.items() if n not in channels})
+        for run in dataset.runs
+    )
+    noise = {name: sd for name, sd in dataset.noise.items() if name not in channels}
+    return replace(dataset, runs=runs, noise=noise)
+
+
+def _noted(dataset: Dataset, faults: Sequence[InputFault]) -> Dataset:
+    said = tuple(f"inputs: {fault.words}" for fault in faults if fault.corrected)
+    return replace(dataset, notes=(*dataset.notes, *said)) if said else dataset
+
+
+def _derived_fault(one: Derived) -> InputFault:
+    sources = ", ".join(one.sources)
+    return InputFault(
+        "derived", one.channel, None, "", None, 0.0, None, f"delete {one.channel} under channels",
+        f"{one.channel} was computed from {sources} and is no measurement of its own, so it is "
+        "left out", f"{one.channel} against {sources}", None, None, (), True, False, True,
+    )  # fmt: skip
+
+
+def _fault(one: Found, right: Dataset) -> InputFault:
+    change = one.change
+    ordinary = _ordinary(change)
+    return InputFault(
+        change.kind, change.target, change.value, change.unit,
+        _interval(change, right), one.p, one.gain, change.line, change.words,
+        one.comparison, one.before, one.after, tuple(rival.line for rival in one.rivals),
+        decisive=True, binds=not ordinary, corrected=not ordinary or "" not in change.clocks,
+    )  # fmt: skip
+
+
+def _ordinary(change: Change) -> bool:
+    """Whether a beat is no further off than servos are."""
+    ratios = [clocks.beat for clocks in change.clocks.values()]
+    return change.kind == "beat" and all(abs(r - 1.0) < ORDINARY_BEAT for r in ratios)
+
+
+def _interval(change: Change, right: Dataset) -> tuple[float, float] | None:
+    """95 % interval of a scale of time, by the beat in the data that were put right."""
+    if change.kind not in TIMES or change.value is None or len(change.clocks) > 1:
+        return None
+    left = ratio_near(list(strokes_of(right).values()))
+    if left is None:
+        return None
+    half = float(ndtri(0.975)) * float(np.hypot(left.sd, BIAS))
+    return change.value * (1.0 - half), change.value * (1.0 + half)
+
+
+def _fine_fault(fine: Fine) -> InputFault:
+    change, ordinary = fine.change, _ordinary(fine.change)
+    words = change.words
+    # A beat that differs from run to run is taken as measured; a common one is an effect.
+    uneven = change.kind == "beat" and "" not in change.clocks
+    is_clock = change.kind != "beat"
+    if ordinary and not uneven:
+        words += "; a servo does that too, which `frequency_scale` and `battery_sag` describe"
+    return InputFault(
+        change.kind, change.target, change.value, change.unit, fine.interval, fine.p, None,
+        change.line, words, BEAT, None, None, tuple(rival.line for rival in fine.rivals),
+        decisive=fine.sure and (uneven or is_clock or not ordinary),
+        binds=fine.sure and not ordinary, corrected=uneven or is_clock,
+    )  # fmt: skip

@@ -1,0 +1,149 @@
+"""Clocks and beats that are off by little: what the beat says, held against the kinematics.
+
+A beat that is a per cent too quick is a tail that beats so, or a clock that runs slow. Only the
+second makes angles grow faster than their rates say, and by the same per cent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import chdtrc, ndtr, ndtri
+
+from fish_env.data.schema import Dataset
+from fish_env.diagnosis.beats import beats_of, by_run
+from fish_env.diagnosis.inputs.changes import Change
+from fish_env.diagnosis.inputs.clock_changes import beat, clock, skew
+from fish_env.diagnosis.inputs.clocks import strokes_of
+from fish_env.diagnosis.inputs.ratios import Ratio, ratio_near
+from fish_env.diagnosis.inputs.skews import Aligner
+from fish_env.diagnosis.recorded import recorded
+from fish_env.rigidbody.consistency import check_consistency
+from fish_env.rigidbody.kinematic_fit import Estimate
+
+BIAS = 0.001
+"""What the ratio of beats is off by in good data: the hull answers quicker beats later."""
+SURE, SMALLEST = 5.0, 0.004
+"""Standard errors, and size, from which a common ratio is not one."""
+UNEVEN, BY_CHANCE = 0.01, 1e-5
+"""Spread of ratios between runs worth a word, and its p-value."""
+AGREE = 3.0
+"""Standard errors within which a beat and a scale of angles are one clock."""
+ALIGNED = 5.0
+"""Log likelihood by which the times of commands tell one clock from two."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fine:
+    """A clock or beat that is off by little.
+
+    Attributes:
+        change: what puts it right.
+        interval: of its value, 95 %.
+        p: probability by chance.
+        rivals: other changes that explain as much.
+        sure: whether it is known which of clock and beat is off.
+    """
+
+    change: Change
+    interval: tuple[float, float]
+    p: float
+    rivals: tuple[Change, ...]
+    sure: bool
+
+
+def fine_clock(dataset: Dataset, rng: np.random.Generator) -> Fine | None:
+    """A clock, or a beat, that is off by little; None if neither is.
+
+    Args:
+        dataset: with what is grossly wrong put right.
+        rng: for the resampling of the kinematic test.
+    """
+    strokes = strokes_of(dataset)
+    single = {run: ratio_near([stroke]) for run, stroke in strokes.items()}
+    known = {run: ratio for run, ratio in single.items() if ratio is not None}
+    p = _uneven(list(known.values()))
+    if p is not None:
+        ratios = _of_every_run(dataset, known)
+        return Fine(beat(ratios), (min(ratios.values()), max(ratios.values())), p, (), True)
+    whole = ratio_near(list(strokes.values()))
+    if whole is None or not _off(whole):
+        return None
+    return _clock_or_beat(dataset, whole, rng)
+
+
+def _of_every_run(dataset: Dataset, known: Mapping[str, Ratio]) -> dict[str, float]:
+    """The ratio of every run: from stretches of constant commands if there are, which tell it best.
+
+    A run that shows no beat gets the mean of the others.
+    """
+    ratios = {run: ratio.value for run, ratio in known.items()}
+    ratios |= {run: ratio for run, (ratio, _) in by_run(beats_of(dataset)).items()}
+    mean = float(np.mean(list(ratios.values())))
+    return {run.id: ratios.get(run.id, mean) for run in dataset.runs}
+
+
+def _uneven(ratios: Sequence[Ratio]) -> float | None:
+    """The p-value of runs that beat differently; None if they do not."""
+    if len(ratios) < 2:
+        return None
+    values = np.array([ratio.value for ratio in ratios])
+    weights = np.array([ratio.sd**2 + BIAS**2 for ratio in ratios]) ** -1
+    square = float(weights @ (values - weights @ values / weights.sum()) ** 2)
+    p = float(chdtrc(len(values) - 1, square))
+    return p if np.std(values, ddof=1) > UNEVEN and p < BY_CHANCE else None
+
+
+def _off(ratio: Ratio) -> bool:
+    error = float(np.hypot(ratio.sd, BIAS))
+    return abs(ratio.value - 1.0) > max(SURE * error, SMALLEST)
+
+
+def _clock_or_beat(
+    dataset: Dataset,
+    whole: Ratio,
+    rng: np.random.Generator,
+) -> Fine:
+    """Which of the two a common ratio is."""
+    error = float(np.hypot(whole.sd, BIAS))
+    half, p = float(ndtri(0.975)) * error, float(2.0 * ndtr(-abs(whole.value - 1.0) / error))
+    interval = (whole.value - half, whole.value + half)
+    slow, common = clock(whole.value), beat({"": whole.value})
+    scale = _scale(dataset, rng)
+    if scale is None:
+        return Fine(common, interval, p, (slow,), False)
+    apart = abs(scale.value - (whole.value - 1.0)) / np.hypot(scale.error, whole.sd)
+    if not scale.found:
+        apart_enough = bool(apart >= AGREE)
+        return Fine(common, interval, p, () if apart_enough else (slow,), apart_enough)
+    if apart > AGREE:
+        return Fine(common, interval, p, (), False)
+    changes = _one_clock_or_two(dataset, whole.value)
+    return Fine(changes[0], interval, scale.p, tuple(changes[1:]), True)
+
+
+def _scale(dataset: Dataset, rng: np.random.Generator) -> Estimate | None:
+    """By how much angles, or else positions, grow faster than rates say."""
+    tested = check_consistency(recorded(dataset), rng).tested
+    for name in ("attitude", "position"):
+        found = next((t.estimate("scale") for t in tested if t.name == name), None)
+        if found is not None:
+            return found
+    return None
+
+
+def _one_clock_or_two(dataset: Dataset, ratio: float) -> list[Change]:
+    """The clock of the whole log, or that of the measurements; both where times do not tell."""
+    one, two = clock(ratio), skew(ratio, 0.0, of_commands=False)
+    aligner = Aligner.of(dataset)
+    if aligner is None:
+        return [one, two]
+    windows = aligner.windows(ratio)
+    gain = (
+        0.5 * windows * (aligner.left((1.0 / ratio, 0.0), ratio) - aligner.left((1.0, 0.0), ratio))
+    )
+    if abs(gain) < ALIGNED:
+        return [one, two] if gain > 0.0 else [two, one]
+    return [one] if gain > 0.0 else [two]

@@ -1,0 +1,147 @@
+"""Order tracking: at which multiple of the commanded frequency the hull sways.
+
+Commands may change all the time, so the hull's sway is not looked for at a frequency but along the
+commanded phase: a tail that beats at a multiple of what it was told sways the hull with that
+multiple of the phase. Windows are fitted each with a phase of its own, so neither the tail's phase
+nor how fast the hull answers matters.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import pairwise
+
+import numpy as np
+
+from fish_env.arrays import FloatArray, IntArray
+from fish_env.data.schema import CommandSteps
+from fish_env.data.vocabulary import COMMANDS
+from fish_env.rigidbody.gridded import GridRun
+
+SWAYING = ("r", "yaw", "v", "y")
+"""Channels in which a beat shows, the clearest first."""
+CYCLES = 6.0
+"""Cycles of the sway that a window holds, on average."""
+SLOW_PER_CYCLE = 0.8
+"""Degrees of the polynomial, for each cycle, that takes what is slower off."""
+LOWEST, HIGHEST = 0.15, 6.6
+"""Multiples of the commanded frequency that are looked at: 0.2 to 5, and radians for turns."""
+FINENESS = 0.12
+"""Step of the multiples, in cycles at the end of a window."""
+NYQUIST = 0.45
+"""Cycles a sample up to which a sway can be seen."""
+_AMPLITUDE, _FREQUENCY = (list(COMMANDS).index(f"tail_{n}") for n in ("amplitude", "frequency"))
+
+
+@dataclass(frozen=True, eq=False)
+class Stroke:
+    """The commanded stroke of a run on its grid, and what it makes the hull do.
+
+    Attributes:
+        phase: (n,) commanded phase, rad.
+        amplitude: (n,) commanded amplitude, rad.
+        sway: (n,) channel in which the beat shows, NaN in gaps.
+        step_s: s.
+    """
+
+    phase: FloatArray
+    amplitude: FloatArray
+    sway: FloatArray
+    step_s: float
+
+
+def stroke_of(run: GridRun, steps: CommandSteps) -> Stroke | None:
+    """The stroke of a run; None if no channel shows it."""
+    channel = next((name for name in SWAYING if name in run.channels), None)
+    if channel is None:
+        return None
+    times = run.begin_s + run.since_s
+    edges = np.append(steps.times_s, np.inf)
+    frequency = steps.values[:, _FREQUENCY]
+    turned = np.concatenate([[0.0], np.cumsum(np.diff(steps.times_s) * frequency[:-1])])
+    row = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, len(frequency) - 1)
+    cycles = turned[row] + np.maximum(times - steps.times_s[row], 0.0) * frequency[row]
+    amplitude = steps.values[row, _AMPLITUDE]
+    return Stroke(2.0 * np.pi * cycles, amplitude, run.channels[channel], run.step_s)
+
+
+@dataclass(frozen=True, eq=False)
+class Window:
+    """Samples of a stretch, what is slow in them taken off.
+
+    Attributes:
+        phase: (n,) commanded phase about its middle, rad.
+        amplitude: (n,) commanded amplitude over its mean.
+        slow: (n, k) orthonormal basis of what is slow.
+        sway: (n,) what is left of the channel.
+        rate: commanded frequency at its quickest, cycles a sample.
+    """
+
+    phase: FloatArray
+    amplitude: FloatArray
+    slow: FloatArray
+    sway: FloatArray
+    rate: float
+
+
+def windows_of(stroke: Stroke, multiple: float) -> list[Window]:
+    """Windows of a run that suit sways at about a multiple of the commanded frequency."""
+    beating = stroke.amplitude > 0.0
+    if beating.sum() < 10:
+        return []
+    mean = float(stroke.phase[-1] - stroke.phase[0]) / (2.0 * np.pi * beating.sum())
+    length = int(min(np.ceil(CYCLES / max(mean * multiple, 1e-6)), len(stroke.sway)))
+    made = []
+    for first in range(0, len(stroke.sway) - length + 1, length):
+        own = slice(first, first + length)
+        used = np.isfinite(stroke.sway[own]) & beating[own]
+        if used.sum() < max(12, 0.7 * length):
+            continue
+        made.append(_window(stroke, np.arange(first, first + length)[used]))
+    return made
+
+
+def _window(stroke: Stroke, at: IntArray) -> Window:
+    slow = _slow((at - at[0]).tobytes())
+    phase, amplitude, sway = stroke.phase[at], stroke.amplitude[at], stroke.sway[at]
+    rate = float(np.max(np.diff(phase) / np.diff(at))) / (2.0 * np.pi)
+    return Window(
+        phase - phase.mean(),
+        amplitude / amplitude.mean(),
+        slow,
+        sway - slow @ (slow.T @ sway),
+        rate,
+    )
+
+
+@lru_cache(256)
+def _slow(places: bytes) -> FloatArray:
+    """Orthonormal polynomials at places (n,) of a window, (n, k); most windows share theirs."""
+    at = np.frombuffer(places, np.int64)
+    degree = int(SLOW_PER_CYCLE * CYCLES)
+    vander = np.polynomial.legendre.legvander(2.0 * at / at[-1] - 1.0, degree)
+    basis: FloatArray = np.linalg.qr(vander)[0]
+    return basis
+
+
+def explained(window: Window, multiples: FloatArray) -> FloatArray:
+    """Share of a window's sway at each multiple of the commanded frequency, (m,)."""
+    angle = multiples[:, None] * window.phase
+    share = np.zeros(len(multiples))
+    pair = [window.amplitude * f(angle) for f in (np.cos, np.sin)]
+    c, s = (a - (a @ window.slow) @ window.slow.T for a in pair)
+    cc, ss, cs = (np.einsum("mn,mn->m", *ab) for ab in ((c, c), (s, s), (c, s)))
+    c1, s1 = c @ window.sway, s @ window.sway
+    determinant = np.maximum(cc * ss - cs**2, 1e-12 * (cc * ss + 1e-300))
+    gain = (ss * c1**2 - 2.0 * cs * c1 * s1 + cc * s1**2) / determinant
+    share = gain / max(float(window.sway @ window.sway), 1e-300)
+    seen = multiples * window.rate < NYQUIST
+    result: FloatArray = np.where(seen, np.clip(share, 0.0, 1.0), 0.0)
+    return result
+
+
+def bands() -> list[FloatArray]:
+    """Multiples to try, in bands that share a length of window."""
+    edges = np.geomspace(LOWEST, HIGHEST, 8)
+    return [np.arange(low, high, FINENESS * low / CYCLES) for low, high in pairwise(edges.tolist())]

@@ -1,0 +1,95 @@
+"""Ratios that tell of clocks: of measured to commanded beats, and of angles to rates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fish_env.arrays import FloatArray
+from fish_env.diagnosis.inputs.orders import Stroke, Window, bands, explained, windows_of
+from fish_env.diagnosis.inputs.weighing import Weighed
+
+CLEAR = 0.5
+"""Share of the sway that a beat explains if it is the tail's. In good data it is above 0.8."""
+ALIKE = 0.9
+"""Correlation above which a ratio of an angle's and a rate's increments is one of clocks."""
+SIDE, REFINED = 0.12, 50
+"""How far around a multiple it is refined, relative, and in how many steps."""
+RATIOS = ("roll against p", "pitch against q", "yaw against r",
+          "x against u, v, yaw", "y against u, v, yaw", "z against u, w, pitch")  # fmt: skip
+"""Comparisons whose sizes grow with the clock."""
+
+
+@dataclass(frozen=True)
+class Ratio:
+    """Measured over commanded tail frequency.
+
+    Attributes:
+        value: the ratio.
+        sd: its standard error.
+        clear: share of the sway at that ratio.
+    """
+
+    value: float
+    sd: float
+    clear: float
+
+
+def beat_ratio(strokes: Sequence[Stroke]) -> Ratio | None:
+    """The multiple of the commanded frequency at which some runs sway; None if none is clear."""
+    best, share = 1.0, 0.0
+    for multiples in bands():
+        windows = [w for stroke in strokes for w in windows_of(stroke, float(multiples[0]))]
+        if not windows:
+            continue
+        mean = np.mean([explained(w, multiples) for w in windows], axis=0)
+        if mean.max() > share:
+            best, share = float(multiples[np.argmax(mean)]), float(mean.max())
+    if share < CLEAR:
+        return None
+    return _refined([w for s in strokes for w in windows_of(s, best)], best)
+
+
+def ratio_near(strokes: Sequence[Stroke], near: float = 1.0) -> Ratio | None:
+    """The same ratio, looked for close to where it is known to be."""
+    windows = [w for stroke in strokes for w in windows_of(stroke, near)]
+    found = _refined(windows, near) if windows else None
+    return found if found is not None and found.clear >= CLEAR else None
+
+
+def _refined(windows: Sequence[Window], near: float) -> Ratio:
+    """Mean over windows of where each explains most, weighted by how clearly it does."""
+    multiples = near * np.linspace(1.0 - SIDE, 1.0 + SIDE, 2 * REFINED + 1)
+    shares = np.array([explained(w, multiples) for w in windows])
+    total = shares.mean(axis=0)
+    centre = int(np.argmax(total))
+    peaks, weights = [], []
+    for share in shares:
+        at = int(np.argmax(share))
+        if 0 < at < len(multiples) - 1 and share[at] > CLEAR:
+            peaks.append(_vertex(multiples[at - 1 : at + 2], share[at - 1 : at + 2]))
+            weights.append(share[at] / (1.01 - share[at]))
+    if len(peaks) < 2:
+        return Ratio(float(multiples[centre]), SIDE * near, float(total[centre]))
+    value, weight = np.array(peaks), np.array(weights)
+    middle = float(np.median(value))
+    kept = np.abs(value - middle) < 0.03 * near
+    value, weight = value[kept], weight[kept] / weight[kept].sum()
+    mean = float(weight @ value)
+    sd = float(np.sqrt(weight**2 @ (value - mean) ** 2 * len(value) / max(len(value) - 1, 1)))
+    return Ratio(mean, max(sd, 1e-4), float(total[centre]))
+
+
+def _vertex(x: FloatArray, y: FloatArray) -> float:
+    curve = y[0] - 2.0 * y[1] + y[2]
+    shift = 0.5 * (y[0] - y[2]) / curve if curve < 0.0 else 0.0
+    return float(x[1] + shift * (x[1] - x[0]))
+
+
+def clock_ratio(weighed: Weighed) -> float | None:
+    """How much faster angles and positions grow than rates and speeds say; None if unknown."""
+    found = [c.ratio for name, c in weighed.comparisons.items()
+             if name in RATIOS and c.likeness > ALIKE]  # fmt: skip
+    return float(np.median(found)) if found else None

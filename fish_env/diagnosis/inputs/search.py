@@ -1,0 +1,119 @@
+"""Search for other readings of a dataset under which it agrees with itself and its commands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fish_env.data.schema import Dataset
+from fish_env.diagnosis.inputs.changes import Change
+from fish_env.diagnosis.inputs.clocks import changes_of_clocks
+from fish_env.diagnosis.inputs.library import readings
+from fish_env.diagnosis.inputs.responses import AGAINST
+from fish_env.diagnosis.inputs.weighing import BEAT, Scales, Weighed
+
+SUSPICIOUS = 0.4
+"""Disagreement from which the columns of a comparison are read otherwise."""
+FALLS = 0.2
+"""By how much a mistake, put right, lowers the disagreement of some comparison.
+
+A wrong sign takes it from near 2 to near 0, a unit from 1 to near 0."""
+LEVEL = 0.01
+"""Probability by chance below which a finding is decisive."""
+RIVAL = 8.0
+"""Log likelihood within which another reading explains as much."""
+CLOCKS_TRIED = 500
+"""Distinct rates and offsets of clocks that a search may end at."""
+MOST = 6
+"""Mistakes that are looked for, one after the other."""
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """One mistake, with what speaks for it.
+
+    Attributes:
+        change: what puts it right.
+        gain: log likelihood gained.
+        p: bound on the probability of such a gain by chance, for the best of all readings tried.
+        comparison: which comparison it improves most.
+        before: disagreement of that comparison as declared.
+        after: disagreement with the change.
+        rivals: other changes that explain as much.
+    """
+
+    change: Change
+    gain: float
+    p: float
+    comparison: str
+    before: float
+    after: float
+    rivals: tuple[Change, ...]
+
+    @property
+    def decisive(self) -> bool:
+        """Whether chance cannot have made it, and no other reading than it or its rivals can."""
+        return self.p < LEVEL and self.before - self.after > FALLS
+
+
+def search(dataset: Dataset, scales: Scales) -> tuple[list[Found], Dataset]:
+    """Mistakes in a dataset, the clearest first, and the dataset without them.
+
+    Args:
+        dataset: as it is declared.
+        scales: to weigh readings of it.
+    """
+    found: list[Found] = []
+    now = scales.weigh(dataset)
+    while len(found) < MOST:
+        best = best_reading(dataset, scales, now, readings(dataset))
+        if best is None or not best.decisive:
+            return found, dataset
+        found.append(best)
+        dataset = best.change.applied(dataset)
+        now = scales.weigh(dataset)
+    return found, dataset
+
+
+def best_reading(
+    dataset: Dataset, scales: Scales, now: Weighed, every: Sequence[Change]
+) -> Found | None:
+    """The reading that explains most more than the present one; None if none is in question.
+
+    Args:
+        dataset: as it is read now.
+        scales: to weigh it.
+        now: what it weighs.
+        every: readings of its columns; those of its clocks are found from the data.
+    """
+    tried = [change for change in every if _questioned(change, now)]
+    tried += changes_of_clocks(dataset, scales, now)
+    weighed = [(change, scales.weigh(change.applied(dataset))) for change in tried]
+    if not weighed:
+        return None
+    gains = np.array([now.gain(other) for _, other in weighed])
+    first = int(np.argmax(gains))
+    beats = [i for i, (c, _) in enumerate(weighed) if c.kind == "beat" and "" in c.clocks]
+    if weighed[first][0].kind in ("clock", "beat") and beats:
+        # A beat is the smaller claim where the data cannot tell it from a clock.
+        first = beats[0] if gains[beats[0]] > gains[first] - RIVAL else first
+    change, after = weighed[first]
+    gain = float(gains[first])
+    rivals = tuple(
+        other for (other, _), g in zip(weighed, gains, strict=True)
+        if other is not change and g > gain - RIVAL
+    )  # fmt: skip
+    p = float(min(1.0, (len(every) + CLOCKS_TRIED) * np.exp(-max(gain, 0.0))))
+    own = change.clocks.keys() - {""}
+    pair = (now.of_runs(own), after.of_runs(own)) if own else (now, after)
+    return Found(change, gain, p, *pair[0].clearest(pair[1]), rivals)
+
+
+def _questioned(change: Change, now: Weighed) -> bool:
+    """Whether a comparison that a change may touch is bad."""
+    bad = {name for name, value in now.disagreement.items() if value > SUSPICIOUS and name != BEAT}
+    if change.commands and any(name.endswith(AGAINST) for name in bad):
+        return True
+    return any(set(now.comparisons[name].channels) & change.channels.keys() for name in bad)

@@ -1,1 +1,0 @@
-"""Diagnosis of tables of steady motion: averages under held commands instead of runs over time."""

@@ -1,0 +1,91 @@
+"""Channels that the filter takes as evidence: one table, from which everything else follows.
+
+A further sensor of the state is one more entry. Kernels know a channel by three numbers: its kind,
+where its value is, and the column of the error state that it shows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from fish_env.arrays import IntArray
+from fish_env.identification.state_blocks import first_column
+from fish_env.model.state import BASE_STATES
+
+
+class Kind(IntEnum):
+    """How a channel follows from the state."""
+
+    STATE = 0
+    """A row of the state."""
+    EULER = 1
+    """An Euler angle of the attitude: roll, pitch or yaw."""
+    DRIVE = 2
+    """The tail's angle, which follows from its phase, the commands and the servo's effects."""
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One channel of a record.
+
+    Attributes:
+        name: as in datasets.
+        unit: SI.
+        kind: how it follows from the state.
+        index: row of the state, or which Euler angle.
+        column: column of the error state that it shows, or the first of several.
+        turns: whether it is an angle that goes round.
+    """
+
+    name: str
+    unit: str
+    kind: Kind
+    index: int = 0
+    column: int = 0
+    turns: bool = False
+
+    @property
+    def code(self) -> tuple[int, int, int]:
+        """What kernels know it by."""
+        return int(self.kind), self.index, self.column
+
+
+def _rows(names: str, unit: str, block: str) -> tuple[Channel, ...]:
+    first = first_column(block)
+    return tuple(
+        Channel(name, unit, Kind.STATE, BASE_STATES.index(name), first + i)
+        for i, name in enumerate(names)
+    )
+
+
+_ROTATION = first_column("rotation")
+TABLE = (
+    *_rows("xyz", "m", "position"),
+    Channel("roll", "rad", Kind.EULER, 0, _ROTATION, turns=True),
+    Channel("pitch", "rad", Kind.EULER, 1, _ROTATION),
+    Channel("yaw", "rad", Kind.EULER, 2, _ROTATION, turns=True),
+    *_rows("uvw", "m/s", "velocity"),
+    *_rows("pqr", "rad/s", "rate"),
+    Channel("tail_angle", "rad", Kind.DRIVE, 0, first_column("tail_phase")),
+)
+BY_NAME = {channel.name: channel for channel in TABLE}
+
+
+def usable_channels(names: Iterable[str]) -> tuple[str, ...]:
+    """Channels among those measured that the filter uses, in the table's order."""
+    measured = set(names)
+    return tuple(channel.name for channel in TABLE if channel.name in measured)
+
+
+def body_channels(names: Iterable[str]) -> tuple[str, ...]:
+    """Channels among those measured that show the body's motion."""
+    return tuple(name for name in usable_channels(names) if BY_NAME[name].kind != Kind.DRIVE)
+
+
+def codes_of(names: Iterable[str]) -> IntArray:
+    """(C, 3) kind, index and column of each channel, for kernels."""
+    return np.array([BY_NAME[name].code for name in names], np.int64).reshape(-1, 3)

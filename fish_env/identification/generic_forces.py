@@ -1,0 +1,178 @@
+"""Forces of no particular origin: simple functions of what the fish does, in six directions.
+
+They ask whether anything is left (:mod:`~fish_env.inference.adequacy`), and what is left is
+described by them (:mod:`~fish_env.diagnosis.residual_model`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from fish_env.arrays import FloatArray, IntArray
+from fish_env.identification.filtering import Filtered, NoiseModel, Pushes
+from fish_env.identification.runs import RunData
+from fish_env.inference.estimate.fit import Fit
+from fish_env.sensing.channels import channels_from_states
+
+DIRECTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+
+
+def wrench_unit(direction: str) -> str:
+    """Unit of the force or moment in a direction."""
+    return "N" if DIRECTIONS.index(direction) < 3 else "N m"
+
+
+@dataclass(frozen=True, eq=False)
+class GenericForces:
+    """Functions along some runs, each a force or moment in one of six directions.
+
+    Column 6 * function + direction is one such wrench.
+
+    Attributes:
+        names: of the functions (J).
+        scale: (J,) root mean square of each over the runs that define them, in SI units.
+        bases: per run (T, J), divided by the scale.
+    """
+
+    names: tuple[str, ...]
+    scale: FloatArray
+    bases: list[FloatArray]
+
+    @property
+    def columns(self) -> IntArray:
+        """Every wrench there is (6 J,)."""
+        return np.arange(6 * len(self.names))
+
+    def words(self, column: int) -> tuple[str, str]:
+        """Function and direction of a wrench."""
+        return self.names[column // 6], DIRECTIONS[column % 6]
+
+
+def generic_forces(
+    runs: Sequence[RunData], filtered: Sequence[Filtered], like: GenericForces | None = None
+) -> GenericForces:
+    """The functions along runs.
+
+    Args:
+        runs: the runs.
+        filtered: their motion.
+        like: functions and scales to take over; default: every one that is not zero throughout.
+    """
+    tables = [regressors(run, result) for run, result in zip(runs, filtered, strict=True)]
+    names = list(tables[0]) if like is None else list(like.names)
+    bases = [np.column_stack([table[name] for name in names]) for table in tables]
+    if like is not None:
+        return GenericForces(like.names, like.scale, [b / like.scale for b in bases])
+    scale = np.sqrt(np.mean(np.concatenate(bases) ** 2, axis=0))
+    kept = np.flatnonzero(scale > 1e-9)
+    scaled = [np.ascontiguousarray(basis[:, kept] / scale[kept]) for basis in bases]
+    return GenericForces(tuple(names[i] for i in kept), scale[kept], scaled)
+
+
+def probes(columns: IntArray) -> FloatArray:
+    """Sizes small enough for a slope: a millinewton, a hundredth of a millinewton metre."""
+    return np.where(columns % 6 < 3, 1e-3, 1e-5)
+
+
+class Prodded(Protocol):
+    """A problem that can add a prescribed wrench to each point."""
+
+    def changes(
+        self,
+        z: FloatArray,
+        effects: Mapping[str, FloatArray],
+        noise: NoiseModel,
+        filtered: Sequence[Filtered],
+        pushes: Pushes | None = None,
+    ) -> FloatArray:
+        """What innovations change from the first point to each other (N - 1, D)."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class BoundForces:
+    """Generic forces on the runs of a fit, as the adequacy test asks for them.
+
+    Attributes:
+        fit: the fit they are added to.
+        forces: the forces.
+    """
+
+    fit: Fit
+    forces: GenericForces
+
+    @property
+    def columns(self) -> IntArray:
+        """Every wrench there is (6 J,)."""
+        return self.forces.columns
+
+    def words(self, column: int) -> tuple[str, str]:
+        """Function and direction of a wrench."""
+        return self.forces.words(column)
+
+    def unit(self, column: int) -> float:
+        """Size (N or N m) of the wrench behind one unit of :meth:`changes`."""
+        return float(probes(np.array([column]))[0])
+
+    def changes(self, columns: IntArray) -> FloatArray:
+        """How :func:`probes` of some wrenches change the residuals of the fit (D, N).
+
+        What a wrench does to the hull hardly depends on how jumps of the tail's rate are resolved:
+        a fit that does not look the same in long steps for their sake alone takes those as well.
+        """
+        fit, count = self.fit, 1 + len(columns)  # the first gets none
+        z = np.repeat(fit.point.z[:, None], count, axis=1)
+        effects = {path: np.full(count, value) for path, value in fit.point.effects.items()}
+        pushes = Pushes(self.forces.bases, np.r_[0, columns], np.r_[0.0, probes(columns)])
+
+        def pushed(problem: Any) -> FloatArray:
+            chosen: Prodded = problem
+            return chosen.changes(z, effects, fit.noise, fit.filtered, pushes)
+
+        corners = fit.problem.refines_steps(fit.point.effects)
+        problem = fit.problem.with_long_steps() if corners else fit.comparing
+        out = pushed(problem)
+        if problem is not fit.problem and not np.isfinite(out).all():
+            out = pushed(fit.problem)
+        return out.T
+
+
+def regressors(run: RunData, filtered: Filtered) -> dict[str, FloatArray]:
+    """Functions of the filtered motion that a missing force may depend on, each (T,).
+
+    In SI units, but time in units of 30 s; angles in rad, frequencies in Hz. ``beat`` is amplitude
+    times frequency as commanded; depth, north, east, frequency and amplitude count from their mean
+    over the run; what goes with the tail's phase is multiplied by the square of the beat.
+    """
+    c = channels_from_states(filtered.states.T[:18])
+    row = np.searchsorted(run.command_times, run.clock, side="right") - 1
+    command = run.command_values[np.maximum(row, 0)]
+    offset, amplitude, frequency, stroke, bracket = command.T
+    phase = filtered.states[:, 13]
+    beat = amplitude * frequency
+    u, v, w, p, q, r = (c[name] for name in ("u", "v", "w", "p", "q", "r"))
+    plain: dict[str, FloatArray] = {"constant": np.ones_like(u), "time": run.clock / 30.0}
+    plain |= {"u": u, "v": v, "w": w, "p": p, "q": q, "r": r}
+    plain |= {f"{n}|{n}|": x * np.abs(x) for n, x in zip("uvwpqr", (u, v, w, p, q, r), strict=True)}
+    plain |= {"u v": u * v, "u w": u * w, "u q": u * q, "u r": u * r, "v r": v * r, "w q": w * q}
+    plain |= {"p r": p * r, "u^3": u**3, "v^3": v**3}
+    plain |= {"sin pitch": np.sin(c["pitch"]), "sin roll": np.sin(c["roll"])}
+    plain |= {"cos yaw": np.cos(c["yaw"]), "sin yaw": np.sin(c["yaw"])}
+    depth = c["z"] - np.mean(c["z"])
+    plain |= {"depth": depth, "depth^2": depth**2, "depth^3": depth**3}
+    plain |= {"north": c["x"] - c["x"].mean(), "east": c["y"] - c["y"].mean()}
+    plain |= {"beat speed^2": beat**2, "offset beat^2": offset * beat**2, "u beat": u * beat}
+    plain |= {"frequency": frequency - frequency.mean(), "amplitude": amplitude - amplitude.mean()}
+    plain |= {"block": stroke, "bracket": bracket, "offset": offset}
+    waves: tuple[tuple[str, Callable[[FloatArray], FloatArray]], ...] = (
+        ("sin", np.sin),
+        ("cos", np.cos),
+    )
+    for harmonic in (1, 2, 3):
+        for name, function in waves:
+            plain[f"{name} {harmonic} phase"] = beat**2 * function(harmonic * phase)
+    return plain

@@ -1,0 +1,103 @@
+"""Predictions without feedback: from a filtered state on, the model runs alone."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+
+from fish_env.arrays import FloatArray
+from fish_env.identification.filtering import Filtered, NoiseModel
+from fish_env.identification.runs import RunData
+from fish_env.inference.problem import Point
+from fish_env.model.state import BASE_STATES
+
+
+class Predicting(Protocol):
+    """Runs and a model of them."""
+
+    runs: tuple[RunData, ...]
+
+    def refines_steps(self, effects: Iterable[str]) -> bool:
+        """Whether one of these effect parameters makes the tail's rate jump."""
+        ...
+
+    def innovations(
+        self,
+        z: FloatArray,
+        effects: Mapping[str, FloatArray],
+        noise: NoiseModel,
+        filtered: Sequence[Filtered],
+    ) -> FloatArray:
+        """Innovations (N, residuals) of many points under given gains."""
+        ...
+
+
+def without_feedback(
+    run: RunData,
+    states: int = len(BASE_STATES),
+    corners: bool = False,
+    sd: FloatArray | None = None,
+) -> Filtered:
+    """Gains of zero, so that "innovations" are plain prediction errors.
+
+    Args:
+        run: the run.
+        states: rows of the state.
+        corners: whether the tail's rate may jump.
+        sd: (C,) units that errors count in; default: those of the channels.
+    """
+    samples, channels = run.measured.shape
+    units = np.eye(channels) if sd is None else np.diag(1.0 / sd)
+    return Filtered(
+        np.zeros((samples, len(run.covariance0), channels)),
+        np.tile(units, (samples, 1, 1)),
+        np.zeros((samples, channels)),
+        np.zeros((samples, states)),
+        np.zeros((samples, 6)),
+        0.0,
+        corners=corners,
+    )
+
+
+def errors(problem: Predicting, point: Point, noise: NoiseModel) -> list[FloatArray]:
+    """Measured minus predicted of each run from its initial state, (T, C), NaN where missing."""
+    effects = {path: np.array([value]) for path, value in point.effects.items()}
+    corners = problem.refines_steps(point.effects)
+    still = [without_feedback(run, corners=corners) for run in problem.runs]
+    flat = problem.innovations(point.z[:, None], effects, noise, still)[0]
+    parts = np.split(flat, np.cumsum([run.measured.size for run in problem.runs])[:-1])
+    return [
+        np.where(np.isfinite(run.measured), part.reshape(run.measured.shape), np.nan)
+        for run, part in zip(problem.runs, parts, strict=True)
+    ]
+
+
+def windows(run: RunData, filtered: Filtered, length_s: float) -> list[RunData]:
+    """A run cut into windows that start from its filtered states.
+
+    Effects with states of their own start where beating as commanded has left them. Time goes on
+    counting from the run's start, for effects that grow with it.
+    """
+    edges = np.arange(0.0, run.duration - 0.5 * length_s, length_s)
+    starts = np.searchsorted(run.clock, edges)
+    ends = np.r_[starts[1:], len(run.clock) - 1]
+    return [
+        _cut(run, filtered.states[first, : len(BASE_STATES)], first, last + 1)
+        for first, last in zip(starts, ends, strict=True)
+        if last - first >= 3
+    ]
+
+
+def _cut(run: RunData, state: FloatArray, first: int, last: int) -> RunData:
+    held = np.searchsorted(run.command_times, run.clock[first], side="right") - 1
+    return replace(
+        run.cut(first, last),
+        command_times=np.ascontiguousarray(run.command_times[max(held, 0) :]),
+        command_values=np.ascontiguousarray(run.command_values[max(held, 0) :]),
+        state0=np.ascontiguousarray(state),
+        swimming=run.swimming or first > 0,
+        as_measured=False,
+    )

@@ -1,0 +1,399 @@
+"""One-step innovations of runs over time: fish, runs, what is free, what is noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from copy import copy
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from fish_env.arrays import BoolArray, FloatArray, IntArray
+from fish_env.data.schema import Dataset
+from fish_env.effects import catalogue
+from fish_env.effects.extended import ExtendedModel, build_model
+from fish_env.errors import EffectError
+from fish_env.identification.applied_wrench import EFFECT as APPLIED_WRENCH
+from fish_env.identification.channels import usable_channels
+from fish_env.identification.filtering import (
+    Filtered,
+    Measurement,
+    NoiseModel,
+    Pushes,
+    RunFilter,
+)
+from fish_env.identification.generic_forces import BoundForces, generic_forces
+from fish_env.identification.kernel_kinds import LEAN, quickest
+from fish_env.identification.noise import (
+    disturbance_range,
+    fit_noise,
+    small_disturbance,
+    white_noise_sd,
+)
+from fish_env.identification.open_loop import windows, without_feedback
+from fish_env.identification.parameters import ALIKE, Baseline, changes_of, neutral_values
+from fish_env.identification.phases import settle_phases
+from fish_env.identification.runs import FINER, RunData, prepare_run
+from fish_env.identification.variation import VARIATIONS
+from fish_env.inference.estimate.fit import Fit
+from fish_env.inference.hypotheses import effects_of
+from fish_env.inference.policy import POLICY
+from fish_env.inference.probes import phase_grid
+from fish_env.inference.problem import Point, Problem
+from fish_env.inference.vehicle import EffectFreedom, freedoms
+from fish_env.model.effect import Effect
+from fish_env.params.io import load_fish
+from fish_env.params.schema import FishParams
+
+RANDOM_WALK_PHASE = 0.3
+"""rad/s^0.5. Enough to stay in step with a beat that is a tenth off."""
+
+
+class SeriesProblem(Problem):
+    """Measured runs of a fish, the model that should explain them, and its freedom.
+
+    Args:
+        dataset: measured runs.
+        fish: parameters; default: the dataset's own fish.
+        run_ids: runs to use; default: all.
+        paths: free baseline coefficients; default: all with a prior.
+        effects: names of effects whose parameters are free.
+        user_effects: effects of the caller's own, among ``effects`` or not.
+        dt: longest RK4 step (s), but for a moment after each switch of the commands and for
+            effects that make the tail's rate jump, which get finer ones.
+    """
+
+    known: dict[str, Effect]
+    out_of_step = ("frequency_scale", "battery_sag", "clock_scale")
+    interchangeable = ALIKE
+    variations = VARIATIONS
+
+    def __init__(
+        self,
+        dataset: Dataset,
+        fish: FishParams | None = None,
+        run_ids: Sequence[str] | None = None,
+        paths: Sequence[str] | None = None,
+        effects: Iterable[str] = (),
+        user_effects: Iterable[Effect] = (),
+        dt: float = 0.01,
+    ) -> None:
+        self.dataset = dataset
+        self.dt = dt
+        self.fish = fish or load_fish(dataset.fish)
+        self.known = {**catalogue(), **{e.name: e for e in user_effects}}
+        own = tuple(effect for effect in self.known.values() if effect.name not in catalogue())
+        self.model: ExtendedModel = build_model(
+            self.fish, user_effects=(*own, APPLIED_WRENCH), whole_catalogue=True
+        )
+        self.channels = usable_channels(dataset.channels)
+        self.sensor_sd = np.array(
+            [dataset.noise.get(n) or white_noise_sd(dataset, n) for n in self.channels]
+        )
+        chosen = dataset.ids if run_ids is None else tuple(run_ids)
+        self.runs = tuple(
+            prepare_run(dataset.run(i), self.channels, self.sensor_sd, dt) for i in chosen
+        )
+        self.baseline = Baseline(self.fish, paths)
+        self.effects = tuple(effects)
+        self.unrefined = False
+        self._filters: dict[frozenset[str], RunFilter] = {}
+        unknown = [name for name in self.effects if name not in self.known]
+        if unknown:
+            raise EffectError(f"unknown effects {unknown}; known: {', '.join(self.known)}")
+
+    @property
+    def lean_filter(self) -> RunFilter:
+        """Compiled filter on these runs without effects on the motion."""
+        return self._filter_of(LEAN)
+
+    def filter_for(self, effects: Iterable[str]) -> RunFilter:
+        """The quickest filter that computes with these effect parameters."""
+        return self._filter_of(self.stages_for(effects))
+
+    def stages_for(self, effects: Iterable[str]) -> frozenset[str]:
+        """Stages in the quickest kernel that computes with these effect parameters."""
+        names = {*effects_of(effects), *self.model.effects}
+        hooks = {stage for name in names for stage in self.known[name].hooks}
+        return quickest(hooks)
+
+    def _filter_of(self, stages: frozenset[str]) -> RunFilter:
+        if stages not in self._filters:
+            declared = tuple(e for e in self.model.declared if set(e.hooks) <= stages)
+            if APPLIED_WRENCH not in declared:
+                declared = (*declared, APPLIED_WRENCH)
+            model = replace(self.model, declared=declared)
+            self._filters[stages] = RunFilter(model, self.runs, self.channels)
+        return self._filters[stages]
+
+    def subset(self, count: int) -> SeriesProblem:
+        """The same problem on at most ``count`` runs, spread over all of them."""
+        if len(self.runs) <= count:
+            return self
+        return self.some(self.spread(count))
+
+    def until(self, end_s: float) -> SeriesProblem:
+        """The same problem on the beginnings of its runs."""
+        return self.with_runs([run.until(end_s) for run in self.runs])
+
+    def with_runs(self, runs: Sequence[RunData]) -> SeriesProblem:
+        """The same problem on other runs."""
+        other = copy(self)
+        other.runs = tuple(runs)
+        other._filters = {}
+        return other
+
+    def neutral(self, names: Iterable[str]) -> dict[str, float]:
+        """Values of effects as the fish's file has them, neutral where it says nothing."""
+        return neutral_values(self.model, self.known, names)
+
+    @property
+    def longest_step(self) -> float:
+        """Longest RK4 step (s) between samples."""
+        return max(float(np.max(np.diff(run.clock) / run.substeps[1:])) for run in self.runs)
+
+    @property
+    def longest_run(self) -> float:
+        """Length of the longest run (s)."""
+        return max(run.duration for run in self.runs)
+
+    @property
+    def run_count(self) -> int:
+        """Number of runs."""
+        return len(self.runs)
+
+    def groups(self) -> tuple[IntArray, FloatArray]:
+        """(D,) run of each innovation, and (D,) its time in the run (s)."""
+        run_of = np.repeat(np.arange(len(self.runs)), [run.measured.size for run in self.runs])
+        time_of = [np.repeat(run.clock, len(self.channels)) for run in self.runs]
+        return run_of, np.concatenate(time_of)
+
+    def residual_channels(self) -> tuple[tuple[str, ...], IntArray]:
+        """Names of the channels, and (D,) which of them each innovation is of."""
+        samples = sum(len(run.clock) for run in self.runs)
+        return self.channels, np.tile(np.arange(len(self.channels)), samples)
+
+    @property
+    def measured(self) -> BoolArray:
+        """(D,) whether an innovation belongs to a value that was measured."""
+        return np.concatenate([np.isfinite(run.measured).ravel() for run in self.runs])
+
+    def without_feedback(
+        self, filtered: Sequence[Filtered], noise: NoiseModel
+    ) -> tuple[SeriesProblem, Sequence[Filtered], IntArray]:
+        """Windows from filtered states over which the fish swims alone (see the protocol)."""
+        cut = [
+            windows(run, f, POLICY.prediction_window_s)
+            for run, f in zip(self.runs, filtered, strict=True)
+        ]
+        problem = self.with_runs([window for own in cut for window in own])
+        corners = bool(filtered and filtered[0].corners)
+        still = [without_feedback(w, corners=corners, sd=noise.sensor_sd) for w in problem.runs]
+        return problem, still, np.repeat(np.arange(len(cut)), [len(own) for own in cut])
+
+    @property
+    def run_ids(self) -> tuple[str, ...]:
+        """Ids of the runs."""
+        return tuple(run.id for run in self.runs)
+
+    def some(self, runs: Sequence[int]) -> SeriesProblem:
+        """The same problem on some of its runs."""
+        return self.with_runs([self.runs[i] for i in runs])
+
+    def default_noise(self) -> NoiseModel:
+        """Sensor noise from differences of the data, and a disturbance of a few millinewton."""
+        return small_disturbance(self.sensor_sd)
+
+    def fitted_noise(
+        self,
+        point: Point,
+        noise: NoiseModel,
+        final: bool,
+        filtered: Sequence[Filtered] = (),
+        leverage: Callable[[], FloatArray] | None = None,
+    ) -> NoiseModel:
+        """Noise model of largest likelihood at a point, from at most four runs.
+
+        The search starts from the present one and from a small disturbance, so that a disturbance
+        which once stood in for a misfit does not stay.
+        """
+        few = self.subset(4)
+        within = disturbance_range(self.fish)
+        found = noise
+        for _ in range(3):
+            runs, made_with = few.filtered(point, found, keep_slopes=True), found
+            # The lean filter will do: covariances are replayed, and no effect is computed again.
+            replay = partial(few.lean_filter.replay, runs, made_with)
+            small = replace(
+                small_disturbance(found.sensor_sd), phase_sd=found.phase_sd, spread=found.spread
+            )
+            start = max((found, small), key=replay)
+            found = fit_noise(replay, start, within, 45, self.sensor_sd if final else None)
+            if made_with.is_close(found, 0.4):
+                break
+        return found
+
+    def disturbance_at_limit(self, noise: NoiseModel) -> tuple[str, ...]:
+        """How the disturbance leaves what is plausible: a misfit with another name."""
+        return disturbance_range(self.fish).left_by(noise)
+
+    def settled(self, point: Point, noise: NoiseModel) -> SeriesProblem:
+        """The same problem with the likeliest starting phase of every run that has none."""
+        return settle_phases(self, point, noise)
+
+    @property
+    def starts_known(self) -> bool:
+        """Whether the tail's phase at the start of every run is known."""
+        return all(run.phase_known for run in self.runs)
+
+    def relaxed_noise(self, noise: NoiseModel) -> NoiseModel:
+        """The noise model with a random-walk tail phase, which follows a beat out of step."""
+        return replace(noise, phase_sd=RANDOM_WALK_PHASE)
+
+    def follows_drive(self, noise: NoiseModel) -> bool:
+        """Whether the tail's phase is a random walk."""
+        return noise.phase_sd > 0.0
+
+    def starting_grid(self, name: str) -> tuple[Mapping[str, float], ...]:
+        """Sizes of an effect that drifts in phase, close enough to put it in step again."""
+        return phase_grid(self.known[name], max(run.beats for run in self.runs))
+
+    def batch_key(self, effects: Iterable[str]) -> frozenset[str]:
+        """Stages of the quickest kernel: settings of one kind pay for no effects of another."""
+        return self.stages_for(effects)
+
+    @property
+    def variation(self) -> FloatArray:
+        """(R, K) what each run differs in."""
+        return np.array([run.variation for run in self.runs])
+
+    def with_variation(self, values: FloatArray) -> SeriesProblem:
+        """The same problem with other numbers (R, K) of the runs."""
+        pairs = zip(self.runs, values, strict=True)
+        return self.with_runs([replace(run, variation=own) for run, own in pairs])
+
+    def variation_slopes(
+        self, point: Point, noise: NoiseModel, filtered: Sequence[Filtered], steps: FloatArray
+    ) -> FloatArray:
+        """(D, K) change of each innovation with its own run's numbers, by differences (K,)."""
+        count = 1 + len(steps)
+        more = np.column_stack([np.zeros(len(steps)), np.diag(steps)])
+        effects = {path: np.full(count, value) for path, value in point.effects.items()}
+        z = np.repeat(point.z[:, None], count, axis=1)
+        records, measurement = self._lanes(z, effects)
+        rows = self.filter_for(effects).innovations(
+            records, measurement, noise, filtered, variation=more
+        )
+        return np.asarray((rows[1:] - rows[0]).T / steps)
+
+    def generic_terms(self, fit: Any) -> BoundForces:
+        """Forces and moments that depend on motion, attitude, depth, time, beat or commands."""
+        return BoundForces(fit, generic_forces(self.runs, fit.filtered))
+
+    def freedoms(self, names: Iterable[str]) -> tuple[EffectFreedom, ...]:
+        """Free parameters of effects."""
+        step = min(self.dt, self.longest_step)
+        return tuple(f for name in names for f in freedoms(self.known[name], step))
+
+    def innovations(
+        self,
+        z: FloatArray,
+        effects: Mapping[str, FloatArray],
+        noise: NoiseModel,
+        filtered: Sequence[Filtered],
+        pushes: Pushes | None = None,
+    ) -> FloatArray:
+        """Whitened innovations of many points, shape (N, residuals), runs one after another.
+
+        Args:
+            z: (n, N) baseline coefficients.
+            effects: effect parameter -> (N,).
+            noise: noise model.
+            filtered: gains to use.
+            pushes: a prescribed wrench for each point.
+        """
+        records, measurement = self._lanes(z, effects)
+        return self.filter_for(effects).innovations(records, measurement, noise, filtered, pushes)
+
+    def changes(
+        self,
+        z: FloatArray,
+        effects: Mapping[str, FloatArray],
+        noise: NoiseModel,
+        filtered: Sequence[Filtered],
+        pushes: Pushes | None = None,
+    ) -> FloatArray:
+        """What :meth:`innovations` change from the first point to each other (N - 1, residuals)."""
+        rows = self.innovations(z, effects, noise, filtered, pushes)
+        rows[1:] -= rows[0]  # in place: fresh memory costs as much as the arithmetic
+        return rows[1:]
+
+    def filtered(
+        self,
+        point: Point,
+        noise: NoiseModel,
+        near: Sequence[Filtered] = (),
+        keep_slopes: bool = False,
+    ) -> list[Filtered]:
+        """Extended Kalman filter of every run at one point.
+
+        Args:
+            point: values of the parameters.
+            noise: noise model.
+            near: not needed, a filter begins where its run does.
+            keep_slopes: whether to keep what :meth:`RunFilter.replay` needs.
+        """
+        record, measurement = self.lane(point)
+        corners = self.refines_steps(point.effects)
+        return self.filter_for(point.effects).run(record, measurement, noise, keep_slopes, corners)
+
+    def without_refinement(self) -> SeriesProblem:
+        """The same problem without finer steps for effects that make the tail's rate jump."""
+        other = copy(self)
+        other.unrefined = True
+        return other
+
+    def with_long_steps(self) -> SeriesProblem:
+        """The same problem in steps that will do to compare causes, with the same freedoms."""
+        return self.with_runs([run.in_long_steps() for run in self.runs])
+
+    def refined(self) -> tuple[SeriesProblem, int]:
+        """The same problem in finer steps, to tell what those of motion with corners get wrong."""
+        return self.with_runs([run.in_finer_steps() for run in self.runs]), FINER
+
+    def refines_steps(self, effects: Iterable[str]) -> bool:
+        """Whether one of these effect parameters makes the tail's rate jump."""
+        names = (*effects_of(effects), *self.model.effects)
+        return not self.unrefined and self.is_nonsmooth(names)
+
+    def is_nonsmooth(self, names: Iterable[str]) -> bool:
+        """Whether one of these effects makes the tail's rate jump, whatever the steps."""
+        return any(self.known[name].step_error > 0.0 for name in names)
+
+    def lane(self, point: Point) -> tuple[FloatArray, Measurement]:
+        """Parameter record (parameters, 1) of a point, and what its sensors do."""
+        effects = {path: np.array([value]) for path, value in point.effects.items()}
+        return self._lanes(point.z[:, None], effects)
+
+    def _lanes(
+        self, z: FloatArray, effects: Mapping[str, FloatArray]
+    ) -> tuple[FloatArray, Measurement]:
+        """Parameter records (parameters, N) and what the sensors do, for N points."""
+        changes, measurement = changes_of(
+            self.model, self.known, self.baseline, z, effects, self.channels
+        )
+        model = self.filter_for(effects).model
+        return np.ascontiguousarray(model.records(changes)), measurement
+
+
+def series_of(fit: Fit) -> SeriesProblem:
+    """The problem of a fit to runs over time.
+
+    Raises:
+        TypeError: the fit is one to other data.
+    """
+    if not isinstance(fit.problem, SeriesProblem):
+        raise TypeError(f"expected a fit to runs over time, not to {type(fit.problem).__name__}")
+    return fit.problem

@@ -1,0 +1,1 @@
+"""Tables of steady motion as a problem: beat means, orbits, noise of averages."""

@@ -1,0 +1,57 @@
+"""What differs between runs of one fish, and how a run's own numbers enter its simulation.
+
+Sizes are those of a robot that is opened, trimmed and closed again between runs: a weight block
+put back a tenth of a millimetre aside moves the barycentre by that much, a bubble carries a few
+tenths of a gram, a gyro's zero moves with its temperature, and a camera and a logger are started
+by hand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fish_env.arrays import FloatArray
+from fish_env.inference.estimate.run_variation import RunVariation
+from fish_env.params.packing import RECORD_FIELDS
+
+VARIATIONS = (
+    RunVariation("trim_x", "m", 1e-4),
+    RunVariation("trim_y", "m", 1e-4),
+    RunVariation("trim_z", "m", 1e-4),
+    RunVariation("buoyancy", "kg", 4e-4),
+    RunVariation("gyro_zero_p", "rad/s", 5e-3),
+    RunVariation("gyro_zero_q", "rad/s", 5e-3),
+    RunVariation("gyro_zero_r", "rad/s", 5e-3),
+    RunVariation("clock_offset", "s", 1e-2),
+)
+"""Trim is how far the barycentre of the whole fish at rest is moved."""
+COUNT = len(VARIATIONS)
+_MASS, _BUOYANCY = RECORD_FIELDS.index("mass_total"), RECORD_FIELDS.index("mass_buoyancy")
+_STATIC = {f"trim_{axis}": RECORD_FIELDS.index(f"static_{axis}") for axis in "xyz"}
+_GYROS = {"gyro_zero_p": "p", "gyro_zero_q": "q", "gyro_zero_r": "r"}
+_INDEX = {variation.name: i for i, variation in enumerate(VARIATIONS)}
+
+
+def varied_records(records: FloatArray, own: FloatArray) -> FloatArray:
+    """Parameter records (parameters, N) with a run's own numbers (K, N or 1) added."""
+    moved = records.copy()
+    for name, row in _STATIC.items():
+        moved[row] += own[_INDEX[name]] * records[_MASS]
+    moved[_BUOYANCY] += own[_INDEX["buoyancy"]]
+    return moved
+
+
+def varied_bias(bias: FloatArray, own: FloatArray, channels: Sequence[str]) -> FloatArray:
+    """Offsets of the channels (C, N) with a run's own gyro zeros (K, N or 1) added."""
+    moved = bias.copy()
+    for name, channel in _GYROS.items():
+        if channel in channels:
+            moved[list(channels).index(channel)] += own[_INDEX[name]]
+    return moved
+
+
+def varied_delay(delay: FloatArray, own: FloatArray) -> FloatArray:
+    """Age of the samples (N,) with a run's own clock offset (K, N or 1) added (s)."""
+    return np.asarray(delay + own[_INDEX["clock_offset"]])

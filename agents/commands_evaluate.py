@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.console import Console
 
+from agents.options import TrustEffects
 from fish_env.errors import ConfigError
+from fish_env.files import check_outputs
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -35,6 +37,7 @@ def evaluate(
         int | None, typer.Option(min=1, help="Only the first so many, for a first look.")
     ] = None,
     json: Annotated[Path | None, typer.Option(help="File for all numbers.")] = None,
+    trust_effects: TrustEffects = False,
 ) -> None:
     """Measure an agent on frozen sets of episodes, with 95 % intervals.
 
@@ -48,11 +51,14 @@ def evaluate(
 
     from agents.evaluation.results import evaluate as measure
     from agents.evaluation.results import write_results
-    from agents.evaluation.suites import load_suite, suite_names
-    from agents.registry import load_agents
+    from agents.evaluation.suites import load_suite, suite_files, suite_names
+    from agents.registry import agent_files, load_agents
 
     console = Console()
-    suites = [load_suite(name) for name in (suite_names() if suite == ALL else [suite])]
+    names = suite_names() if suite == ALL else [suite]
+    read = [file for name in names for file in suite_files(name)]
+    check_outputs([json], [*read, *agent_files(agent)])
+    suites = [load_suite(name, trust_effects) for name in names]
     chosen = [(one, each, load_agents(agent, each)) for one in suites for each in task_names(task)]
     results = []
     with Progress(console=console, transient=True) as progress:

@@ -8,6 +8,8 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from agents.options import TrustEffects
+
 
 def register(app: typer.Typer) -> None:
     """Adds the command to `robofish`."""
@@ -28,6 +30,7 @@ def swim(
     out: Annotated[Path, typer.Option(help="Folder for pictures.")] = Path("out/swim"),
     video: Annotated[Path | None, typer.Option(help="A film to write, .mp4.")] = None,
     replay: Annotated[Path | None, typer.Option(help="HTML page that shows it swim.")] = None,
+    trust_effects: TrustEffects = False,
 ) -> None:
     """Let an agent swim one episode, and save pictures of it.
 
@@ -37,5 +40,5 @@ def swim(
     """
     from agents.swimming import Wish, swim_and_show
 
-    wish = Wish(agent, task, suite, seed, path, out, video, replay)
+    wish = Wish(agent, task, suite, seed, path, out, video, replay, trust_effects)
     swim_and_show(Console(), wish)

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from agents.options import TrustEffects
+
 
 def train(
     config: Annotated[str, typer.Argument(help="A YAML file, or a shipped training's name.")],
@@ -18,11 +20,13 @@ def train(
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on with the training in the folder.")
     ] = False,
+    trust_effects: TrustEffects = False,
 ) -> None:
     """Train a policy with Stable-Baselines3.
 
     Leaves `policy.npz`, which swims without PyTorch, its `card.yaml`, checkpoints, evaluations and
     a TensorBoard log. After a stop, `--resume` goes on as if nothing had happened.
+    Files in the folder that a training did not write are never replaced.
 
     **Example:** `robofish train ppo-hold`
     """
@@ -30,7 +34,7 @@ def train(
 
     from agents.training.command import run
 
-    run(Console(), config, out, seed, steps, resume)
+    run(Console(), config, out, seed, steps, resume, trust_effects)
 
 
 def register(app: typer.Typer) -> None:

@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from agents.registry import Agent
+from fish_env.arrays import FloatArray
 from fish_env.envs.robotic_fish_3d import RoboticFish3DEnv
 
-FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
 
 

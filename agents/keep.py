@@ -5,14 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.envs.robotic_fish_3d import RoboticFish3DEnv
 from fish_env.rendering import Scene, write_video
 from fish_env.replay import Group, motion_from_trajectory, write_replay
 from fish_env.trajectory import Trajectory
 
-FloatArray = npt.NDArray[np.float64]
 REPLAY_HZ = 50.0
 """Samples a second of a replay: a beat at 2 Hz has 25."""
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from agents.episode import Episode, FloatArray
+from agents.episode import Episode
+from fish_env.arrays import FloatArray
 from fish_env.envs.config import EnvConfig
 from fish_env.plotting.style import BLACK, BLUE, COLOUR_MAP, SKY, VERMILION, drawing, save
 

@@ -44,6 +44,11 @@ def load_agents(name: str, task: str) -> list[Agent]:
     return _policies(name, task)
 
 
+def agent_files(name: str) -> list[Path]:
+    """The files that an agent of this name is read from; none for those without a file."""
+    return _files(Path(name))
+
+
 def _policies(name: str, task: str) -> list[Agent]:
     from agents import policies
 

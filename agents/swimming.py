@@ -8,7 +8,6 @@ from typing import Any
 
 import gymnasium as gym
 import numpy as np
-import numpy.typing as npt
 from rich.console import Console
 from rich.progress import Progress
 
@@ -16,17 +15,18 @@ from agents.controllers.line_of_sight import LineOfSight
 from agents.controllers.path import PathFollower
 from agents.episode import Episode
 from agents.episode import swim as swim_episode
-from agents.evaluation.suites import load_suite
+from agents.evaluation.suites import load_suite, suite_files
 from agents.keep import Keeper
 from agents.pictures import draw_actuators, draw_path, draw_tracking
-from agents.registry import load_agents
+from agents.registry import agent_files, load_agents
+from fish_env.arrays import FloatArray
 from fish_env.envs.registration import ENV_ID
 from fish_env.envs.robotic_fish_3d import RoboticFish3DEnv
 from fish_env.envs.tasks import TASKS
 from fish_env.errors import ConfigError
+from fish_env.files import check_outputs
 from fish_env.rendering import check_installed
 
-FloatArray = npt.NDArray[np.float64]
 COLUMNS = ("north", "east", "depth")
 SLOWNESS = 1.5
 """A path may take this many times as long as its length at cruise speed, and ten seconds."""
@@ -44,6 +44,7 @@ class Wish:
     out: Path
     video: Path | None
     replay: Path | None
+    trust_effects: bool = False
 
 
 def swim_and_show(console: Console, wish: Wish) -> Episode:
@@ -57,6 +58,8 @@ def swim_and_show(console: Console, wish: Wish) -> Episode:
         raise ConfigError(f"task '{wish.task}': one of {', '.join(TASKS)}")
     if wish.video is not None:
         check_installed()
+    read = [wish.path, *suite_files(wish.suite), *agent_files(wish.agent)]
+    check_outputs([wish.video, wish.replay], read)
     agent = load_agents(wish.agent, wish.task)[0]
     waypoints = None if wish.path is None else read_waypoints(wish.path)
     env, options = _environment(wish, waypoints)
@@ -101,7 +104,7 @@ def _environment(
     wish: Wish, waypoints: FloatArray | None
 ) -> tuple[gym.Env[Any, Any], dict[str, Any] | None]:
     """The environment, and how its episode begins; on a path: at its start, along it."""
-    suite = load_suite(wish.suite)
+    suite = load_suite(wish.suite, wish.trust_effects)
     mode = None if wish.video is None else "rgb_array"
     task = wish.task if waypoints is None else "hold"
     steps, options = suite.episode_steps, None

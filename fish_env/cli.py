@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import atexit
 import gc
+import sys
 import warnings
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -29,6 +30,14 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 
+TrustEffects = Annotated[
+    bool,
+    typer.Option(
+        "--trust-effects",
+        help="Run the Python files of effects that the fish's file names. Reading runs no code.",
+    ),
+]
+
 
 @app.command()
 def simulate(
@@ -39,6 +48,7 @@ def simulate(
         Path | None, typer.Option(help="A .csv or .parquet file; without it, CSV is printed.")
     ] = None,
     replay: Annotated[Path | None, typer.Option(help="HTML page that shows it swim.")] = None,
+    trust_effects: TrustEffects = False,
 ) -> None:
     """Simulate one case and write pose and velocities over time.
 
@@ -49,7 +59,7 @@ def simulate(
     """
     from fish_env.commands.simulate import simulate_case
 
-    simulate_case(case, dt, rate, out, replay)
+    simulate_case(case, dt, rate, out, replay, trust_effects)
 
 
 @app.command()
@@ -67,6 +77,7 @@ def compare(
     replay: Annotated[
         Path | None, typer.Option(help="HTML page that shows measured and simulated swim.")
     ] = None,
+    trust_effects: TrustEffects = False,
 ) -> None:
     """Compare measured motion with its simulation: how wrong it is, and where.
 
@@ -77,7 +88,47 @@ def compare(
     """
     from fish_env.commands.compare import compare_dataset
 
-    compare_dataset(Console(), dataset, fish, json, out, dt, runs, replay)
+    compare_dataset(Console(), dataset, fish, json, out, dt, runs, replay, trust_effects)
+
+
+@app.command("import")
+def import_command(
+    logs: Annotated[
+        list[str],
+        typer.Argument(
+            help="Logs: files, folders, or patterns such as 'runs/*.csv'.", metavar="LOG"
+        ),
+    ],
+    out: Annotated[Path, typer.Option(help="Folder of the dataset to write.")],
+    mapping: Annotated[
+        Path | None, typer.Option(help="A mapping (YAML) to use; without it, one is guessed.")
+    ] = None,
+    fish: Annotated[str | None, typer.Option(help="The fish: preset or parameter file.")] = None,
+    frame: Annotated[
+        str | None, typer.Option(help="ned (z down) or enu (z up), if the logs do not tell.")
+    ] = None,
+    name: Annotated[str | None, typer.Option(help="Name of the dataset.")] = None,
+    run_column: Annotated[
+        str | None, typer.Option(help="Column that tells several runs in one table apart.")
+    ] = None,
+    yes: Annotated[
+        bool, typer.Option("--yes", help="Accept what is guessed; everything assumed is printed.")
+    ] = False,
+) -> None:
+    """Import logs: ROS bags, MATLAB, Parquet, Excel, CSV of any shape.
+
+    Guesses which column is what, shows it with a picture of each run, and writes a dataset once
+    you confirm. The mapping is written beside it as `import.yaml`; `--mapping` uses it again.
+
+    **Example:** `robofish import trial1.bag trial2.bag --out trials --fish zheng-2021-a`
+    """
+    from fish_env.commands.import_logs import Told, import_logs
+
+    console = Console()
+    ask = console.input if sys.stdin.isatty() else None
+    told = Told(fish, frame, name, run_column)
+    if import_logs(console, logs, out, mapping, told, yes, ask) is None:
+        raise typer.Exit(1)
 
 
 @app.command()
@@ -125,18 +176,19 @@ def diagnose(
         ),
     ] = False,
     seed: Annotated[int, typer.Option(help="Of all that is random.")] = 0,
+    trust_effects: TrustEffects = False,
 ) -> None:
     """Find what the simulation gets wrong: a cause with numbers, or an honest "none I know".
 
     Refits the coefficients first, then tries every effect of the catalogue, and measures on runs
     kept apart what the best one gains. Writes `diagnosis.json`, and `extended.yaml`, a fish file,
-    where there is something to extend.
+    where there is something to extend. Other files in the folder stay.
 
     **Example:** `robofish diagnose pool-trials --out out/pool`
     """
     from fish_env.commands.diagnose import diagnose_dataset
 
-    diagnose_dataset(Console(), dataset, out, fish, quick, seed, measured_beats)
+    diagnose_dataset(Console(), dataset, out, fish, quick, seed, measured_beats, trust_effects)
 
 
 @app.command()
@@ -153,6 +205,7 @@ def fit(
     out: Annotated[Path, typer.Option(help="The parameter file to write.")] = Path(
         "identified.yaml"
     ),
+    trust_effects: TrustEffects = False,
 ) -> None:
     """Fit a fish's coefficients to measured runs and write them with their uncertainty.
 
@@ -161,7 +214,7 @@ def fit(
     from fish_env.commands.fit import fit_dataset
 
     names = tuple(name.strip() for name in effects.split(",") if name.strip())
-    fit_dataset(Console(), dataset, fish, names, out)
+    fit_dataset(Console(), dataset, fish, names, out, trust_effects)
 
 
 @app.command()
@@ -169,6 +222,7 @@ def info(
     fish: Annotated[str, typer.Option(help="A preset's name, or a parameter file.")] = (
         "zheng-2021-a"
     ),
+    trust_effects: TrustEffects = False,
 ) -> None:
     """Show a fish: parameters and where they come from, trim, stability, reach and speeds.
 
@@ -176,7 +230,7 @@ def info(
     """
     from fish_env.commands.info import print_info
 
-    print_info(Console(), fish)
+    print_info(Console(), fish, trust_effects)
 
 
 @app.command()
@@ -192,6 +246,7 @@ def plot(
         list[str] | None,
         typer.Option(help="png, svg or pdf; may be given more than once.", show_default="png"),
     ] = None,
+    trust_effects: TrustEffects = False,
 ) -> None:
     """Draw a fish for a paper: the four motions, polar diagrams, forces over a beat, trim curves.
 
@@ -199,7 +254,7 @@ def plot(
     """
     from fish_env.commands.plot import plot_fish
 
-    plot_fish(Console(), kind, fish, out, format or ["png"])
+    plot_fish(Console(), kind, fish, out, format or ["png"], trust_effects)
 
 
 @app.command()
@@ -275,7 +330,8 @@ def _run() -> None:
         _complain("red", f"robofish: {error}")
         raise SystemExit(2) from None
     except OSError as error:
-        _complain("red", f"robofish: {error.filename or ''}: {error.strerror or error}")
+        named = f"{error.filename}: " if error.filename else ""
+        _complain("red", f"robofish: {named}{error.strerror or error}")
         raise SystemExit(2) from None
 
 

@@ -27,6 +27,10 @@ class ConfigError(RoboticFishError):
     """Raised when an environment, training or benchmark configuration is wrong."""
 
 
+class OutputError(RoboticFishError, OSError):
+    """Raised when a file cannot be written, or when writing it would replace one that is read."""
+
+
 class MissingExtraError(RoboticFishError, ImportError):
     """Raised when a feature needs a package that only an optional extra installs."""
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.data.schema import CommandSteps
 from fish_env.effects.extended import EffectValues, build_model
 from fish_env.errors import ScheduleError, SimulationDiverged
@@ -19,11 +20,10 @@ from fish_env.model.emit import OUTPUTS
 from fish_env.model.frames import quaternion_from_euler
 from fish_env.model.runtime import Grid
 from fish_env.model.state import BASE_STATES, INPUTS
-from fish_env.params.io import load_fish
+from fish_env.params.io import as_fish
 from fish_env.params.schema import FishParams
 from fish_env.trajectory import Trajectory
 
-FloatArray = npt.NDArray[np.float64]
 REST_COMMANDS = (0.0, 0.0, 0.0, 0.0, 0.0)
 
 
@@ -121,9 +121,12 @@ class Simulator:
         dt: longest physics step (s).
         effects: effects to switch on, beside those in the fish's file: name -> parameters.
         user_effects: effects of your own (see :func:`fish_env.effects.load_effect_file`).
+        trust_effects: run the effect files (Python code) beside the fish's file that it names;
+            without it they are refused.
 
     Raises:
-        EffectError: an unknown effect, a bad value, or a time constant shorter than dt.
+        EffectError: an unknown effect, a bad value, an effect file that is not trusted, or a time
+            constant shorter than dt.
     """
 
     def __init__(
@@ -132,10 +135,11 @@ class Simulator:
         dt: float = 0.01,
         effects: EffectValues | None = None,
         user_effects: Iterable[Effect] = (),
+        trust_effects: bool = False,
     ) -> None:
         if not 0 < dt <= 0.1:
             raise ScheduleError(f"dt = {dt} s: choose a physics step between 0 and 0.1 s")
-        self.fish = fish if isinstance(fish, FishParams) else load_fish(fish)
+        self.fish = as_fish(fish, trust_effects)
         self.model = build_model(self.fish, effects, user_effects)
         self.model.check_step(dt)
         self.dt = dt

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from fish_env.arrays import FloatArray
 from fish_env.effects.extended import ExtendedModel, build_model
 from fish_env.errors import ScheduleError
 from fish_env.model.runtime import Grid
@@ -20,7 +21,6 @@ from fish_env.model.state import BASE_STATES, INPUTS
 from fish_env.params.schema import FishParams
 from fish_env.sensing import channels_from_states, measured_channels, true_times
 
-FloatArray = npt.NDArray[np.float64]
 BEAT_WITHOUT_TAIL_S = 1.0
 """Time that counts as a beat where the tail is still."""
 SHORTEST_CHUNK_S = 5.0

@@ -9,16 +9,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.errors import ScheduleError, missing_extra
+from fish_env.files import replacing
 from fish_env.model.state import INPUTS
 from fish_env.sensing.channels import channels_from_states
 
 if TYPE_CHECKING:
     import pandas as pd
 
-FloatArray = npt.NDArray[np.float64]
 POSE_COLUMNS = ("x", "y", "z", "qw", "qx", "qy", "qz", "u", "v", "w", "p", "q", "r")
 
 
@@ -80,7 +80,8 @@ class Trajectory:
         """Write columns (default: all) as CSV, with 17 significant digits: reads back equal."""
         named = self._chosen(columns)
         table = np.column_stack(list(named.values()))
-        np.savetxt(path, table, delimiter=",", fmt="%.17g", header=",".join(named), comments="")
+        with replacing(path) as part:
+            np.savetxt(part, table, delimiter=",", fmt="%.17g", header=",".join(named), comments="")
 
     def to_parquet(self, path: str | Path) -> None:
         """Write all columns as Parquet.
@@ -92,7 +93,8 @@ class Trajectory:
             import pyarrow  # noqa: F401
         except ImportError:
             raise missing_extra("Writing Parquet", "pyarrow", "parquet") from None
-        self.to_pandas().to_parquet(path, index=False)
+        with replacing(path) as part:
+            self.to_pandas().to_parquet(part, index=False)
 
     def _chosen(self, columns: tuple[str, ...] | None) -> Mapping[str, FloatArray]:
         everything = self.columns

@@ -16,8 +16,8 @@ import numpy.typing as npt
 
 from agents.controllers.prediction import UNKNOWNS, Costs, Prediction
 from agents.controllers.seen import Seen
+from fish_env.arrays import FloatArray
 
-FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
 SENSITIVITY = np.array([-95.0, -0.476, -0.56])
 """Change of pitch rate, heave speed and yaw rate in 0.1 s per kg m, kg and rad of the unknowns, of

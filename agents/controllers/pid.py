@@ -18,10 +18,10 @@ import numpy.typing as npt
 import yaml
 
 from agents.controllers.seen import Seen
+from fish_env.arrays import BoolArray, FloatArray
 from fish_env.errors import ConfigError
 from fish_env.params.io import config_root
 
-FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
 Gain = float | FloatArray
 """A number, or one for each fish (N,)."""
@@ -190,7 +190,5 @@ class PIDController:
         return np.where(rest, -1.0, action)
 
 
-def _integrated(
-    value: FloatArray, step: FloatArray, grows: npt.NDArray[np.bool_], windup: Gain
-) -> FloatArray:
+def _integrated(value: FloatArray, step: FloatArray, grows: BoolArray, windup: Gain) -> FloatArray:
     return np.where(grows, np.clip(value + step, -windup, windup), value)

@@ -10,15 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from agents.controllers.seen import Seen
+from fish_env.arrays import BoolArray, FloatArray
 from fish_env.envs.config import load_env_config
 from fish_env.envs.layout import MAX_BEAT_S
 from fish_env.simulator import Simulator, time_grid
 
-FloatArray = npt.NDArray[np.float64]
 FAILURE_COST = 5.0
 """For each step that ends outside the tank or diverged."""
 MOMENT, LIFT = "mass.static_moment_rest[0]", "mass.buoyancy"
@@ -102,7 +101,7 @@ class Prediction:
 
     def _swim(
         self, seen: Seen, actions: FloatArray, unknown: FloatArray
-    ) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
+    ) -> tuple[FloatArray, BoolArray]:
         """States from depth on, (steps + 1, rows, N, K), and where they are failures."""
         steps, fish, candidates, _ = actions.shape
         lanes = fish * candidates

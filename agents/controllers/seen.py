@@ -7,9 +7,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.envs.layout import OBSERVATION
-
-FloatArray = npt.NDArray[np.float64]
 
 
 class Seen(NamedTuple):

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import binomtest
 
-FloatArray = npt.NDArray[np.float64]
+from fish_env.arrays import FloatArray
+
 CONFIDENCE = 0.95
 RESAMPLES = 2000
 SEED = 20_261_120

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import numpy.typing as npt
 
 from agents.evaluation.record import Record
+from fish_env.arrays import BoolArray, FloatArray
 
-FloatArray = npt.NDArray[np.float64]
 LATE_S = 10.0
 """Length of the end of an episode over which lasting errors are taken (s)."""
 STEP_RESPONSE_TASK = "hold"
@@ -54,7 +53,7 @@ def action_change(record: Record) -> FloatArray:
     return np.asarray((change * both).sum(axis=0) / np.maximum(both.sum(axis=0), 1))
 
 
-def _begins_outside(record: Record, channel: str) -> npt.NDArray[np.bool_]:
+def _begins_outside(record: Record, channel: str) -> BoolArray:
     first = record.first[f"{channel}_error"]
     return np.asarray(np.abs(first) > record.limits[channel])
 
@@ -66,7 +65,7 @@ def _errors(record: Record, channel: str) -> FloatArray:
     return np.asarray(series / np.where(first == 0, 1.0, first))
 
 
-def _first_time(reached: npt.NDArray[np.bool_]) -> FloatArray:
+def _first_time(reached: BoolArray) -> FloatArray:
     """Index of the first True in each column; the length where there is none."""
     return np.where(reached.any(axis=0), reached.argmax(axis=0), len(reached) - 1).astype(float)
 

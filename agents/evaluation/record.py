@@ -6,12 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from agents.evaluation.suites import Suite
 from agents.registry import Agent
+from fish_env.arrays import BoolArray, FloatArray
 
-FloatArray = npt.NDArray[np.float64]
 KEPT = (
     "depth_error",
     "heading_error",
@@ -45,7 +44,7 @@ class Record:
     first: dict[str, FloatArray]
     reward: FloatArray
     actions: FloatArray
-    alive: npt.NDArray[np.bool_]
+    alive: BoolArray
     period_s: float
     weight: FloatArray
     limits: dict[str, float]

@@ -17,6 +17,7 @@ from agents.evaluation.suites import Suite
 from agents.registry import Agent
 from fish_env.envs.registration import ENV_ID
 from fish_env.errors import ConfigError
+from fish_env.files import write_text
 
 RATES = ("success_rate", "failure_rate")
 
@@ -96,8 +97,7 @@ def _interval(key: str, values: np.ndarray) -> Interval | None:
 def write_results(path: Path, results: Sequence[Result], **more: Any) -> None:
     """Writes results, and whatever else describes them, as JSON."""
     rows = [_as_json(result) for result in results]
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps({**more, "results": rows}, indent=1) + "\n", encoding="utf-8")
+    write_text(path, json.dumps({**more, "results": rows}, indent=1) + "\n")
 
 
 def _as_json(result: Result) -> dict[str, Any]:

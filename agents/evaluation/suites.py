@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +12,13 @@ import yaml
 from fish_env.envs.tasks import TASKS
 from fish_env.envs.vector import RoboticFish3DVectorEnv
 from fish_env.errors import ConfigError
-from fish_env.params.io import config_root
+from fish_env.params.io import config_root, fish_files
 
 RESERVED_SEEDS = range(1_000_000, 2_000_000)
 """Seeds of episodes that belong to the suites: nothing is trained, tuned or selected on them."""
 FINGERPRINT_TOLERANCE = 1e-3
+TRUST = "trust_effects"
+"""Option of the environment that only a caller may give."""
 
 
 @dataclass(frozen=True)
@@ -82,23 +84,55 @@ def suite_names() -> list[str]:
     return [name for name in order if name in found] + sorted(found - set(order))
 
 
-def load_suite(name_or_path: str | Path) -> Suite:
+def load_suite(name_or_path: str | Path, trust_effects: bool = False) -> Suite:
     """Reads a suite: a shipped one by its name, or any file by its path.
+
+    Args:
+        name_or_path: a shipped suite's name, or a file.
+        trust_effects: run the effect files that its fish's file names, see ``load_fish``.
 
     Raises:
         ConfigError: there is none, or it lacks or misspells something.
     """
+    path = _find(name_or_path)
+    try:
+        tree = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: not readable as YAML: {error}") from error
+    suite = _checked(tree, path)
+    if not trust_effects:
+        return suite
+    return replace(suite, environment={**suite.environment, TRUST: True})
+
+
+def suite_files(name_or_path: str | Path) -> list[Path]:
+    """The files that a suite is read from, those of its fish and settings among them.
+
+    Raises:
+        RoboticFishError: one of them is missing or cannot be read.
+    """
+    return [_find(name_or_path), *environment_files(load_suite(name_or_path).environment)]
+
+
+def environment_files(options: Mapping[str, Any]) -> list[Path]:
+    """The files that the environment reads for its options.
+
+    Raises:
+        ParameterError: there is no such fish.
+    """
+    settings, fish = options.get("config"), options.get("fish")
+    found = [Path(settings)] if isinstance(settings, (str, Path)) else []
+    return found if fish is None else [*found, *fish_files(fish)]
+
+
+def _find(name_or_path: str | Path) -> Path:
     named = str(name_or_path) in suite_names()
     path = config_root() / "benchmarks" / f"{name_or_path}.yaml" if named else Path(name_or_path)
     if not path.is_file():
         raise ConfigError(
             f"suite '{name_or_path}': neither one of {', '.join(suite_names())} nor a file"
         )
-    try:
-        tree = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: not readable as YAML: {error}") from error
-    return _checked(tree, path)
+    return path
 
 
 def _checked(tree: Any, path: Path) -> Suite:
@@ -117,5 +151,10 @@ def _checked(tree: Any, path: Path) -> Suite:
         raise ConfigError(
             f"{path}: 'environment' must be a mapping of options, 'fingerprint' one with a number "
             f"for each of {', '.join(TASKS)}"
+        )
+    if TRUST in tree["environment"]:
+        raise ConfigError(
+            f"{path}: environment.{TRUST}: no file can say that it is trusted; remove the key and "
+            "give the option --trust-effects"
         )
     return Suite(**tree)

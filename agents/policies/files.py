@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import os
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -25,6 +24,7 @@ from agents.policies.network import ACTIVATIONS, OUTPUTS, Network
 from fish_env.envs.layout import OBSERVATION
 from fish_env.envs.registration import ENV_ID
 from fish_env.errors import ConfigError
+from fish_env.files import write_bytes
 
 FORMAT = "robofish-policy-1"
 ACTIONS = 5
@@ -80,18 +80,7 @@ def write_policy(policy: PolicyFile, path: Path) -> None:
     document = json.dumps(text, sort_keys=True)
     buffer = io.BytesIO()
     np.savez(buffer, about=np.array(document), digest=np.array(_digest(document, arrays)), **arrays)
-    replace_file(path, buffer.getvalue())
-
-
-def replace_file(path: Path, content: bytes) -> None:
-    """Puts a file in place at once: a reader, or a kill, sees the old one or the new one."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f".{path.name}.part")
-    with part.open("wb") as stream:
-        stream.write(content)
-        stream.flush()
-        os.fsync(stream.fileno())
-    part.replace(path)
+    write_bytes(path, buffer.getvalue())
 
 
 def read_policy(path: str | Path) -> PolicyFile:

@@ -6,14 +6,16 @@ nominal one. A few frames and a slow mean of all sensors tell both, without a re
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from fish_env.arrays import BoolArray
 from fish_env.errors import ConfigError
 
-BoolArray = npt.NDArray[np.bool_]
 Float32Array = npt.NDArray[np.float32]
 MOST_FRAMES = 50
 
@@ -97,6 +99,20 @@ class History:
         for filtered, share in zip(filters, self._share, strict=True):
             filtered += share * (observation - filtered)
         return self._beside(frames, filters)
+
+    def save_state(self) -> dict[str, npt.NDArray[Any]]:
+        """What was seen, as arrays."""
+        return {"frames": self._frames, "filters": self._filters, "fresh": self._fresh}
+
+    def load_state(self, state: Mapping[str, npt.NDArray[Any]]) -> None:
+        """Puts back what :meth:`save_state` gave.
+
+        Raises:
+            KeyError, ValueError: arrays are missing or have other shapes.
+        """
+        self._frames[:] = state["frames"]
+        self._filters[:] = state["filters"]
+        self._fresh[:] = state["fresh"]
 
     @staticmethod
     def _beside(frames: Float32Array, filters: Float32Array) -> Float32Array:

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from fish_env.arrays import FloatArray
+
 Float32Array = npt.NDArray[np.float32]
 
 

@@ -1,32 +1,25 @@
 """Checkpoints: one file with all that a later process needs to go on as if nothing had happened.
 
 It is written beside the old one and put in its place at once, so that a kill at any moment leaves
-a whole file. It contains pickles: it is for the machine that wrote it. What is given to others is
-a policy file.
+a whole file. It holds arrays and JSON and no pickles, so that reading one can run no code.
 """
 
 from __future__ import annotations
 
-import io
-import pickle
-import random
 import zipfile
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import torch
-import yaml
-from stable_baselines3 import PPO, SAC
-
-from agents.policies.files import replace_file
+from agents.policies.files import UNREADABLE
 from agents.training.config import TrainConfig
-from agents.training.model import Model
+from agents.training.learner_state import learner_state, restore_learner
+from agents.training.model import Model, make_model
+from agents.training.plain import read_plain, write_plain
 from agents.training.stack import Stack
 from fish_env.errors import ConfigError
 
-FORMAT = "robofish-checkpoint-1"
+FORMAT = "robofish-checkpoint-2"
 
 
 @dataclass
@@ -55,55 +48,68 @@ class Progress:
 def save_checkpoint(
     path: Path, config: TrainConfig, model: Model, stack: Stack, progress: Progress
 ) -> None:
-    """Writes a checkpoint; a kill leaves the last one."""
-    learner = io.BytesIO()
-    model.save(learner)
-    state = {
+    """Writes a checkpoint; a kill leaves the last one.
+
+    Args:
+        path: the file.
+        config: of the training.
+        model: the learner.
+        stack: its fish.
+        progress: what was done so far.
+
+    Raises:
+        OutputError: the file cannot be written.
+    """
+    tree = {
+        "format": FORMAT,
+        "config": config.tree(),
+        "learner": learner_state(model),
         "stack": stack.state(),
-        "progress": progress,
-        "replay": getattr(model, "replay_buffer", None),
-        "random": (torch.get_rng_state(), np.random.get_state(), random.getstate()),  # noqa: NPY002
+        "progress": asdict(progress),
     }
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w") as archive:
-        archive.writestr("format", FORMAT)
-        archive.writestr("config.yaml", yaml.safe_dump(config.tree()))
-        archive.writestr("learner.zip", learner.getvalue())
-        archive.writestr("state.pkl", pickle.dumps(state))
-    replace_file(path, buffer.getvalue())
+    write_plain(tree, path)
 
 
 def load_checkpoint(path: Path, config: TrainConfig, stack: Stack) -> tuple[Model, Progress]:
     """The learner and its progress; the stack and all random generators are put back.
 
+    Args:
+        path: the file. Reading it runs no code, whatever it holds.
+        config: of the training that goes on.
+        stack: fish of that configuration.
+
     Raises:
-        ConfigError: not a checkpoint, a damaged one, or one of another configuration.
+        ConfigError: not a checkpoint, a damaged one, or one of another configuration or version.
     """
     try:
-        with zipfile.ZipFile(path) as archive:
-            parts = {name: archive.read(name) for name in archive.namelist()}
-        if parts.pop("format") != FORMAT.encode():
-            raise KeyError("format")
-        saved = yaml.safe_load(parts["config.yaml"])
-        learner, content = io.BytesIO(parts["learner.zip"]), parts["state.pkl"]
-    except (zipfile.BadZipFile, KeyError, EOFError) as error:
+        tree = read_plain(path)
+        if tree["format"] != FORMAT:
+            raise ValueError(f"its format is {tree['format']!r}, not {FORMAT!r}")
+        saved = tree["config"]
+        _check_same(path, saved, config.tree())
+        model = make_model(config, stack)
+        stack.restore(tree["stack"])
+        restore_learner(model, tree["learner"])
+        rows = tuple(tree["progress"].pop("evaluations"))
+        progress = Progress(**tree["progress"], evaluations=rows)
+    except (*UNREADABLE, TypeError, AttributeError, IndexError) as error:
+        reason = _earlier(path) or f"not a readable checkpoint ({error})"
         raise ConfigError(
-            f"{path}: not a readable checkpoint ({error}); remove it to start afresh"
+            f"{path}: {reason}; move it away to start afresh, or train into another folder"
         ) from None
-    _check_same(path, saved, config.tree())
-    state: dict[str, Any] = pickle.loads(content)
-    kind = PPO if config.algorithm == "ppo" else SAC
-    model: Model = kind.load(learner, env=stack.outside, device="cpu", force_reset=False)
-    if state["replay"] is not None:
-        assert isinstance(model, SAC)
-        model.replay_buffer = state["replay"]
-    stack.restore(state["stack"])
-    torch_state, numpy_state, python_state = state["random"]
-    torch.set_rng_state(torch_state)
-    np.random.set_state(numpy_state)  # noqa: NPY002
-    random.setstate(python_state)
-    progress: Progress = state["progress"]
     return model, progress
+
+
+def _earlier(path: Path) -> str | None:
+    """What to say of a checkpoint of the first format, which held pickles."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            first = archive.read("format")
+    except UNREADABLE:
+        return None
+    if first != b"robofish-checkpoint-1":
+        return None
+    return "written by an earlier version in a form that could run code, which is not read"
 
 
 def _check_same(path: Path, saved: dict[str, Any], now: dict[str, Any]) -> None:

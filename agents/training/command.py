@@ -9,8 +9,9 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from agents.training.card import shares
-from agents.training.config import TrainConfig, load_train_config
-from agents.training.run import Outcome, train
+from agents.training.config import TrainConfig, files_behind, load_train_config
+from agents.training.run import CONFIG, Outcome, outputs, train
+from fish_env.files import check_outputs
 
 
 class Screen:
@@ -53,6 +54,7 @@ def run(
     seed: int | None,
     steps: int | None,
     resume: bool,
+    trust_effects: bool = False,
 ) -> None:
     """Trains as the command line asks.
 
@@ -63,9 +65,12 @@ def run(
         seed: instead of the configuration's.
         steps: instead of the configuration's.
         resume: go on with what is in the folder.
+        trust_effects: run the effect files that the fish's file names.
     """
-    config = load_train_config(source, seed=seed, total_steps=steps)
+    config = load_train_config(source, trust_effects, seed=seed, total_steps=steps)
     folder = out or Path("out/train") / f"{config.name}-seed-{config.seed}"
+    written = [file for file in outputs(folder) if not (resume and file.name == CONFIG)]
+    check_outputs(written, files_behind(source, config))
     console.print(
         f"training {config.name}, seed {config.seed}, into {folder}",
         highlight=False,

@@ -10,7 +10,7 @@ from typing import Any
 
 import yaml
 
-from agents.evaluation.suites import load_suite
+from agents.evaluation.suites import TRUST, environment_files, load_suite, suite_files
 from agents.policies.files import ACTIONS
 from agents.policies.history import HistorySpec
 from agents.policies.network import ACTIVATIONS
@@ -22,6 +22,7 @@ from fish_env.errors import ConfigError
 from fish_env.params.io import config_root
 
 SCHEDULES = ("constant", "linear")
+NOT_BY_FILE = "no file can say that it is trusted; remove the key and give --trust-effects"
 MOST_FISH = 1000
 """Fish of one batch are seeded one after the other; a seed of a training leaves room for these."""
 
@@ -201,6 +202,8 @@ class TrainConfig:
         evaluation: see :class:`Evaluation`.
         checkpoint_every: steps between two checkpoints.
         threads: see :class:`Threads`.
+        trust_effects: run the effect files that the fish's file names, see ``load_fish``; only a
+            caller says so, never a file.
     """
 
     name: str
@@ -221,6 +224,7 @@ class TrainConfig:
     evaluation: Evaluation = field(default_factory=Evaluation)
     checkpoint_every: int = 100_000
     threads: Threads = field(default_factory=Threads)
+    trust_effects: bool = field(default=False, compare=False)
 
     def __post_init__(self) -> None:
         """Refuses what contradicts itself or the environment.
@@ -243,6 +247,7 @@ class TrainConfig:
                 f"environment.{key}: not together with '{own}'",
             )
         known = inspect.signature(env_options).parameters
+        _check(TRUST not in self.environment, f"environment.{TRUST}: {NOT_BY_FILE}")
         for key in self.environment:
             _check(key in known, f"environment: unknown key '{key}'; known: {', '.join(known)}")
         _check(self.algorithm == "ppo" or not self.imitate.rounds, "imitate: needs ppo")
@@ -264,7 +269,7 @@ class TrainConfig:
         options: dict[str, Any] = {"task": self.task} | suite | dict(self.environment)
         if training and self.settings:
             options["config"] = dict(self.settings)
-        return options
+        return options | {TRUST: self.trust_effects}
 
     def history_spec(self, period_s: float) -> HistorySpec:
         """What the policy sees of the past, for a control period (s)."""
@@ -272,8 +277,8 @@ class TrainConfig:
 
     def tree(self) -> dict[str, Any]:
         """As a YAML file could say it, with every default spelled out."""
-        unused = "sac" if self.algorithm == "ppo" else "ppo"
-        tree = {key: value for key, value in asdict(self).items() if key != unused}
+        left_out = ("sac" if self.algorithm == "ppo" else "ppo", TRUST)
+        tree = {key: value for key, value in asdict(self).items() if key not in left_out}
         return dict(yaml.safe_load(yaml.safe_dump(_plain(tree))))
 
 
@@ -283,11 +288,14 @@ def _plain(value: Any) -> Any:
     return [_plain(item) for item in value] if isinstance(value, (list, tuple)) else value
 
 
-def load_train_config(name_or_path: str | Path, **changes: Any) -> TrainConfig:
+def load_train_config(
+    name_or_path: str | Path, trust_effects: bool = False, **changes: Any
+) -> TrainConfig:
     """Reads a configuration: a shipped one by its name, or any file by its path.
 
     Args:
         name_or_path: ``ppo-hold``, or a path.
+        trust_effects: run the effect files that the fish's file names, see ``load_fish``.
         **changes: fields that replace those of the file; None leaves them.
 
     Raises:
@@ -300,12 +308,26 @@ def load_train_config(name_or_path: str | Path, **changes: Any) -> TrainConfig:
         raise ConfigError(f"{file}: not readable as YAML: {error}") from error
     if isinstance(tree, Mapping):
         tree = {"name": file.stem, **tree}
+        if TRUST in tree:
+            raise ConfigError(f"{file}: {TRUST}: {NOT_BY_FILE}")
+        tree[TRUST] = trust_effects
         unused = {"ppo": "sac", "sac": "ppo"}.get(str(tree.get("algorithm")))
         if unused in tree:
             raise ConfigError(f"{file}: '{unused}' has no effect, the algorithm is another")
     config = build(TrainConfig, tree, str(file))
     given = {key: value for key, value in changes.items() if value is not None}
     return replace(config, **given)
+
+
+def files_behind(name_or_path: str | Path, config: TrainConfig) -> list[Path]:
+    """The files that a training reads: its configuration, suites, fish and settings.
+
+    Args:
+        name_or_path: as for :func:`load_train_config`.
+        config: what was read.
+    """
+    suites = [file for name in config.disturbances for file in suite_files(name)]
+    return [_find(name_or_path), *suites, *environment_files(config.environment)]
 
 
 def _find(name_or_path: str | Path) -> Path:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from fish_env.arrays import FloatArray
+
 SLOWEST, FASTEST = 1e-3, 0.45
 """Angular frequencies (rad/s) that a goal is taken to swing with."""
 

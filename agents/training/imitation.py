@@ -20,10 +20,10 @@ from torch import nn
 from agents.training.config import Imitation, TrainConfig
 from agents.training.stack import Stack
 from agents.training.teacher import Teacher
+from fish_env.arrays import BoolArray, FloatArray
 from fish_env.envs.layout import OBSERVATION
 from fish_env.envs.registration import MAX_EPISODE_STEPS
 
-FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
 BATCH = 1024
 STEP_SIZE = 1e-3
@@ -47,7 +47,7 @@ class Swim:
     seen: Float32Array
     wanted: Float32Array
     reward: Float32Array
-    ended: npt.NDArray[np.bool_]
+    ended: BoolArray
 
 
 def imitate(model: PPO, stack: Stack, config: TrainConfig, settings: Imitation) -> None:

@@ -16,20 +16,23 @@ from stable_baselines3 import PPO
 from stable_baselines3.common import logger
 
 from agents.policies.export import export_policy
-from agents.policies.files import PolicyFile, replace_file, write_policy
+from agents.policies.files import PolicyFile, write_policy
 from agents.policies.pretrained import PretrainedPolicy
 from agents.training.callback import Between, Watcher
 from agents.training.card import card, shares
 from agents.training.checkpoint import Progress, load_checkpoint, save_checkpoint
 from agents.training.config import TrainConfig
 from agents.training.imitation import imitate
+from agents.training.lock import locked
 from agents.training.model import Model, make_model
 from agents.training.stack import Stack, make_stack, seed_episodes
 from agents.training.trial import try_policy
 from fish_env.errors import ConfigError
+from fish_env.files import write_bytes
 
 CHECKPOINT = "checkpoint.zip"
 POLICY = "policy.npz"
+CONFIG, CARD, EVALUATIONS = "config.yaml", "card.yaml", "evaluations.csv"
 
 
 @dataclass(frozen=True)
@@ -62,19 +65,38 @@ def train(config: TrainConfig, folder: Path, watcher: Watcher, resume: bool = Fa
             first one.
 
     Raises:
-        ConfigError: the folder has a checkpoint and ``resume`` is False, or one that does not fit.
+        ConfigError: the folder has a checkpoint and ``resume`` is False, or one that does not fit;
+            another process trains in it; or it has files of the same names that this training did
+            not write. The folder then stays as it was.
+        OutputError: the folder cannot be written.
     """
-    checkpoint = folder / CHECKPOINT
-    if checkpoint.exists() and not resume:
-        raise ConfigError(
-            f"{folder}: a training is kept here already; add --resume to go on with it, or give "
-            "another folder with --out"
-        )
-    folder.mkdir(parents=True, exist_ok=True)
-    replace_file(folder / "config.yaml", _yaml(config.tree()))
-    with _torch_threads(config.threads.torch):
+    with locked(folder), _torch_threads(config.threads.torch):
+        _check_folder(config, folder, resume)
         run = _Run(config, folder)
         return run.finish(watcher)
+
+
+def outputs(folder: Path) -> list[Path]:
+    """The files that a training leaves in a folder, beside its log."""
+    return [folder / name for name in (CONFIG, CHECKPOINT, POLICY, CARD, EVALUATIONS)]
+
+
+def _check_folder(config: TrainConfig, folder: Path, resume: bool) -> None:
+    """Refuses a folder that has something to lose."""
+    if (folder / CHECKPOINT).exists():
+        if not resume:
+            raise ConfigError(
+                f"{folder}: a training is kept here already; add --resume to go on with it, or "
+                "give another folder with --out"
+            )
+        return
+    present = [file for file in outputs(folder) if file.exists()]
+    kept = folder / CONFIG
+    if present and not (kept.is_file() and kept.read_bytes() == _yaml(config.tree())):
+        raise ConfigError(
+            f"{present[0]}: this training did not write it and would replace it; move it away, or "
+            "give another folder with --out"
+        )
 
 
 class _Run:
@@ -88,6 +110,7 @@ class _Run:
         if checkpoint.exists():
             self.model, self.progress = load_checkpoint(checkpoint, config, self.stack)
         else:
+            write_bytes(folder / CONFIG, _yaml(config.tree()))
             self.model, self.progress = make_model(config, self.stack), Progress()
             seed_episodes(self.stack, config)
             if config.imitate.rounds:
@@ -128,7 +151,7 @@ class _Run:
     def _keep(self, row: dict[str, float]) -> None:
         about = card(self.config, self.progress, row)
         write_policy(self._policy(about), self.folder / POLICY)
-        replace_file(self.folder / "card.yaml", _yaml(about))
+        write_bytes(self.folder / CARD, _yaml(about))
 
     def _save(self) -> None:
         for name, share in shares(self.progress, self.stack.fish.cpu_s).items():
@@ -143,7 +166,7 @@ class _Run:
             writer = csv.DictWriter(table, list(rows[0]), lineterminator="\n")
             writer.writeheader()
             writer.writerows(rows)
-            replace_file(self.folder / "evaluations.csv", table.getvalue().encode())
+            write_bytes(self.folder / EVALUATIONS, table.getvalue().encode())
 
 
 def _merit(row: dict[str, float]) -> tuple[float, float]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 
 from agents.training.config import MOST_FISH, TrainConfig
@@ -98,27 +99,40 @@ class Stack:
     outside: VecNormalize
 
     def state(self) -> dict[str, Any]:
-        """All that a later process needs to go on with the same bits."""
-        normalise = self.outside
+        """All that a later process needs to go on with the same bits, as plain values."""
+        outside = self.outside
         return {
-            "envs": [part.env for part in self.fish.parts],
+            "envs": [part.env.save_state() for part in self.fish.parts],
             "cpu_s": self.fish.cpu_s,
-            "monitor": (self.monitor.episode_returns, self.monitor.episode_lengths),
-            "past": self.past.history,
-            "normalise": (normalise.obs_rms, normalise.ret_rms, normalise.returns),
-            "latest": (normalise.old_obs, normalise.old_reward),
+            "monitor": [self.monitor.episode_returns, self.monitor.episode_lengths],
+            "past": self.past.history.save_state(),
+            "means": [[m.mean, m.var, m.count] for m in self._means()],
+            "returns": outside.returns,
+            "latest": [outside.old_obs, outside.old_reward],
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Puts a state back."""
+        """Puts a state back.
+
+        Raises:
+            KeyError, ValueError: the state is not that of such fish.
+        """
         self.fish.cpu_s = state["cpu_s"]
         for part, env in zip(self.fish.parts, state["envs"], strict=True):
-            part.env = env
+            part.env.load_state(env)
         self.monitor.episode_returns, self.monitor.episode_lengths = state["monitor"]
-        self.past.history = state["past"]
+        self.past.history.load_state(state["past"])
         outside = self.outside
-        outside.obs_rms, outside.ret_rms, outside.returns = state["normalise"]
+        for running, saved in zip(self._means(), state["means"], strict=True):
+            running.mean, running.var, running.count = saved
+        outside.returns = state["returns"]
         outside.old_obs, outside.old_reward = state["latest"]
+
+    def _means(self) -> list[RunningMeanStd]:
+        """What observations and returns are normalised by."""
+        seen = self.outside.obs_rms
+        assert isinstance(seen, RunningMeanStd)
+        return [seen, self.outside.ret_rms]
 
 
 def make_stack(config: TrainConfig) -> Stack:

@@ -15,11 +15,11 @@ from agents.controllers.seen import Seen
 from agents.training.config import Imitation
 from agents.training.course import Course
 from agents.training.teacher_gains import TeacherGains, teacher_gains
+from fish_env.arrays import FloatArray
 from fish_env.envs.batch import FishBatch
 from fish_env.envs.layout import OBSERVATION, OUTPUTS
 from fish_env.envs.sb3 import FishVecEnv
 
-FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
 JUMP_OF_DEPTH, JUMP_OF_HEADING = 0.05, 0.3
 """Largest smooth change of a goal's rate (m/s^2, rad/s^2)."""

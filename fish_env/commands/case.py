@@ -49,8 +49,12 @@ class Case:
     effects: Mapping[str, Mapping[str, float]]
 
 
-def read_case(file: Path) -> Case:
+def read_case(file: Path, trust_effects: bool = False) -> Case:
     """Reads a case.
+
+    Args:
+        file: The case.
+        trust_effects: Let its simulation run the effect files that the fish's file names.
 
     Raises:
         ScheduleError: The file is missing, is no JSON, or a key or value is not as it should be;
@@ -60,7 +64,7 @@ def read_case(file: Path) -> Case:
     data = _read_json(file)
     _check_keys(data, REQUIRED, OPTIONAL, str(file))
     return Case(
-        fish=_fish(data["fish"], file),
+        fish=_fish(data["fish"], file, trust_effects),
         duration_s=_number(data["duration_s"], f"{file}: duration_s"),
         commands=_commands(data["schedule"], file),
         initial=_initial(data.get("initial"), f"{file}: initial"),
@@ -98,13 +102,13 @@ def _check_keys(
             raise ScheduleError(f"{where}: the key '{key}' is missing; add it")
 
 
-def _fish(name: Any, file: Path) -> FishParams:
+def _fish(name: Any, file: Path, trust_effects: bool) -> FishParams:
     if not isinstance(name, str):
         raise ScheduleError(f"{file}: fish: expected a preset's name or a path, got {_shown(name)}")
     beside = file.parent / name
     # A name without an ending that is no file is a misspelt preset: load_fish suggests the nearest.
     is_path = name not in list_fish() and (beside.is_file() or beside.suffix in (".yaml", ".yml"))
-    return load_fish(beside if is_path else name)
+    return load_fish(beside if is_path else name, trust_effects)
 
 
 def _commands(rows: Any, file: Path) -> CommandSteps:

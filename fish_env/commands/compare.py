@@ -17,9 +17,10 @@ from fish_env.comparison import RunComparison, RunsComparison, SteadyComparison
 from fish_env.comparison.runs import compare_runs
 from fish_env.comparison.tables import compare_steady
 from fish_env.comparison.words import in_words, shown_unit
-from fish_env.data import Dataset, SteadyDataset, load_dataset
+from fish_env.data import Dataset, SteadyDataset, dataset_files, load_dataset
 from fish_env.errors import DatasetError
-from fish_env.params import FishParams, load_fish
+from fish_env.files import check_outputs, write_text
+from fish_env.params import FishParams, fish_files, load_fish
 
 Comparison = RunsComparison | SteadyComparison
 Groups = Mapping[str, tuple[RunComparison, ...]]
@@ -34,6 +35,7 @@ def compare_dataset(
     dt: float,
     every_run: bool,
     replay: Path | None = None,
+    trust_effects: bool = False,
 ) -> Comparison:
     """Compares a dataset with its simulation and writes what was asked for.
 
@@ -46,6 +48,7 @@ def compare_dataset(
         dt: Longest physics step, s.
         every_run: Print each run, not only conditions.
         replay: HTML page that shows measured and simulated fish swim.
+        trust_effects: Run the effect files that the fish's file names.
 
     Raises:
         RoboticFishError: The data or the fish cannot be used; or a replay of a steady table.
@@ -53,14 +56,12 @@ def compare_dataset(
     measured = load_dataset(dataset)
     if replay is not None and isinstance(measured, SteadyDataset):
         raise DatasetError(f"{dataset}: a table of steady motion has no runs to replay")
-    model = load_fish(fish or measured.fish)
+    model = load_fish(fish or measured.fish, trust_effects)
+    check_outputs([json_file, replay], [*dataset_files(dataset), *fish_files(model)])
     comparison = _compare(console, measured, model, dt)
     print_comparison(console, comparison, every_run)
     if json_file is not None:
-        json_file.parent.mkdir(parents=True, exist_ok=True)
-        json_file.write_text(
-            json.dumps(comparison.as_dict(), indent=1, allow_nan=False) + "\n", encoding="utf-8"
-        )
+        write_text(json_file, json.dumps(comparison.as_dict(), indent=1, allow_nan=False) + "\n")
         console.print(f"numbers: {json_file}", soft_wrap=True)
     if out is not None:
         draw(console, comparison, out)

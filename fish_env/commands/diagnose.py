@@ -13,8 +13,10 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from fish_env.diagnosis.answer import holds_elsewhere, words
-from fish_env.diagnosis.generic_forces import wrench_unit
 from fish_env.diagnosis.pipeline import diagnose
+from fish_env.diagnosis.writing import EXTENDED
+from fish_env.identification.generic_forces import wrench_unit
+from fish_env.inference.verdict import EXTENDING
 
 COLLECT_AFTER = 100_000
 """New objects after which garbage is looked for; Python 3.11 does so after 700."""
@@ -28,6 +30,7 @@ def diagnose_dataset(
     quick: bool,
     seed: int,
     measured_beats: bool = False,
+    trust_effects: bool = False,
 ) -> dict[str, Any]:
     """Diagnoses a dataset, prints the verdict and writes the files.
 
@@ -39,6 +42,7 @@ def diagnose_dataset(
         quick: Take a first look only.
         seed: Of the split into runs and of the null distributions.
         measured_beats: Take the tail's frequencies from the hull's swaying.
+        trust_effects: Run the effect files that the fish's file names.
 
     Raises:
         RoboticFishError: The data or the fish cannot be used.
@@ -54,26 +58,28 @@ def diagnose_dataset(
         def tell(step: str) -> None:
             progress.update(task, description=step)
 
-        answer = diagnose(dataset, out, seed, quick, fish, tell, measured_beats)
+        answer = diagnose(dataset, out, seed, quick, fish, tell, measured_beats, trust_effects)
     print_answer(console, answer)
-    _print_files(console, out)
+    _print_files(console, out, answer["verdict"] in EXTENDING)
     return answer
 
 
-def _print_files(console: Console, out: Path) -> None:
-    files = {
-        "report": "report.html",
-        "numbers": "diagnosis.json",
-        "extended model": "extended.yaml",
-    }
+def _print_files(console: Console, out: Path, extends: bool) -> None:
+    files = {"report": "report.html", "numbers": "diagnosis.json", "extended model": EXTENDED}
     for word, name in files.items():
-        if (out / name).exists():
-            console.print(f"{word}: {out / name}", soft_wrap=True)
+        if not (out / name).exists():
+            continue
+        if name == EXTENDED and not extends:
+            word = "not of this diagnosis, left as it was"
+        console.print(f"{word}: {out / name}", soft_wrap=True)
 
 
 def print_answer(console: Console, answer: dict[str, Any]) -> None:
     """Prints the verdict in words, then what supports it."""
     console.print(f"[bold]{answer['verdict']}[/bold]  {escape(words(answer))}", highlight=False)
+    for fault in answer.get("inputs", ()):
+        word = "inputs" if fault["decisive"] else "perhaps"
+        console.print(f"{word}: {escape(fault['words'])}", highlight=False)
     if answer["quick"]:
         console.print(f"a first look, without {'; '.join(answer['left_out'])}", style="dim")
     if answer["causes"]:

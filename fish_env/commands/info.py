@@ -18,9 +18,15 @@ from fish_env.studies import portrait
 DEG = 180.0 / np.pi
 
 
-def print_info(console: Console, fish_name: str) -> None:
-    """Prints parameters, trim, stability, reach, speeds and effects of a fish."""
-    fish = load_fish(fish_name)
+def print_info(console: Console, fish_name: str, trust_effects: bool = False) -> None:
+    """Prints parameters, trim, stability, reach, speeds and effects of a fish.
+
+    Args:
+        console: Where they go.
+        fish_name: A preset's name, or a parameter file.
+        trust_effects: Run the effect files that the fish's file names.
+    """
+    fish = load_fish(fish_name, trust_effects)
     simulator = Simulator(fish)
     console.print(_heading(fish))
     console.print(_parameters(fish))

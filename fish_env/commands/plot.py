@@ -56,7 +56,14 @@ KINDS: dict[str, Callable[[FishParams, Path, Formats], Path]] = {
 }
 
 
-def plot_fish(console: Console, kind: str, fish: str, out: Path, formats: list[str]) -> list[Path]:
+def plot_fish(
+    console: Console,
+    kind: str,
+    fish: str,
+    out: Path,
+    formats: list[str],
+    trust_effects: bool = False,
+) -> list[Path]:
     """Draws one kind of picture, or all, and names the files.
 
     Args:
@@ -65,6 +72,7 @@ def plot_fish(console: Console, kind: str, fish: str, out: Path, formats: list[s
         fish: A preset's name, or a parameter file.
         out: Folder for the pictures.
         formats: Some of `FORMATS`.
+        trust_effects: Run the effect files that the fish's file names.
 
     Returns:
         The first format of each picture.
@@ -78,7 +86,7 @@ def plot_fish(console: Console, kind: str, fish: str, out: Path, formats: list[s
     unknown = sorted(set(formats) - set(FORMATS))
     if unknown:
         raise ConfigError(f"no format '{unknown[0]}': choose from {', '.join(FORMATS)}")
-    loaded = load_fish(fish)
+    loaded = load_fish(fish, trust_effects)
     written = []
     for name in KINDS if kind == "all" else (kind,):
         with console.status(f"swimming and drawing: {name}"):

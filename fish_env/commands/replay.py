@@ -10,7 +10,9 @@ from rich.console import Console
 from fish_env.commands.case import Case, read_case
 from fish_env.comparison import RunsComparison
 from fish_env.data import Dataset
-from fish_env.params import FishParams, load_fish
+from fish_env.data.description import FILE_NAME
+from fish_env.files import check_outputs
+from fish_env.params import FishParams, fish_files, load_fish
 from fish_env.replay import Group, motion_from_run, motion_from_trajectory, write_replay
 from fish_env.replay.reading import read_replay_file
 from fish_env.simulator import Simulator
@@ -33,13 +35,15 @@ def replay_files(
         case_file: Case the files were simulated from, for tail and block.
 
     Raises:
-        RoboticFishError: A file cannot be read.
+        RoboticFishError: A file cannot be read, or would be replaced by the page.
     """
     case = read_case(case_file) if case_file else None
+    check_outputs([out], [*files, *(file.with_name(FILE_NAME) for file in files), case_file])
     phase = case.initial.tail_phase if case else None
     read = [read_replay_file(file, case.commands if case else None, phase) for file in files]
     named = fish or next((item.fish for item in read if item.fish), None)
     shown = load_fish(named) if named else case.fish if case else load_fish(DEFAULT_FISH)
+    check_outputs([out], fish_files(shown))
     title = ", ".join(item.motion.name for item in read)
     group = Group(title, tuple(item.motion for item in read))
     return _written(console, [group], shown, out, f"Replay of {title}")

@@ -7,21 +7,27 @@ from pathlib import Path
 from typing import TextIO
 
 import numpy as np
-import numpy.typing as npt
 from rich.console import Console
 
+from fish_env.arrays import FloatArray
 from fish_env.commands.case import read_case
 from fish_env.errors import ScheduleError, missing_extra
+from fish_env.files import cannot_write, check_outputs, replacing
+from fish_env.params import fish_files
 from fish_env.simulator import Simulator
 from fish_env.trajectory import POSE_COLUMNS, Trajectory
 
-FloatArray = npt.NDArray[np.float64]
 COLUMNS = ("t", *POSE_COLUMNS)
 SUFFIXES = (".csv", ".parquet")
 
 
 def simulate_case(
-    case_file: Path, dt: float, rate_hz: float, out: Path | None, replay: Path | None = None
+    case_file: Path,
+    dt: float,
+    rate_hz: float,
+    out: Path | None,
+    replay: Path | None = None,
+    trust_effects: bool = False,
 ) -> None:
     """Simulates a case and writes its motion, to standard output if no file is named.
 
@@ -31,13 +37,16 @@ def simulate_case(
         rate_hz: Samples per second.
         out: `.csv` or `.parquet` file.
         replay: HTML page that shows the fish swim.
+        trust_effects: Run the effect files that the fish's file names.
 
     Raises:
         ScheduleError: The case or the output's ending is not as it should be.
+        OutputError: An output would replace a file that is read, or cannot be written.
     """
     if out is not None and out.suffix not in SUFFIXES:
         raise ScheduleError(f"{out}: give the output the ending .csv or .parquet")
-    case = read_case(case_file)
+    case = read_case(case_file, trust_effects)
+    check_outputs([out, replay], [case_file, *fish_files(case.fish)])
     simulator = Simulator(case.fish, dt, case.effects)
     trajectory = simulator.run(case.commands, case.duration_s, case.initial, rate_hz)
     write_table(pose_table(trajectory), out)
@@ -62,11 +71,15 @@ def pose_table(trajectory: Trajectory) -> FloatArray:
 def write_table(table: FloatArray, out: Path | None) -> None:
     """Writes a table with all digits, as its file's ending says, or as CSV to standard output."""
     if out is None:
-        _write_csv(table, sys.stdout)
+        try:
+            _write_csv(table, sys.stdout)
+            sys.stdout.flush()
+        except OSError as error:
+            raise cannot_write("standard output", error) from error
     elif out.suffix == ".parquet":
         _write_parquet(table, out)
     else:
-        with out.open("w", encoding="utf-8") as file:
+        with replacing(out) as part, part.open("w", encoding="utf-8") as file:
             _write_csv(table, file)
 
 
@@ -82,4 +95,5 @@ def _write_parquet(table: FloatArray, out: Path) -> None:
         raise missing_extra("Writing Parquet", "pyarrow", "parquet") from None
     import pandas as pd
 
-    pd.DataFrame(table, columns=list(COLUMNS)).to_parquet(out, index=False)
+    with replacing(out) as part:
+        pd.DataFrame(table, columns=list(COLUMNS)).to_parquet(part, index=False)

@@ -6,7 +6,7 @@ from fish_env.comparison.errors import ChannelError
 from fish_env.comparison.runs import RunComparison, RunsComparison, compare_runs
 from fish_env.comparison.tables import ObservationComparison, SteadyComparison, compare_steady
 from fish_env.data import Dataset, SteadyDataset
-from fish_env.params import FishParams, load_fish
+from fish_env.params import FishParams, as_fish
 
 __all__ = [
     "ChannelError",
@@ -24,6 +24,7 @@ def compare(
     dataset: Dataset | SteadyDataset,
     fish: FishParams | str | Path | None = None,
     dt: float = 0.01,
+    trust_effects: bool = False,
 ) -> RunsComparison | SteadyComparison:
     """Simulates what a dataset measured and compares the two.
 
@@ -31,11 +32,12 @@ def compare(
         dataset: Runs over time, or a table of steady motion.
         fish: Another fish than the one the dataset names.
         dt: Longest physics step, s.
+        trust_effects: Run the effect files that the fish's file names, see `load_fish`.
 
     Raises:
         RoboticFishError: The fish is unknown, or its simulation is not possible.
     """
-    chosen = fish if isinstance(fish, FishParams) else load_fish(fish or dataset.fish)
+    chosen = as_fish(fish or dataset.fish, trust_effects)
     if isinstance(dataset, SteadyDataset):
         return compare_steady(dataset, chosen, dt)
     return compare_runs(dataset, chosen, dt)

@@ -9,11 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.data import CHANNELS, OBSERVATIONS, unwrap_angle
 
-FloatArray = npt.NDArray[np.float64]
 UNITS = {"length": "m", "angle": "rad", "speed": "m/s", "rate": "rad/s"}
 WINDING = ("roll", "yaw")
 """Angles that may pass the end of their range, where they jump by a turn."""

@@ -7,17 +7,17 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.comparison.errors import ChannelError, aligned, channel_error, plain, unit_of
 from fish_env.comparison.start import measured_start, opening
 from fish_env.data import Dataset, Run
+from fish_env.data.clock import check_seconds
 from fish_env.model.state import INPUTS
 from fish_env.params import FishParams
 from fish_env.sensing import measured_channels, true_times
 from fish_env.simulator import InitialState, Simulator
 
-FloatArray = npt.NDArray[np.float64]
 PHASES = 16
 """Tail phases that are tried where the phase at the start is not known."""
 
@@ -118,9 +118,11 @@ def compare_runs(
         progress: Called with the id of each finished run.
 
     Raises:
+        DatasetError: The times of a run can hardly be in seconds.
         EffectError: `dt` is too long for an effect.
         SimulationDiverged: A simulation did not stay finite.
     """
+    check_seconds(dataset)
     simulator, compared = Simulator(fish, dt), []
     for run in dataset.runs:
         compared.append(compare_run(simulator, run))

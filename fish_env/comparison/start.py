@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from fish_env.arrays import BoolArray, FloatArray
 from fish_env.comparison.errors import WINDING
 from fish_env.data import Run, unwrap_angle
 from fish_env.effects.extended import ExtendedModel
@@ -15,7 +15,6 @@ from fish_env.model.state import INPUTS
 from fish_env.sensing import measured_channels
 from fish_env.simulator import InitialState
 
-FloatArray = npt.NDArray[np.float64]
 FEWEST_SAMPLES = 5
 FITTED_BEATS = 2
 POSE = ("x", "y", "z", "roll", "pitch", "yaw")
@@ -28,7 +27,7 @@ def first_beat_s(run: Run) -> float:
     return float(1.0 / frequency) if frequency > 0.0 else 1.0
 
 
-def opening(run: Run, beats: int = 1) -> npt.NDArray[np.bool_]:
+def opening(run: Run, beats: int = 1) -> BoolArray:
     """Which samples lie in the first tail beats, shape (n,); at least the first five."""
     inside = run.time_s <= run.time_s[0] + beats * first_beat_s(run)
     inside[:FEWEST_SAMPLES] = True

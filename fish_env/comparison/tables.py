@@ -8,15 +8,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.comparison.errors import plain, unit_of
 from fish_env.data import COMMANDS, SteadyDataset
 from fish_env.effects.extended import build_model
 from fish_env.params import FishParams
 from fish_env.steady import steady_motion
 
-FloatArray = npt.NDArray[np.float64]
 SMALL = 0.1
 """Percentages leave out values below this share of the largest measured one: near zero they say
 nothing."""

@@ -1,10 +1,11 @@
 """Measured data: runs of a real fish over time, and tables of its steady motion.
 
-`load_dataset` reads a folder with a `dataset.yaml`, `write_dataset` writes one, and `split_runs`
-divides the runs for fitting, selecting and the final check.
+`load_dataset` reads a folder with a `dataset.yaml`, `write_dataset` writes one, `from_frames` makes
+one of pandas frames, and `split_runs` divides the runs for fitting, selecting and the final check.
 """
 
-from fish_env.data.reading import list_datasets, load_dataset
+from fish_env.data.importing.from_pandas import from_frames
+from fish_env.data.reading import dataset_files, list_datasets, load_dataset
 from fish_env.data.schema import CommandSteps, Dataset, Run, SteadyDataset
 from fish_env.data.splits import Split, split_runs
 from fish_env.data.units import unwrap_angle
@@ -20,6 +21,8 @@ __all__ = [
     "Run",
     "Split",
     "SteadyDataset",
+    "dataset_files",
+    "from_frames",
     "list_datasets",
     "load_dataset",
     "split_runs",

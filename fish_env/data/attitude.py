@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from fish_env.arrays import FloatArray
 from fish_env.data.place import Place
-from fish_env.data.schema import FloatArray
 from fish_env.data.vocabulary import QUATERNION
 
 NORM_TOLERANCE = 0.01

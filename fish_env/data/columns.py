@@ -4,9 +4,9 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
+from fish_env.arrays import FloatArray
 from fish_env.data.description import Description
 from fish_env.data.plausibility import check_range
-from fish_env.data.schema import FloatArray
 from fish_env.data.table import Table
 from fish_env.data.units import Unit
 from fish_env.data.vocabulary import COMMANDS, Quantity
@@ -21,7 +21,7 @@ def read_quantity(
         DatasetError: A cell is no finite number or out of range, or no cell holds anything.
     """
     values = table.numbers(name, may_miss) * unit.factor
-    place = table.place.at(column=name)
+    place = table.at(name)
     if np.isnan(values).all():
         raise place.refuse("no row has a value", "Leave the column out of dataset.yaml")
     check_range(values, quantity, unit, table.rows, place)
@@ -62,6 +62,7 @@ def read_commands(table: Table, description: Description) -> FloatArray:
 
 
 def note_ignored(table: Table, used: Iterable[str]) -> tuple[str, ...]:
-    """Words a note for each column of the file that dataset.yaml does not declare."""
-    ignored = [name for name in table.cells if name not in set(used)]
+    """Words a note for each column of the file that holds no quantity of dataset.yaml."""
+    columns = {table.label(name) for name in used}
+    ignored = [name for name in table.cells if name not in columns]
     return tuple(f"{table.place.at(column=name)}: not declared, ignored" for name in ignored)

@@ -6,12 +6,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
+from fish_env.data.declared import TIME, Clock, check_columns, parse_clock, parse_column
 from fish_env.data.frames import FRAMES
 from fish_env.data.mapping import Section, read_section
 from fish_env.data.place import Place, closest
 from fish_env.data.plausibility import check_value
+from fish_env.data.retiming import Clocks, parse_clocks
 from fish_env.data.schema import Start
-from fish_env.data.units import SI_UNIT, Unit, parse_unit
+from fish_env.data.table import Column
+from fish_env.data.units import SI_UNIT, Unit
 from fish_env.data.vocabulary import (
     CHANNELS,
     COMMANDS,
@@ -35,13 +38,14 @@ _PHASE = Quantity("angle", -2.0 * math.pi, 2.0 * math.pi)
 
 @dataclass(frozen=True)
 class RunEntry:
-    """One entry under `runs`: as `Run`, with the file that holds it."""
+    """One entry under `runs`: as `Run`, with the file that holds it and its clocks' corrections."""
 
     id: str
     file: Path
     start: Start
     tail_phase: float | None
     condition: str | None
+    clocks: Clocks = Clocks()
 
 
 @dataclass(frozen=True)
@@ -55,6 +59,8 @@ class Description:
         frame: "ned" or "enu".
         channels: Unit of each declared channel, or observation of a steady table.
         commands: Unit of each command that has a column.
+        columns: Where each of these channels and commands stands in the files.
+        clock: The time column.
         constants: SI value of each command that has none.
         noise: One-sigma value of channels, SI, in the file's frame.
         runs: The runs; empty for a steady table.
@@ -68,6 +74,8 @@ class Description:
     frame: str
     channels: dict[str, Unit]
     commands: dict[str, Unit]
+    columns: dict[str, Column]
+    clock: Clock
     constants: dict[str, float]
     noise: dict[str, float]
     runs: tuple[RunEntry, ...]
@@ -81,23 +89,39 @@ def read_description(file: Path) -> Description:
     Raises:
         DatasetError: It is missing or says anything that the format does not know.
     """
-    top = read_section(Place(file))
+    return parse_description(read_section(Place(file)))
+
+
+def parse_description(top: Section) -> Description:
+    """Checks the content of dataset.yaml.
+
+    Raises:
+        DatasetError: It says anything that the format does not know.
+    """
     top.require(["format"])
     top.choice("format", [FORMAT])
     steady = "kind" in top and top.choice("kind", ["steady"]) == "steady"
-    top.allow([*_COMMON, *_OPTIONAL, *(("kind", "file") if steady else ("runs",))])
+    own = ("kind", "file") if steady else ("runs", "time", "clock")
+    top.allow([*_COMMON, *_OPTIONAL, *own])
     top.require(_COMMON)
-    channels = _parse_units(top.section("channels"), OBSERVATIONS if steady else FILE_CHANNELS)
+    frame = top.choice("frame", FRAMES)
+    known = OBSERVATIONS if steady else FILE_CHANNELS
+    channels, columns = _parse_columns(top.section("channels"), known, frame)
     if not steady:
-        _check_attitude(channels, top.at("channels"))
-    commands = _parse_units(top.section("commands"), COMMANDS, "command")
+        _check_attitude(channels, columns, top.at("channels"))
+    commands, command_columns = _parse_columns(top.section("commands"), COMMANDS, frame, "command")
+    columns |= command_columns
+    clock = parse_clock(top)
+    check_columns(columns, clock, top)
     return Description(
         place=top.place,
         name=top.text("name"),
         fish=_find_fish(top),
-        frame=top.choice("frame", FRAMES),
+        frame=frame,
         channels=channels,
         commands=commands,
+        columns=columns,
+        clock=clock,
         constants=_parse_constants(top, commands),
         noise=_parse_noise(top.section("noise"), channels),
         runs=() if steady else _parse_runs(top),
@@ -106,23 +130,24 @@ def read_description(file: Path) -> Description:
     )
 
 
-def _parse_units(
-    section: Section, known: Mapping[str, Quantity], what: str = "channel"
-) -> dict[str, Unit]:
-    # The time column is always in seconds; saying so is allowed.
-    times = {"t": Quantity("time")} if what == "channel" else {}
+def _parse_columns(
+    section: Section, known: Mapping[str, Quantity], frame: str, what: str = "channel"
+) -> tuple[dict[str, Unit], dict[str, Column]]:
+    # `t: s` among the channels tells of the clock.
+    times = [TIME] if what == "channel" else []
     section.allow([*known, *times], what)
-    units = {
-        name: parse_unit(section.text(name), {**known, **times}[name], section.at(name))
-        for name in section
-    }
-    units.pop("t", None)
+    units, columns = dict[str, Unit](), dict[str, Column]()
+    for name in section:
+        if name != TIME:
+            units[name], columns[name] = parse_column(section, name, known[name], frame)
     if what == "channel" and not units:
         raise section.place.refuse("no channel is declared", "Declare at least one: `x: m`")
-    return units
+    return units, columns
 
 
-def _check_attitude(channels: Mapping[str, Unit], place: Place) -> None:
+def _check_attitude(
+    channels: Mapping[str, Unit], columns: Mapping[str, Column], place: Place
+) -> None:
     given = [name for name in QUATERNION if name in channels]
     if given and len(given) < len(QUATERNION):
         raise place.refuse(
@@ -134,6 +159,10 @@ def _check_attitude(channels: Mapping[str, Unit], place: Place) -> None:
         raise place.refuse(
             f"the attitude is declared twice, as a quaternion and as {', '.join(angles)}",
             "Declare one of the two",
+        )
+    if len({columns[name].frame for name in given}) > 1:
+        raise place.refuse(
+            f"{', '.join(QUATERNION)} are declared in two frames", "Give the four one frame"
         )
 
 
@@ -213,7 +242,7 @@ def _parse_runs(top: Section) -> tuple[RunEntry, ...]:
 
 def _parse_run(item: object, top: Section) -> RunEntry:
     section = Section(item, top.at("runs"))
-    section.allow(["id", "file", "start", "tail_phase", "condition"])
+    section.allow(["id", "file", "start", "tail_phase", "condition", "clock"])
     id = section.text("id")
     section = Section(item, Place(top.place.file, run=id))
     section.require(["file", "start", "tail_phase"])
@@ -223,6 +252,7 @@ def _parse_run(item: object, top: Section) -> RunEntry:
         start=cast(Start, section.choice("start", ["rest", "unknown"])),
         tail_phase=_parse_phase(section),
         condition=section.text("condition") if "condition" in section else None,
+        clocks=parse_clocks((section if "clock" in section else top).section("clock")),
     )
 
 

@@ -29,7 +29,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from fish_env.data.schema import CommandSteps, Dataset, FloatArray, Run, SteadyDataset
+from fish_env.arrays import FloatArray
+from fish_env.data.schema import CommandSteps, Dataset, Run, SteadyDataset
 from fish_env.data.vocabulary import COMMANDS
 
 FRAMES = ("ned", "enu")

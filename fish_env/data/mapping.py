@@ -42,6 +42,11 @@ class Section:
         self._content = content
         self.place = place
 
+    @property
+    def content(self) -> dict[str, Any]:
+        """A copy of all that stands in it."""
+        return dict(self._content)
+
     def __contains__(self, key: str) -> bool:
         return key in self._content
 
@@ -113,6 +118,10 @@ class Section:
             raise self.at(key).refuse(f"'{text}' is not a finite number", "Write a plain number")
         return value
 
+    def holds_section(self, key: str) -> bool:
+        """Whether the value of a key is a section of its own."""
+        return isinstance(self._content.get(key), dict)
+
     def section(self, key: str) -> "Section":
         """Returns the section under a key; one that is absent is empty.
 
@@ -140,7 +149,19 @@ def read_section(place: Place) -> Section:
     Raises:
         DatasetError: The file is missing, empty or no YAML, or a key stands in it twice.
     """
-    text = read_text(place)
+    return parse_section(read_text(place), place)
+
+
+def parse_section(text: str, place: Place) -> Section:
+    """Reads YAML text that holds one mapping.
+
+    Args:
+        text: The YAML.
+        place: Where it stands, for errors.
+
+    Raises:
+        DatasetError: The text is empty or no YAML, or a key stands in it twice.
+    """
     try:
         content = yaml.load(text, Loader=TextLoader)
     except (yaml.YAMLError, TypeError) as error:

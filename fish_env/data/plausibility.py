@@ -6,8 +6,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from fish_env.arrays import FloatArray
 from fish_env.data.place import Place
-from fish_env.data.schema import FloatArray
 from fish_env.data.units import Unit
 from fish_env.data.vocabulary import Quantity
 

@@ -1,9 +1,11 @@
 """Reading measured data: a folder with dataset.yaml and its CSV files."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from fish_env.data.description import FILE_NAME, Description, read_description
-from fish_env.data.frames import switch_noise_frame
+from fish_env.data.model_frame import noise_to_model_frame
 from fish_env.data.place import closest
 from fish_env.data.run_file import read_run
 from fish_env.data.schema import Dataset, Run, SteadyDataset, identical_runs
@@ -38,6 +40,18 @@ def load_dataset(folder_or_name: str | Path) -> Dataset | SteadyDataset:
     return _read_runs(description)
 
 
+def dataset_files(folder_or_name: str | Path) -> list[Path]:
+    """Returns the files that `load_dataset` reads: dataset.yaml and its tables.
+
+    Raises:
+        DatasetError: There is no such dataset, or its description is not as it should be.
+    """
+    file = find_description(folder_or_name)
+    description = read_description(file)
+    tables = [entry.file for entry in description.runs]
+    return [file, *tables, *([description.table] if description.table is not None else [])]
+
+
 def find_description(folder_or_name: str | Path) -> Path:
     """Returns the path of a dataset's dataset.yaml.
 
@@ -63,6 +77,17 @@ def _packaged() -> Path:
 
 def _read_runs(description: Description) -> Dataset:
     read = [read_run(description, entry) for entry in description.runs]
+    dataset = build_dataset(description, read)
+    return replace(dataset, notes=(*_folder_notes(description), *dataset.notes))
+
+
+def build_dataset(description: Description, read: Sequence[tuple[Run, tuple[str, ...]]]) -> Dataset:
+    """Builds a dataset from its runs.
+
+    Args:
+        description: What dataset.yaml says.
+        read: The runs, each with the notes of its reading.
+    """
     runs = tuple(run for run, _ in read)
     run_notes = [note for _, notes in read for note in notes]
     return Dataset(
@@ -72,13 +97,16 @@ def _read_runs(description: Description) -> Dataset:
         noise=_model_noise(description),
         about=description.about,
         notes=(*_dataset_notes(description, runs), *run_notes),
+        declared={
+            name: (description.columns[name].name, unit.name)
+            for name, unit in (description.channels | description.commands).items()
+        },
+        frame=description.frame,
     )
 
 
 def _model_noise(description: Description) -> dict[str, float]:
-    noise = description.noise
-    if description.frame == "enu":
-        noise = switch_noise_frame(noise)
+    noise = noise_to_model_frame(description.noise, description.columns)
     if "depth" not in noise:
         return noise
     others = {name: sigma for name, sigma in noise.items() if name != "depth"}
@@ -88,15 +116,25 @@ def _model_noise(description: Description) -> dict[str, float]:
 def _dataset_notes(description: Description, runs: tuple[Run, ...]) -> list[str]:
     place, notes = description.place, []
     if description.frame == "enu":
-        notes.append(f"{place}: converted from frame enu to ned")
+        offset = description.columns.get("tail_offset")
+        turned = "no command" if offset is not None and offset.frame == "ned" else "tail_offset"
+        notes.append(
+            f"{place}: converted from frame enu to ned; of the commands, {turned} changed its sign"
+        )
     if "qw" in description.channels:
         notes.append(f"{place}: the quaternion is read as roll, pitch and yaw")
     if "depth" in description.channels:
         notes.append(f"{place}: depth is read as z, which points down")
-    listed = {entry.file.resolve() for entry in description.runs}
-    for file in sorted(place.file.parent.glob("*.csv")):
-        if file.resolve() not in listed:
-            notes.append(f"{place}: no run names {file.name}, which lies beside it")
     for first, second in identical_runs(runs):
         notes.append(f"{place}: runs {first} and {second} hold the same samples")
     return notes
+
+
+def _folder_notes(description: Description) -> list[str]:
+    place = description.place
+    listed = {entry.file.resolve() for entry in description.runs}
+    return [
+        f"{place}: no run names {file.name}, which lies beside it"
+        for file in sorted(place.file.parent.glob("*.csv"))
+        if file.resolve() not in listed
+    ]

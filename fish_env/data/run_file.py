@@ -1,15 +1,22 @@
 """Reading of one run's CSV file."""
 
+from dataclasses import replace
+
 import numpy as np
 
+from fish_env.arrays import FloatArray
 from fish_env.data.attitude import check_quaternion, euler_from_quaternion
+from fish_env.data.clock import check_clock, read_time
 from fish_env.data.columns import note_ignored, read_commands, read_quantities
+from fish_env.data.declared import TIME
 from fish_env.data.description import Description, RunEntry
-from fish_env.data.frames import switch_command_frame, switch_frame, switch_tail_phase
+from fish_env.data.frames import switch_tail_phase
+from fish_env.data.model_frame import commands_to_model_frame, to_model_frame
 from fish_env.data.place import Place
 from fish_env.data.plausibility import check_progress, check_rate, check_travel, check_turning
-from fish_env.data.schema import CommandSteps, FloatArray, Run
-from fish_env.data.table import Table, read_table
+from fish_env.data.retiming import retimed
+from fish_env.data.schema import CommandSteps, Run
+from fish_env.data.table import Column, Table, read_table
 from fish_env.data.units import Unit
 from fish_env.data.vocabulary import COMMANDS, FILE_CHANNELS, QUATERNION
 
@@ -33,52 +40,60 @@ def read_run(description: Description, entry: RunEntry) -> tuple[Run, tuple[str,
     Raises:
         DatasetError: The file is not what is declared.
     """
-    table = read_table(Place(entry.file, run=entry.id), fewest_rows=2)
-    used = ["t", *description.channels, *description.commands]
+    return build_run(description, entry, read_table(Place(entry.file, run=entry.id), fewest_rows=2))
+
+
+def build_run(
+    description: Description, entry: RunEntry, table: Table
+) -> tuple[Run, tuple[str, ...]]:
+    """Builds a run from the cells of its file; see :func:`read_run`."""
+    clock = description.clock
+    table = replace(table, columns={**description.columns, TIME: Column(clock.column, 1.0, "ned")})
+    used = [TIME, *description.channels, *description.commands]
     table.require(used)
-    time = read_time(table)
+    time, time_notes = read_time(table, clock)
     channels = read_quantities(table, description.channels, FILE_CHANNELS)
+    commands, phase = read_commands(table, description), entry.tail_phase
+    check_clock(time, commands, clock, table)
     check_turning_channels(time, channels, description.channels, table)
     channels = quaternion_to_angles(channels, table)
-    commands, phase = read_commands(table, description), entry.tail_phase
     check_positions(time, channels, commands, description.channels, table)
+    channels = to_model_frame(channels, description.columns, table.place)
+    commands = commands_to_model_frame(commands, description.columns, description.frame)
     if description.frame == "enu":
-        channels = switch_frame(channels)
-        commands, phase = switch_command_frame(commands), switch_tail_phase(phase)
+        phase = switch_tail_phase(phase)
     channels, depth_notes = depth_to_z(channels, table)
     steps = CommandSteps(time, commands)
     run = Run(entry.id, time, channels, steps, entry.start, phase, entry.condition)
+    run = retimed(run, entry.clocks)
     notes = (
+        *time_notes,
         *note_ignored(table, used),
         *depth_notes,
-        *note_late_commands(steps, time, table.place),
+        *note_late_commands(steps, time, channels, table.place),
     )
     return run, notes
 
 
-def read_time(table: Table) -> FloatArray:
-    """Reads the time column, shape (n,), s.
+def note_late_commands(
+    steps: CommandSteps, time: FloatArray, channels: dict[str, FloatArray], place: Place
+) -> tuple[str, ...]:
+    """Words a note if commands change after a gap: a lost row takes its command with it.
 
-    Raises:
-        DatasetError: A time is missing, or not later than the one before.
+    Args:
+        steps: The commands.
+        time: Times of the rows, shape (n,), s.
+        channels: What was measured, each of shape (n,). A row without anything in it was added
+            for its command, which then is not late.
+        place: The file and run.
     """
-    time = table.numbers("t", may_miss=False)
-    backward = np.flatnonzero(np.diff(time) <= 0.0)
-    if backward.size:
-        before, after = time[backward[0]], time[backward[0] + 1]
-        raise table.place.at(table.rows[backward[0] + 1], "t").refuse(
-            f"time does not increase: {after:.9g} s comes after {before:.9g} s",
-            "Sort the rows or remove the repeated one; if the clock was set back, correct it or "
-            "make two runs of it",
-        )
-    return time
-
-
-def note_late_commands(steps: CommandSteps, time: FloatArray, place: Place) -> tuple[str, ...]:
-    """Words a note if commands change after a gap: a lost row takes its command with it."""
+    present = np.array([np.isfinite(values) for values in channels.values()])
+    busiest = time[present[np.argmax(present.sum(axis=1))]]
+    usual = np.median(np.diff(busiest if busiest.size > 1 else time))
     switches = np.searchsorted(time, steps.times_s[1:])
-    gaps = np.diff(time)
-    late = int(np.sum(gaps[switches - 1] > LONG_GAP * np.median(gaps)))
+    gaps = np.diff(time)[switches - 1]
+    anything = np.asarray(present.any(axis=0))[switches]
+    late = int(np.sum((gaps > LONG_GAP * usual) & anything))
     if not late:
         return ()
     return (
@@ -92,7 +107,7 @@ def check_turning_channels(
 ) -> None:
     """Refuses a yaw and angular rates whose radians can only be degrees."""
     for name, values in channels.items():
-        place = table.place.at(column=name)
+        place = table.at(name)
         if name == "yaw":
             check_turning(time, values, units[name], table.rows, place)
         elif FILE_CHANNELS[name].dimension == "rate":
@@ -109,7 +124,7 @@ def check_positions(
     """Refuses positions whose unit can only be another."""
     positions = {name: values for name, values in channels.items() if name in POSITION}
     for name, values in positions.items():
-        check_travel(time, values, units[name], table.rows, table.place.at(column=name))
+        check_travel(time, values, units[name], table.rows, table.at(name))
     amplitude = commands[:-1, list(COMMANDS).index("tail_amplitude")]
     beating = float(np.sum(np.diff(time)[amplitude > 0.0]))
     check_progress(beating, positions, units, table.place)
@@ -153,11 +168,11 @@ def depth_to_z(
     both = np.isfinite(difference)
     if both.any() and np.median(difference[both]) > DEPTH_TOLERANCE:
         first = int(np.argmax(difference > DEPTH_TOLERANCE))
-        raise table.place.at(table.rows[first], "depth").refuse(
+        raise table.at("depth", table.rows[first]).refuse(
             f"depth and z differ by {np.median(difference[both]):.3g} m (median)",
             "z points down in frame ned and up in frame enu, depth always down; "
             "correct one of the two or leave it out",
         )
     gaps = np.isnan(z)
-    note = f"{table.place.at(column='depth')}: z is kept; depth fills {gaps.sum()} gaps in it"
+    note = f"{table.at('depth')}: z is kept; depth fills {gaps.sum()} gaps in it"
     return others | {"z": np.where(gaps, depth, z)}, (note,)

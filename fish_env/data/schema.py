@@ -11,12 +11,12 @@ from itertools import combinations
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from fish_env.arrays import FloatArray
 from fish_env.data.vocabulary import CHANNELS, COMMANDS, OBSERVATIONS
 from fish_env.errors import DatasetError
 
-FloatArray = NDArray[np.float64]
 Start = Literal["rest", "unknown"]
 
 FEWEST_SHARED, SHARED = 10, 0.2
@@ -191,6 +191,8 @@ class Dataset(_ComparedByContent):
         noise: One-sigma noise by channel, SI, for those channels where it is known.
         about: Free text from the file: description, source, licence and the like.
         notes: What reading left aside or converted, for the user to see.
+        declared: Column and unit in the file of each channel and command that was read from one.
+        frame: Frame that the file is declared in, "ned" or "enu".
     """
 
     name: str
@@ -199,6 +201,8 @@ class Dataset(_ComparedByContent):
     noise: Mapping[str, float] = field(default_factory=dict)
     about: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[str, ...] = field(default=(), compare=False)
+    declared: Mapping[str, tuple[str, str]] = field(default_factory=dict, compare=False)
+    frame: str = field(default="ned", compare=False)
 
     def __post_init__(self) -> None:
         _require(bool(self.runs), self.name, "a dataset needs at least one run")

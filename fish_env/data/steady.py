@@ -1,10 +1,11 @@
 """Reading of a table of steady motion: commands, and the speeds and rates they led to."""
 
+from dataclasses import replace
 from pathlib import Path
 
 from fish_env.data.columns import note_ignored, read_commands, read_quantities
 from fish_env.data.description import Description
-from fish_env.data.frames import switch_command_frame, switch_frame
+from fish_env.data.model_frame import commands_to_model_frame, to_model_frame
 from fish_env.data.place import Place
 from fish_env.data.plausibility import check_rate
 from fish_env.data.schema import SteadyDataset
@@ -27,16 +28,16 @@ def read_steady(description: Description, file: Path) -> SteadyDataset:
     Raises:
         DatasetError: The file is not what is declared.
     """
-    table = read_table(Place(file), fewest_rows=1)
+    table = replace(read_table(Place(file), fewest_rows=1), columns=description.columns)
     columns = [*description.channels, *description.commands]
     table.require(columns)
     observations = read_quantities(table, description.channels, OBSERVATIONS)
     if "yaw_rate" in observations:
-        place, unit = table.place.at(column="yaw_rate"), description.channels["yaw_rate"]
+        place, unit = table.at("yaw_rate"), description.channels["yaw_rate"]
         check_rate(observations["yaw_rate"], unit, table.rows, place)
     commands = read_commands(table, description)
-    if description.frame == "enu":
-        observations, commands = switch_frame(observations), switch_command_frame(commands)
+    observations = to_model_frame(observations, description.columns, table.place)
+    commands = commands_to_model_frame(commands, description.columns, description.frame)
     return SteadyDataset(
         name=description.name,
         fish=description.fish,
@@ -65,7 +66,7 @@ def _read_ids(table: Table) -> tuple[str, ...]:
 def _read_conditions(table: Table) -> tuple[str | None, ...]:
     if CONDITION not in table.cells:
         return (None,) * len(table.rows)
-    return tuple(cell.strip() or None for cell in table.cells[CONDITION])
+    return tuple(str(cell).strip() or None for cell in table.cells[CONDITION])
 
 
 def _notes(description: Description, table: Table, used: list[str]) -> tuple[str, ...]:

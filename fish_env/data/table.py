@@ -3,13 +3,31 @@
 import csv
 import io
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
+from fish_env.arrays import FloatArray
 from fish_env.data.place import Place, closest
-from fish_env.data.schema import FloatArray
+
+
+@dataclass(frozen=True)
+class Column:
+    """The column of a quantity.
+
+    Attributes:
+        name: Name of the column in the file.
+        factor: What its cells are multiplied by to be in the declared unit: sign times scale.
+        frame: "ned" or "enu", the frame its values are in.
+        offset: What is added then, in the declared unit.
+    """
+
+    name: str
+    factor: float
+    frame: str
+    offset: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -19,69 +37,85 @@ class Table:
     Attributes:
         place: The file, and the run that it holds.
         rows: Line of the file of each row of cells.
-        cells: Text of the cells by column name.
+        cells: Cells by column name: their text, or numbers where they are no file's.
+        columns: Where each quantity stands; a quantity without an entry has a column of its name.
     """
 
     place: Place
     rows: list[int]
-    cells: dict[str, tuple[str, ...]]
+    cells: Mapping[str, Sequence[str] | FloatArray]
+    columns: Mapping[str, Column] = field(default_factory=dict)
 
-    def require(self, columns: list[str]) -> None:
-        """Refuses the table unless it has all these columns.
+    def label(self, name: str) -> str:
+        """Name of the column in which a quantity stands."""
+        return self.columns[name].name if name in self.columns else name
+
+    def at(self, name: str, row: int | None = None) -> Place:
+        """Returns the place of a quantity's column, in one row if that is given."""
+        return self.place.at(row, self.label(name))
+
+    def require(self, names: list[str]) -> None:
+        """Refuses the table unless it has the columns of all these quantities.
 
         Raises:
             DatasetError: Naming the first column that is missing.
         """
-        for name in columns:
-            if name not in self.cells:
-                raise self.place.at(1, name).refuse(
+        for name in names:
+            if self.label(name) not in self.cells:
+                raise self.at(name, 1).refuse(
                     "the column is declared in dataset.yaml but is not in the file",
                     f"Add it, or declare what is there ({', '.join(self.cells)})",
                 )
 
-    def numbers(self, column: str, may_miss: bool = True) -> FloatArray:
-        """Returns a column as numbers, NaN where the cell is empty or says nan.
+    def numbers(self, name: str, may_miss: bool = True) -> FloatArray:
+        """Returns a quantity in its declared unit, NaN where the cell is empty or says nan.
 
         Args:
-            column: Name of the column.
+            name: The quantity.
             may_miss: Whether cells may be empty.
 
         Raises:
             DatasetError: At the first cell that is no number, infinite, or missing.
         """
-        values = np.array([self._number(cell) for cell in self.cells[column]])
+        cells = self.cells[self.label(name)]
+        values = (
+            cells if isinstance(cells, np.ndarray) else np.array([_number(cell) for cell in cells])
+        )
         if np.isinf(values).any():
-            self._refuse_cell(column, int(np.argmax(np.isinf(values))))
+            self._refuse_cell(name, int(np.argmax(np.isinf(values))))
         if not may_miss and np.isnan(values).any():
             row = self.rows[int(np.argmax(np.isnan(values)))]
-            raise self.place.at(row, column).refuse("the cell is empty", "Fill it in")
-        return values
+            raise self.at(name, row).refuse("the cell is empty", "Fill it in")
+        # Adding zero turns the -0.0 of a reversed zero into 0.0.
+        column = self.columns.get(name, Column(name, 1.0, "ned"))
+        return column.factor * values + (column.offset + 0.0)
 
-    @staticmethod
-    def _number(cell: str) -> float:
-        try:
-            return float(cell) if cell and not cell.isspace() else math.nan
-        except ValueError:
-            return math.inf
-
-    def _refuse_cell(self, column: str, index: int) -> None:
-        cell = self.cells[column][index]
-        raise self.place.at(self.rows[index], column).refuse(
+    def _refuse_cell(self, name: str, index: int) -> None:
+        cell = self.cells[self.label(name)][index]
+        raise self.at(name, self.rows[index]).refuse(
             f"'{cell}' is not a finite number",
             "Write a plain number with a decimal point, or leave the cell empty "
             "where a sample is missing",
         )
 
     def text(self, column: str) -> tuple[str, ...]:
-        """Returns a column of names.
+        """Returns a column of text, without the spaces around it.
 
         Raises:
             DatasetError: At the first empty cell.
         """
-        for row, cell in zip(self.rows, self.cells[column], strict=True):
-            if not cell.strip():
-                raise self.place.at(row, column).refuse("the cell is empty", "Name the row")
-        return tuple(cell.strip() for cell in self.cells[column])
+        cells = tuple(str(cell).strip() for cell in self.cells[column])
+        for row, cell in zip(self.rows, cells, strict=True):
+            if not cell:
+                raise self.place.at(row, column).refuse("the cell is empty", "Fill it in")
+        return cells
+
+
+def _number(cell: str) -> float:
+    try:
+        return float(cell) if cell and not cell.isspace() else math.nan
+    except ValueError:
+        return math.inf
 
 
 def read_table(place: Place, fewest_rows: int) -> Table:

@@ -1,12 +1,18 @@
-"""Units a file may use, and their conversion to SI and radians."""
+"""Units a file may use, and their conversion to SI and radians.
+
+The short names of the table below are read without help. Any other spelling ("degrees", "°/s",
+"inches", "rpm") is read by pint, which is imported only then: it takes about 0.6 s.
+"""
 
 import math
 from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fish_env.data.place import Place, closest
+from fish_env.data.place import Place
 from fish_env.data.vocabulary import Quantity
 
 _FACTORS: dict[str, dict[str, float]] = {
@@ -15,12 +21,29 @@ _FACTORS: dict[str, dict[str, float]] = {
     "speed": {"m/s": 1.0, "cm/s": 0.01, "mm/s": 0.001},
     "rate": {"rad/s": 1.0, "deg/s": math.pi / 180.0},
     "frequency": {"Hz": 1.0},
-    "time": {"s": 1.0},
+    "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
     "number": {"1": 1.0},
 }
 
 SI_UNIT: dict[str, str] = {dimension: next(iter(units)) for dimension, units in _FACTORS.items()}
 """SI unit of each dimension."""
+
+_ROOTS: dict[str, dict[str, int]] = {
+    "length": {"meter": 1},
+    "angle": {"radian": 1},
+    "speed": {"meter": 1, "second": -1},
+    "rate": {"radian": 1, "second": -1},
+    "frequency": {"second": -1},
+    "time": {"second": 1},
+    "number": {},
+}
+"""What pint reduces a unit of each dimension to; it keeps the radian apart from a mere number."""
+
+_LONGEST = 40
+"""Characters. No unit has a longer name, and a parser should not be fed with text without end."""
+
+_PIXELS = ("px", "pixel", "pixels")
+_DEGREE_SIGNS = str.maketrans({"\N{MASCULINE ORDINAL INDICATOR}": "°", "\N{RING ABOVE}": "°"})
 
 
 @dataclass(frozen=True)
@@ -34,8 +57,10 @@ class Unit:
 def parse_unit(name: str, quantity: Quantity, place: Place) -> Unit:
     """Finds a unit by name and checks that it can measure the quantity.
 
+    A unit of the table keeps its short name there, however it is spelt: "degrees" is "deg".
+
     Args:
-        name: The unit as the file writes it.
+        name: The unit as the file writes it, in any spelling that pint knows.
         quantity: What is measured in it.
         place: Where the unit is written.
 
@@ -45,13 +70,65 @@ def parse_unit(name: str, quantity: Quantity, place: Place) -> Unit:
     fitting = _FACTORS[quantity.dimension]
     if name in fitting:
         return Unit(name, fitting[name])
-    every = [unit for units in _FACTORS.values() for unit in units]
-    if name not in every:
-        raise place.refuse(f"unknown unit '{name}'", closest(name, every))
+    remedy = f"Use one of: {', '.join(fitting)}, or another spelling of such a unit"
+    if name.lower() in _PIXELS:
+        raise place.refuse(
+            "a pixel has no size of its own",
+            f"Give the size of one as `scale`, with the unit '{next(iter(fitting))}'",
+        )
+    known = [root for root in (unit_root(name), unit_root(name.lower())) if root is not None]
+    for factor, root in known:
+        if root == _ROOTS[quantity.dimension]:
+            return _short(name, factor, fitting)
+        if quantity.dimension == "frequency" and root == _ROOTS["rate"]:
+            # A turn is one cycle: 60 rpm are 1 Hz.
+            return _short(name, factor / (2.0 * math.pi), fitting)
+    if not known and not any(name in units for units in _FACTORS.values()):
+        raise place.refuse(f"unknown unit '{name}'", remedy)
     raise place.refuse(
         f"the unit '{name}' does not measure this, which is of dimension {quantity.dimension}",
-        f"Use one of: {', '.join(fitting)}",
+        remedy,
     )
+
+
+def _short(name: str, factor: float, fitting: dict[str, float]) -> Unit:
+    """The unit by its name in the table if it is there, else as it was written."""
+    for short, known in fitting.items():
+        if math.isclose(factor, known, rel_tol=1e-12):
+            return Unit(short, known)
+    return Unit(name, factor)
+
+
+@cache
+def unit_root(name: str) -> tuple[float, dict[str, int]] | None:
+    """Reduces a unit to SI base units and the radian.
+
+    Args:
+        name: The unit in any spelling that pint knows.
+
+    Returns:
+        The factor to SI, and the power of each base unit by pint's name; None if unknown.
+    """
+    text = name.strip().translate(_DEGREE_SIGNS)
+    if not text or len(text) > _LONGEST:
+        return None
+    registry = _registry()
+    try:
+        factor, root = registry.get_root_units(registry.parse_units(text))
+    # pint raises errors of many kinds, AssertionError and TokenError among them.
+    except Exception:
+        return None
+    return float(factor), {str(unit): power for unit, power in root._units.items()}
+
+
+@cache
+def _registry() -> Any:
+    import pint
+
+    registry: Any = pint.UnitRegistry()
+    for alias in ("@alias hertz = hz", "@alias revolution = rev"):
+        registry.define(alias)
+    return registry
 
 
 def unwrap_angle(angle_rad: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -9,23 +9,26 @@ from typing import Any
 import numpy as np
 import yaml
 
+from fish_env.arrays import FloatArray
+from fish_env.data.declared import TIME
 from fish_env.data.description import FILE_NAME
 from fish_env.data.frames import switch_dataset_frame, switch_steady_frame
-from fish_env.data.schema import Dataset, FloatArray, Run, SteadyDataset
+from fish_env.data.schema import Dataset, Run, SteadyDataset
 from fish_env.data.units import SI_UNIT
 from fish_env.data.vocabulary import CHANNELS, COMMANDS, FORMAT, OBSERVATIONS, Quantity
 from fish_env.errors import DatasetError
+from fish_env.files import FORBIDDEN, file_name, replacing, write_text
 from fish_env.params import list_fish
 
 TABLE = "steady.csv"
-_FORBIDDEN = '/\\:*?"<>|'
 
 
 def write_dataset(dataset: Dataset | SteadyDataset, folder: str | Path, frame: str = "ned") -> Path:
     """Writes a dataset, in SI units: dataset.yaml, and `<run id>.csv` each or steady.csv.
 
     Written in the model's own frame, it reads back equal. The notes are not written: they tell
-    of the files that were read. The path of a fish file is written relative to the folder.
+    of the files that were read. The path of a fish file is written relative to the folder. A time
+    that counts from a date, such as epoch stamps, reads back as counted from the first sample.
 
     Args:
         dataset: Runs over time, or a table of steady motion.
@@ -37,7 +40,7 @@ def write_dataset(dataset: Dataset | SteadyDataset, folder: str | Path, frame: s
 
     Raises:
         DatasetError: The frame is unknown, a run's id cannot be a file name, or the folder
-            already holds a dataset.
+            already holds a dataset or a file of one of the names.
     """
     target = Path(folder)
     if frame not in ("ned", "enu"):
@@ -53,31 +56,54 @@ def write_dataset(dataset: Dataset | SteadyDataset, folder: str | Path, frame: s
 def _write_runs(dataset: Dataset, folder: Path, frame: str) -> Path:
     for run in dataset.runs:
         _check_file_name(run.id)
-    folder.mkdir(parents=True, exist_ok=True)
+    check_free(folder, [f"{run.id}.csv" for run in dataset.runs])
     for run in dataset.runs:
-        columns = {"t": run.time_s, **run.channels, **_by_name(run.commands.at(run.time_s))}
-        _write_table(folder / f"{run.id}.csv", columns)
+        columns = {TIME: run.time_s, **run.channels, **_by_name(run.commands.at(run.time_s))}
+        write_table(folder / f"{run.id}.csv", columns)
     _write_description(
-        folder, dataset, frame, dataset.runs[0].channels, CHANNELS, runs=_run_entries(dataset.runs)
+        folder,
+        dataset,
+        frame,
+        dataset.runs[0].channels,
+        CHANNELS,
+        time={"column": TIME, "unit": "s"},
+        runs=_run_entries(dataset.runs),
     )
     return folder
 
 
 def _write_steady(dataset: SteadyDataset, folder: Path, frame: str) -> Path:
-    folder.mkdir(parents=True, exist_ok=True)
+    check_free(folder, [TABLE])
     names = {"id": dataset.ids, "condition": [c or "" for c in dataset.conditions]}
     columns = {**names, **_by_name(dataset.commands), **dataset.observations}
-    _write_table(folder / TABLE, columns)
+    write_table(folder / TABLE, columns)
     _write_description(
         folder, dataset, frame, dataset.observations, OBSERVATIONS, kind="steady", file=TABLE
     )
     return folder
 
 
+def check_free(folder: Path, names: Iterable[str]) -> None:
+    """Refuses to write over files in a folder.
+
+    Args:
+        folder: The folder.
+        names: Names of the files that will be written.
+
+    Raises:
+        DatasetError: One of them is there already.
+    """
+    for name in names:
+        if (folder / name).exists():
+            raise DatasetError(
+                f"{folder / name} is there already and would be lost; give another folder."
+            )
+
+
 def _check_file_name(id: str) -> None:
-    if not id.strip(". ") or any(letter in _FORBIDDEN for letter in id):
+    if id != file_name(id):
         raise DatasetError(
-            f"run '{id}': the id cannot be a file name; rename the run without {_FORBIDDEN}"
+            f"run '{id}': the id cannot be a file name; rename the run without {FORBIDDEN}"
         )
 
 
@@ -85,8 +111,9 @@ def _by_name(commands: FloatArray) -> dict[str, FloatArray]:
     return dict(zip(COMMANDS, commands.T, strict=True))
 
 
-def _write_table(file: Path, columns: Mapping[str, Iterable[Any]]) -> None:
-    with file.open("w", encoding="utf-8", newline="") as stream:
+def write_table(file: Path, columns: Mapping[str, Iterable[Any]]) -> None:
+    """Writes columns of numbers or text as a CSV file; a missing number is an empty cell."""
+    with replacing(file) as part, part.open("w", encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
         writer.writerow(columns)
         writer.writerows(zip(*map(_cells, columns.values()), strict=True))
@@ -110,7 +137,7 @@ def _write_description(
     content = {
         "format": FORMAT,
         "name": dataset.name,
-        "fish": _fish_reference(dataset.fish, folder),
+        "fish": fish_reference(dataset.fish, folder),
         "frame": frame,
         **dataset.about,
         "channels": {name: SI_UNIT[known[name].dimension] for name in channels},
@@ -119,10 +146,11 @@ def _write_description(
         **form,
     }
     text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=100)
-    (folder / FILE_NAME).write_text(text, encoding="utf-8")
+    write_text(folder / FILE_NAME, text)
 
 
-def _fish_reference(fish: str, folder: Path) -> str:
+def fish_reference(fish: str, folder: Path) -> str:
+    """Names a fish as dataset.yaml in a folder does: by its preset, or by a path from there."""
     return fish if fish in list_fish() else os.path.relpath(fish, folder.resolve())
 
 

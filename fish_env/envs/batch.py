@@ -10,19 +10,30 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from fish_env.arrays import FloatArray, IntArray
 from fish_env.envs import start
 from fish_env.envs.layout import GOAL, MAX_BEAT_S, OBSERVATION, OUTPUTS, SENSORS, Failure
 from fish_env.envs.options import EnvOptions
 from fish_env.errors import ConfigError
 from fish_env.model.history import forget, history_rows
-from fish_env.model.runtime import Grid, Kernels, default_threads, kernels, run_in_threads
+from fish_env.model.runtime import Grid, Kernels, kernels, run_in_threads
 from fish_env.model.state import BASE_STATES, INTEGRAL_ROW
+from fish_env.threads import default_threads
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 STEP_TEMPLATE = Path(__file__).with_name("step_template.py")
 NOISE_BLOCK = 64
 """Noise is drawn for this many steps at a time."""
+STEPPED = (
+    "_data", "_actions", "_queue", "_ring", "_noise", "_noise_blocks", "_noise_used", "obs",
+)  # fmt: skip
+"""Arrays of a batch that steps change."""
+
+
+def generator(state: Mapping[str, Any]) -> np.random.Generator:
+    """A random generator that goes on from the state of another one's ``bit_generator``."""
+    bits: Any = np.random.PCG64()
+    bits.state = dict(state)
+    return np.random.Generator(bits)
 
 
 def _step_kernels(options: EnvOptions) -> Kernels:
@@ -101,6 +112,33 @@ class FishBatch:
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state)
         self._bind()
+
+    def save_state(self) -> dict[str, Any]:
+        """All that steps change, as arrays and plain values; :meth:`load_state` takes it."""
+        rngs = [None if rng is None else rng.bit_generator.state for rng in self._noise_rngs]
+        return {
+            "arrays": {name: getattr(self, name) for name in STEPPED},
+            "history": self._history,
+            "drawn": self.drawn,
+            "places": [self._queue_at, self._ring_at],
+            "noise": rngs,
+            "started": self._started,
+        }
+
+    def load_state(self, state: Mapping[str, Any]) -> None:
+        """Goes on from a state of fish with the same options, to the same bits.
+
+        Raises:
+            KeyError, ValueError: the state is not that of such fish.
+        """
+        for name in STEPPED:
+            getattr(self, name)[:] = state["arrays"][name]  # there are views of these
+        self._history = np.array(state["history"], float)
+        for path, values in self.drawn.items():
+            values[:] = state["drawn"][path]
+        self._queue_at, self._ring_at = state["places"]
+        self._noise_rngs = [None if saved is None else generator(saved) for saved in state["noise"]]
+        self._started = state["started"]
 
     @property
     def started(self) -> bool:

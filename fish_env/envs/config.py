@@ -10,16 +10,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import yaml
 
+from fish_env.arrays import FloatArray
 from fish_env.envs.config_checks import check_settings, is_number, speed_range
 from fish_env.envs.layout import Setup, empty_setup
 from fish_env.errors import ConfigError
 from fish_env.model.state import INPUTS
 from fish_env.params.io import config_root
 
-FloatArray = npt.NDArray[np.float64]
 DEFAULT_NAME = "robotic-fish-3d.yaml"
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.effects.extended import PREFIX, EffectValues, ExtendedModel, build_model
 from fish_env.envs.config import EnvConfig, load_env_config
 from fish_env.envs.config_checks import is_number, speed_range
@@ -19,10 +19,9 @@ from fish_env.envs.tasks import TASKS
 from fish_env.errors import ConfigError
 from fish_env.model.crank_slider import CrankSlider
 from fish_env.model.state import INPUTS
-from fish_env.params.io import load_fish
+from fish_env.params.io import as_fish
 from fish_env.params.schema import FishParams
 
-FloatArray = npt.NDArray[np.float64]
 NOISE_GROUPS = {
     "depth": ("depth",),
     "depth_rate": ("depth_rate",),
@@ -74,6 +73,7 @@ def env_options(
     observation_delay_s: float = 0.0,
     action_delay_s: float = 0.0,
     randomization: str | Mapping[str, Any] | None = None,
+    trust_effects: bool = False,
 ) -> EnvOptions:
     """Check and combine what the constructor of the environment takes (see its docstring).
 
@@ -86,7 +86,7 @@ def env_options(
     settings = load_env_config(config, control_hz, physics_hz)
     if cruise_speed is not None:
         settings.tree["goal"]["cruise_speed"] = speed_range("cruise_speed", cruise_speed)
-    loaded = fish if isinstance(fish, FishParams) else load_fish(fish)
+    loaded = as_fish(fish, trust_effects)
     whole = _names_effects(randomization, loaded)
     model = build_model(loaded, _water(effects, current, wave), whole_catalogue=whole)
     model.check_step(settings.dt)

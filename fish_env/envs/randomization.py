@@ -10,12 +10,12 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import ndtr, ndtri
 
+from fish_env.arrays import BoolArray, FloatArray
 from fish_env.effects.extended import PREFIX, ExtendedModel
 from fish_env.envs.config_checks import is_number
 from fish_env.errors import ConfigError, EffectError
 from fish_env.params.schema import FishParams
 
-FloatArray = npt.NDArray[np.float64]
 TRUNCATE = 2.5
 """Normal draws stay within this many standard deviations."""
 QUANTILES = 65
@@ -38,7 +38,7 @@ class Randomization:
     """
 
     paths: tuple[str, ...]
-    uniform: npt.NDArray[np.bool_]
+    uniform: BoolArray
     first: FloatArray
     second: FloatArray
     factor: FloatArray

@@ -146,6 +146,8 @@ class RoboticFish3DEnv(Watched, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.
         action_delay_s: time until an action reaches the actuators (s).
         randomization: parameters drawn in each episode: ``"prior"``, ``"posterior"``, or
             path -> ``{"relative": sd}``, ``{"sd": sd}`` or ``[low, high]``.
+        trust_effects: run the effect files (Python code) beside the fish's file that it names;
+            without it they are refused.
         render_size: width and height of a picture (pixels).
 
     Raises:
@@ -174,6 +176,7 @@ class RoboticFish3DEnv(Watched, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.
         observation_delay_s: float = 0.0,
         action_delay_s: float = 0.0,
         randomization: str | Mapping[str, Any] | None = None,
+        trust_effects: bool = False,
         render_size: tuple[int, int] = (640, 480),
     ) -> None:
         self.render_mode = render_mode
@@ -191,6 +194,7 @@ class RoboticFish3DEnv(Watched, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.
             observation_delay_s=observation_delay_s,
             action_delay_s=action_delay_s,
             randomization=randomization,
+            trust_effects=trust_effects,
         )
         self.metadata = {**self.metadata, "render_fps": 1.0 / self.options.config.control_period}
         self.action_space = action_space()

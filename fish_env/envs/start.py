@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.effects.extended import PREFIX
 from fish_env.envs.config import EnvConfig
 from fish_env.envs.config_checks import is_number
@@ -20,7 +20,6 @@ from fish_env.errors import ConfigError
 from fish_env.model.frames import quaternion_from_euler
 from fish_env.model.state import BASE_STATES
 
-FloatArray = npt.NDArray[np.float64]
 POSE_DRAWS = 6
 STATE_KEYS = {
     "position": 3,

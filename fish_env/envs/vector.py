@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,8 @@ from gymnasium.utils import seeding
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
-from fish_env.envs.batch import FishBatch
+from fish_env.arrays import BoolArray, FloatArray, IntArray
+from fish_env.envs.batch import FishBatch, generator
 from fish_env.envs.layout import OUTPUTS
 from fish_env.envs.options import env_options
 from fish_env.envs.robotic_fish_3d import (
@@ -24,8 +25,6 @@ from fish_env.envs.viewing import Frame, Viewer, Watched
 from fish_env.errors import ConfigError
 from fish_env.rendering import Scene
 
-BoolArray = npt.NDArray[np.bool_]
-FloatArray = npt.NDArray[np.float64]
 Float32Array = npt.NDArray[np.float32]
 
 
@@ -121,7 +120,7 @@ class RoboticFish3DVectorEnv(Watched, VectorEnv[Float32Array, Float32Array, npt.
 
     def step(
         self, actions: npt.ArrayLike
-    ) -> tuple[Float32Array, npt.NDArray[np.float64], BoolArray, BoolArray, dict[str, Any]]:
+    ) -> tuple[Float32Array, FloatArray, BoolArray, BoolArray, dict[str, Any]]:
         """One control step of every fish.
 
         Raises:
@@ -148,6 +147,26 @@ class RoboticFish3DVectorEnv(Watched, VectorEnv[Float32Array, Float32Array, npt.
         self._viewer.after_step(batch)
         infos = self._infos(np.ones(self.num_envs, bool)) | self._drawn(fresh) | final
         return batch.obs.copy(), reward, terminated, truncated, infos
+
+    def save_state(self) -> dict[str, Any]:
+        """All that steps change, as arrays and plain values; :meth:`load_state` takes it."""
+        return {
+            "batch": self.batch.save_state(),
+            "random": [rng.bit_generator.state for rng in self._rngs],
+            "steps": self._steps,
+            "ended": self._ended,
+        }
+
+    def load_state(self, state: Mapping[str, Any]) -> None:
+        """Goes on from a state of an environment made alike, to the same bits.
+
+        Raises:
+            KeyError, ValueError: the state is not that of such an environment.
+        """
+        self.batch.load_state(state["batch"])
+        self._rngs = [generator(saved) for saved in state["random"]]
+        self._steps[:] = state["steps"]
+        self._ended = np.array(state["ended"], bool)
 
     def render(self) -> tuple[Frame, ...] | Frame | None:  # type: ignore[override]
         """Pictures (height, width, 3), uint8.
@@ -195,12 +214,12 @@ class RoboticFish3DVectorEnv(Watched, VectorEnv[Float32Array, Float32Array, npt.
             "_final_info": mask.copy(),
         }
 
-    def _restart(self, lanes: npt.NDArray[np.int64], given: dict[str, Any]) -> None:
+    def _restart(self, lanes: IntArray, given: dict[str, Any]) -> None:
         self.batch.reset(lanes, [self._rngs[lane] for lane in lanes], given)
         self._steps[lanes] = 0
         self._ended = self._ended & ~np.isin(self._all, lanes)
 
-    def _seed(self, seed: int | Sequence[int | None] | None, lanes: npt.NDArray[np.int64]) -> None:
+    def _seed(self, seed: int | Sequence[int | None] | None, lanes: IntArray) -> None:
         if not self._rngs:
             first = seed if isinstance(seed, int) else None
             self._np_random, self._np_random_seed = seeding.np_random(first)
@@ -216,7 +235,7 @@ class RoboticFish3DVectorEnv(Watched, VectorEnv[Float32Array, Float32Array, npt.
             if seed[lane] is not None:
                 self._rngs[lane] = seeding.np_random(seed[lane])[0]
 
-    def _masked(self, mask: Any) -> npt.NDArray[np.int64]:
+    def _masked(self, mask: Any) -> IntArray:
         chosen = np.asarray(mask)
         if chosen.dtype != bool or chosen.shape != (self.num_envs,) or not chosen.any():
             raise ConfigError(

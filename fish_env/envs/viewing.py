@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.envs.batch import FishBatch
 from fish_env.envs.layout import OUTPUTS
 from fish_env.envs.options import EnvOptions
@@ -30,7 +31,6 @@ if TYPE_CHECKING:
     from fish_env.rendering.view import View
     from fish_env.rendering.window import Window
 
-FloatArray = npt.NDArray[np.float64]
 Frame = npt.NDArray[np.uint8]
 WAKE_S = 30.0
 TAIL_PHASE = BASE_STATES.index("tail_phase")

@@ -6,18 +6,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.comparison import RunComparison, RunsComparison, SteadyComparison
 from fish_env.comparison.words import shown_unit
 from fish_env.data import COMMANDS
+from fish_env.files import file_name
 from fish_env.plotting.style import MEASURED, SIMULATED, colours, drawing, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
 
-FloatArray = npt.NDArray[np.float64]
 COMMAND_UNITS = {
     "tail_offset": ("deg", 180.0 / np.pi),
     "tail_amplitude": ("deg", 180.0 / np.pi),
@@ -61,7 +61,7 @@ def draw_run(run: RunComparison, folder: Path) -> Path:
             _draw_path(path, run)
             path.legend(loc="best")
         figure.suptitle(f"{run.id}: measured and simulated", fontsize=10)
-        return save(figure, folder, f"run_{run.id}", ("png",))
+        return save(figure, folder, f"run_{file_name(run.id)}", ("png",))
 
 
 def _draw_channel(ax: Axes, run: RunComparison, name: str) -> None:

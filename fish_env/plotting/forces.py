@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.plotting.style import (
     BLACK,
     BLUE,
@@ -26,7 +26,6 @@ from fish_env.plotting.style import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-FloatArray = npt.NDArray[np.float64]
 GREY = "#777777"
 GROUPS = {
     "tail lift": (("tail_lift",), BLUE),

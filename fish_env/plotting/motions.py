@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.plotting.style import BLUE, GREEN, PALE, VERMILION, drawing, save
 from fish_env.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-FloatArray = npt.NDArray[np.float64]
 DEG = 180.0 / np.pi
 PATH, DEPTH, SPEED, ATTITUDE, TURNING = range(5)
 

@@ -8,14 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.plotting.style import drawing, save, shades
 
 if TYPE_CHECKING:
     from matplotlib.projections.polar import PolarAxes
 
-FloatArray = npt.NDArray[np.float64]
 DEG = 180.0 / np.pi
 
 

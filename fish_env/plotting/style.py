@@ -11,6 +11,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fish_env.files import replacing
+
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
@@ -78,8 +80,8 @@ def shades(count: int) -> list[Any]:
 
 def save(figure: Figure, folder: Path, name: str, formats: tuple[str, ...] | None = None) -> Path:
     """Writes a figure as `<folder>/<name>.<format>` for each format; returns the first path."""
-    folder.mkdir(parents=True, exist_ok=True)
     paths = [folder / f"{name}.{ending}" for ending in formats or FORMATS]
     for path in paths:
-        figure.savefig(path, dpi=DOTS_PER_INCH)
+        with replacing(path) as part:
+            figure.savefig(part, dpi=DOTS_PER_INCH)
     return paths[0]

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.plotting.style import BLACK, drawing, save, shades
 
-FloatArray = npt.NDArray[np.float64]
 DEG = 180.0 / np.pi
 
 

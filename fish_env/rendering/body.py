@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.rendering.mesh import (
     OPAQUE,
     Mesh,
@@ -20,7 +20,6 @@ from fish_env.rendering.mesh import (
 )
 from fish_env.rendering.shape import PEDUNCLE, FishShape, hull_profile
 
-FloatArray = npt.NDArray[np.float64]
 BACK, SIDE, BELLY = (
     np.array(colour, float) for colour in ((226, 96, 22), (255, 150, 48), (255, 232, 196))
 )

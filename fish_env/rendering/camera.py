@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from fish_env.arrays import FloatArray
+
 NEAR = 0.04
 """m. Nothing nearer to the eye is drawn."""
 VIEW_ANGLE = np.radians(42.0)

@@ -8,11 +8,11 @@ import numpy as np
 import numpy.typing as npt
 import pygame
 
+from fish_env.arrays import BoolArray, FloatArray, IntArray
 from fish_env.rendering.camera import NEAR, Camera
 from fish_env.rendering.light import clearness, hazed, lit, water_colour
 from fish_env.rendering.mesh import OPAQUE, Mesh
 
-FloatArray = npt.NDArray[np.float64]
 Colour = tuple[int, int, int]
 LARGEST = 20000.0
 """Pixels beyond which a corner is held back: the drawing library counts in small integers."""
@@ -55,7 +55,7 @@ class Canvas:
             _fill(layer, pixels - low, rows)
             self.surface.blit(layer, low.tolist())
 
-    def _layer(self, pixels: FloatArray) -> tuple[pygame.Surface | None, npt.NDArray[np.int64]]:
+    def _layer(self, pixels: FloatArray) -> tuple[pygame.Surface | None, IntArray]:
         """A clear layer around pixels (n, 2) as far as they are in the picture, and its corner."""
         size = self.surface.get_size()
         low = np.clip(np.floor(pixels.min(axis=0)) - 1, 0, size).astype(int)
@@ -118,7 +118,7 @@ class Canvas:
 
     def _clipped(
         self, starts: FloatArray, ends: FloatArray
-    ) -> tuple[FloatArray, FloatArray, npt.NDArray[np.bool_]]:
+    ) -> tuple[FloatArray, FloatArray, BoolArray]:
         """Lines cut off where they come too near to the eye, and which are left."""
         ahead = [self.camera.seen(points)[:, 0] for points in (starts, ends)]
         kept = np.maximum(*ahead) > NEAR

@@ -5,13 +5,11 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 import pygame
 
 from fish_env.rendering.lettering import Colour, write
 from fish_env.rendering.light import FISH, GOAL
 
-FloatArray = npt.NDArray[np.float64]
 PANEL = (6, 24, 38, 150)
 INK: Colour = (228, 240, 244)
 DIM: Colour = (128, 160, 174)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from fish_env.arrays import FloatArray
+
 UP, LEVEL, DOWN = (
     np.array(colour, float) for colour in ((88, 186, 200), (30, 112, 142), (7, 42, 74))
 )

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import BoolArray, FloatArray
 from fish_env.rendering.canvas import Canvas
 from fish_env.rendering.light import GOAL
 from fish_env.rendering.scene import Goal, Scene, Tank
 
-FloatArray = npt.NDArray[np.float64]
 PLANE_HALF_M, PLANE_STEP_M = 0.5, 0.125
 LONGEST = 400
 """Pieces of the wake that are drawn."""
@@ -79,7 +78,7 @@ def wake_points(scene: Scene, clear: float) -> FloatArray:
     return np.asarray(past[np.linalg.norm(past - scene.position, axis=1) > clear])
 
 
-def draw_wake(canvas: Canvas, points: FloatArray, which: npt.NDArray[np.bool_]) -> None:
+def draw_wake(canvas: Canvas, points: FloatArray, which: BoolArray) -> None:
     """The way the fish came, a line with bubbles that fade with age; ``which`` (n - 1,) of it."""
     if not which.any():
         return

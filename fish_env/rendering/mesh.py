@@ -8,7 +8,8 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from fish_env.arrays import BoolArray, FloatArray
+
 OPAQUE = 255.0
 
 
@@ -38,11 +39,11 @@ class Mesh:
         """Turned by a rotation matrix (3, 3), then moved by an offset (3,)."""
         return Mesh(self.corners @ rotation.T + np.asarray(offset), self.colours, self.alphas)
 
-    def chosen(self, which: npt.NDArray[np.bool_]) -> Mesh:
+    def chosen(self, which: BoolArray) -> Mesh:
         """Some of the faces; which: (n,)."""
         return Mesh(self.corners[which], self.colours[which], self.alphas[which])
 
-    def facing(self, eye: FloatArray) -> npt.NDArray[np.bool_]:
+    def facing(self, eye: FloatArray) -> BoolArray:
         """(n,) which faces look at a point (3,)."""
         return np.asarray(np.einsum("ij,ij->i", self.normals, eye - self.middles) > 0.0)
 

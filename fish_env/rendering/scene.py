@@ -12,10 +12,10 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.model.frames import euler_from_quaternion
 from fish_env.rendering.shape import FishShape
 
-FloatArray = npt.NDArray[np.float64]
 PICTURE_SIZE = (640, 480)
 """Width and height of a picture (pixels), unless another is asked for."""
 NO_WAKE = np.zeros((0, 3))

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
+
 if TYPE_CHECKING:
     from fish_env.params.schema import FishParams
 
-FloatArray = npt.NDArray[np.float64]
 WIDEST = 0.42
 """Where along the hull it is widest, from the nose."""
 PEDUNCLE = 0.24

@@ -7,13 +7,12 @@ from functools import cache, lru_cache
 import numpy as np
 import numpy.typing as npt
 
+from fish_env.arrays import BoolArray, FloatArray
 from fish_env.rendering.canvas import Canvas
 from fish_env.rendering.light import clearness
 from fish_env.rendering.scene import Tank
 from fish_env.rendering.water import SAND
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 Span = tuple[float, float]
 GRID_M = 0.25
 REACH_M = 5.0

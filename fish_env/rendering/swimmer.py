@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import BoolArray, FloatArray
 from fish_env.model.frames import rotation
 from fish_env.model.jit import py_function
 from fish_env.rendering import markers
@@ -17,8 +17,6 @@ from fish_env.rendering.mesh import Mesh
 from fish_env.rendering.scene import Scene
 from fish_env.rendering.shape import hull_profile
 
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
 CIRCLE = np.linspace(0.0, 2.0 * np.pi, 17)[:-1]
 
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.rendering.scene import Goal, Scene, Setting, Tank
 from fish_env.rendering.shape import FishShape
 
@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from fish_env.params.schema import FishParams
     from fish_env.trajectory import Trajectory
 
-FloatArray = npt.NDArray[np.float64]
 ROOM_M = 0.35
 """m of water left above and below a trajectory that leaves the default tank."""
 WAKE_S = 30.0

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from fish_env.errors import ConfigError, missing_extra
+from fish_env.files import replacing
 from fish_env.rendering.scene import Scene, Setting, between
 from fish_env.rendering.view import View
 
@@ -25,22 +26,27 @@ def write(
 ) -> Path:
     """As :func:`fish_env.rendering.write_video`."""
     try:
-        from imageio_ffmpeg import write_frames
+        from imageio_ffmpeg import read_frames, write_frames
     except ImportError:
         raise missing_extra("Writing a video", "imageio-ffmpeg", "render") from None
     if size[0] % 2 or size[1] % 2:
         raise ConfigError(f"a video of {size[0]} x {size[1]} pixels: both must be even")
     moments = in_between(scenes, fps)
-    path.parent.mkdir(parents=True, exist_ok=True)
     view = View(setting, size)
-    writer = write_frames(str(path), size, fps=fps, quality=QUALITY, macro_block_size=2)
-    writer.send(None)
-    try:
-        for scene in moments:
-            writer.send(view.frame(scene))
-            report()
-    finally:
-        writer.close()
+    with replacing(path) as part:
+        writer = write_frames(str(part), size, fps=fps, quality=QUALITY, macro_block_size=2)
+        writer.send(None)
+        try:
+            for scene in moments:
+                writer.send(view.frame(scene))
+                report()
+        finally:
+            writer.close()
+        if part.is_file():
+            # ffmpeg stays silent about a full disk; what it then leaves cannot be opened.
+            opened = read_frames(str(part))
+            next(opened)
+            opened.close()
     return path
 
 

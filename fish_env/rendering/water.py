@@ -12,10 +12,10 @@ import numpy as np
 import numpy.typing as npt
 import pygame
 
+from fish_env.arrays import FloatArray, IntArray
 from fish_env.rendering.camera import Camera
 from fish_env.rendering.light import clearness, water_colour
 
-FloatArray = npt.NDArray[np.float64]
 Pixels = npt.NDArray[np.float32]
 TEXELS = 256
 TEXTURE_M = 1.6
@@ -59,14 +59,14 @@ class Rays:
         self.slope = ahead[2] + self.down * below[2]
         self.steep = self.slope / np.sqrt(1.0 + self.down**2)
 
-    def reaching(self, depth: float) -> tuple[npt.NDArray[np.int64], FloatArray]:
+    def reaching(self, depth: float) -> tuple[IntArray, FloatArray]:
         """Rows that meet a level plane, and how far ahead (m)."""
         with np.errstate(divide="ignore"):
             distance = (depth - self.camera.eye[2]) / self.slope
         rows = np.flatnonzero((distance > 0.0) & (distance < FARTHEST))
         return rows, distance[rows]
 
-    def points(self, rows: npt.NDArray[np.int64], distance: FloatArray) -> tuple[Pixels, Pixels]:
+    def points(self, rows: IntArray, distance: FloatArray) -> tuple[Pixels, Pixels]:
         """North and east (rows, width) where rays at these rows are, so far ahead (m)."""
         ahead, across, below = self.camera.axes
         along = self.camera.eye + distance[:, None] * (ahead + self.down[rows, None] * below)
@@ -115,14 +115,14 @@ def paint(
 
 def _mix(
     picture: Pixels,
-    rows: npt.NDArray[np.int64],
+    rows: IntArray,
     colours: Pixels,
     share: FloatArray,
 ) -> None:
     picture[rows] += share.astype(np.float32)[:, None, None] * (colours - picture[rows])
 
 
-def _left(rays: Rays, rows: npt.NDArray[np.int64], distance: FloatArray) -> FloatArray:
+def _left(rays: Rays, rows: IntArray, distance: FloatArray) -> FloatArray:
     return clearness(distance * np.sqrt(1.0 + rays.down[rows] ** 2))
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from scipy.interpolate import PchipInterpolator
 from scipy.spatial.transform import Rotation, Slerp
 
-FloatArray = npt.NDArray[np.float64]
+from fish_env.arrays import FloatArray
+
 RATE_HZ = 40.0
 """Twenty pictures a beat at 2 Hz; the page interpolates between them."""
 

@@ -7,16 +7,15 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from fish_env.arrays import FloatArray
 from fish_env.data.schema import CommandSteps, Run
 from fish_env.data.units import unwrap_angle
 from fish_env.model.state import INPUTS
 from fish_env.replay.frames import Frames, filled, frames_of
 from fish_env.trajectory import Trajectory
 
-FloatArray = npt.NDArray[np.float64]
 Role = Literal["measured", "baseline", "extended", "other"]
 POSITION, ATTITUDE = ("x", "y", "z"), ("roll", "pitch", "yaw")
 SHOWN = (*POSITION, *ATTITUDE, "u", "v", "w", "p", "q", "r")

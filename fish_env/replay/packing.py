@@ -7,14 +7,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.data.vocabulary import CHANNELS, Quantity
 from fish_env.params import FishParams
 from fish_env.rendering.shape import FishShape, hull_profile
 from fish_env.replay.motion import Group, Motion
 
-FloatArray = npt.NDArray[np.float64]
 Plain = dict[str, Any]
 MOST_SAMPLES = 6000
 """A plot a thousand pixels wide shows no more."""

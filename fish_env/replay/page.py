@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
+from fish_env.files import write_text
 from fish_env.params import FishParams
 from fish_env.replay.motion import Group
 from fish_env.replay.packing import page_data
@@ -33,7 +34,6 @@ def write_replay(
         The path of the file.
     """
     file = Path(out)
-    file.parent.mkdir(parents=True, exist_ok=True)
     page = _read("page.html")
     parts = {
         "title": html.escape(title),
@@ -43,7 +43,7 @@ def write_replay(
     }
     for name, text in parts.items():
         page = page.replace(f"<!--{name}-->", text)
-    file.write_text(page, encoding="utf-8")
+    write_text(file, page)
     return file
 
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd
 from scipy.spatial.transform import Rotation
 
+from fish_env.arrays import FloatArray
 from fish_env.data import CHANNELS
 from fish_env.data.description import FILE_NAME, read_description
 from fish_env.data.run_file import read_run
@@ -19,7 +19,6 @@ from fish_env.model.state import INPUTS
 from fish_env.replay.motion import Motion, Role, motion_from_channels, motion_from_run
 from fish_env.trajectory import POSE_COLUMNS
 
-FloatArray = npt.NDArray[np.float64]
 ROLES: tuple[Role, ...] = ("measured", "baseline", "extended")
 QUATERNION = ("qw", "qx", "qy", "qz")
 

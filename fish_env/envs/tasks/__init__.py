@@ -2,14 +2,11 @@
 
 from collections.abc import Callable
 
-import numpy as np
-import numpy.typing as npt
-
+from fish_env.arrays import FloatArray
 from fish_env.envs.config import EnvConfig
 from fish_env.envs.tasks.hold import hold_goal
 from fish_env.envs.tasks.track import track_goal
 
-FloatArray = npt.NDArray[np.float64]
 Goals = dict[str, FloatArray]
 
 TASKS: dict[str, Callable[[EnvConfig, FloatArray], Goals]] = {

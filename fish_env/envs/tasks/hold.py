@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.envs.config import EnvConfig
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def between(bounds: list[float], draw: FloatArray) -> FloatArray:

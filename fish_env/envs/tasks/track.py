@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from fish_env.arrays import FloatArray
 from fish_env.envs.config import EnvConfig
 from fish_env.envs.tasks.hold import between, hold_goal
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def track_goal(config: EnvConfig, draws: FloatArray) -> dict[str, FloatArray]:

@@ -1,0 +1,179 @@
+"""The time column of a run: its unit, its order, and refusal of what cannot be seconds."""
+
+from datetime import UTC, datetime, timedelta
+from datetime import time as time_of_day
+
+import numpy as np
+
+from fish_env.arrays import FloatArray
+from fish_env.data.declared import TIME, Clock
+from fish_env.data.place import Place
+from fish_env.data.schema import Dataset
+from fish_env.data.table import Table
+from fish_env.data.vocabulary import COMMANDS
+from fish_env.errors import DatasetError
+
+EPOCH_S = 1e8
+"""s, about three years. No run lasts so long, so a later time counts from a date."""
+
+SLOW, SLOWER = 0.5, 1.5
+"""s. Median sample intervals from which a clock is asked for its unit: beyond the second always,
+beyond the first if the tail beats so fast that nobody would sample it so slowly."""
+
+FEWEST = 5
+"""Samples from which the interval between them is judged."""
+
+SLOWEST = 5.0
+"""s. A fish whose motion is sampled less often than this cannot be compared with a simulation."""
+
+_LARGER = (("ms", 1e3), ("us", 1e6), ("ns", 1e9))
+
+
+def read_time(table: Table, clock: Clock) -> tuple[FloatArray, tuple[str, ...]]:
+    """Reads the time column, shape (n,), s, and a note if it is made to begin at 0.
+
+    A clock that counts from a date, as epoch stamps do, loses its digits in a float. Such a time
+    is counted from the first sample.
+
+    Raises:
+        DatasetError: A time is missing, no time, or not later than the one before.
+    """
+    place = table.at(TIME)
+    if clock.unit is None:
+        time, begins = _from_text(table), 0.0
+    else:
+        time, begins = _from_numbers(table, clock.unit.factor)
+    _check_order(time + begins, table)
+    if clock.unit is None:
+        first = table.text(clock.column)[0]
+        return time, (f"{place}: the run begins at t = 0, which is {first}",)
+    if begins:
+        stamp = datetime.fromtimestamp(begins, UTC).isoformat(timespec="milliseconds")
+        return time, (f"{place}: the run begins at t = 0, which is {stamp} if 1970 is 0",)
+    return time, ()
+
+
+def _from_numbers(table: Table, factor: float) -> tuple[FloatArray, float]:
+    """Times, s, and what was taken off them, s."""
+    time = table.numbers(TIME, may_miss=False)
+    if abs(time[0]) * factor < EPOCH_S:
+        return time * factor, 0.0
+    cells = table.cells[table.label(TIME)]
+    if not isinstance(cells, np.ndarray) and all(cell.strip().isdigit() for cell in cells):
+        # Whole numbers of 19 digits, nanoseconds since 1970, do not fit a float.
+        first = int(cells[0])
+        return np.array([float(int(cell) - first) for cell in cells]) * factor, first * factor
+    return (time - time[0]) * factor, float(time[0] * factor)
+
+
+def _from_text(table: Table) -> FloatArray:
+    cells = table.text(table.label(TIME))
+    stamps = [
+        iso_seconds(cell, table.at(TIME, row)) for cell, row in zip(cells, table.rows, strict=True)
+    ]
+    kinds = {stamp[1] for stamp in stamps}
+    if len(kinds) > 1:
+        raise table.at(TIME).refuse(
+            f"some stamps have {' and some '.join(sorted(kinds))}", "Write all of them alike"
+        )
+    return np.array([(stamp - stamps[0][0]).total_seconds() for stamp, _ in stamps])
+
+
+def iso_seconds(cell: str, place: Place) -> tuple[timedelta, str]:
+    """Reads one ISO 8601 stamp, a date with a time or a time of day.
+
+    Args:
+        cell: The text.
+        place: Where it stands.
+
+    Returns:
+        The time since 1970, UTC where a zone is given, or since midnight; and its kind in words.
+
+    Raises:
+        DatasetError: It is no such stamp.
+    """
+    try:
+        stamp = datetime.fromisoformat(cell)
+    except ValueError:
+        return _since_midnight(cell, place), "a time of day without a date"
+    if stamp.tzinfo is None:
+        return stamp - datetime(1970, 1, 1), "a date without a time zone"
+    return stamp - datetime(1970, 1, 1, tzinfo=UTC), "a date with a time zone"
+
+
+def _since_midnight(cell: str, place: Place) -> timedelta:
+    try:
+        of_day = time_of_day.fromisoformat(cell)
+    except ValueError:
+        raise place.refuse(
+            f"'{cell}' is no time in ISO 8601", "Write it as 2026-05-01T12:00:00.040"
+        ) from None
+    midnight = datetime.min.replace(tzinfo=of_day.tzinfo)
+    return datetime.combine(midnight, of_day) - midnight
+
+
+def _check_order(time: FloatArray, table: Table) -> None:
+    backward = np.flatnonzero(np.diff(time) <= 0.0)
+    if backward.size:
+        before, after = time[backward[0]], time[backward[0] + 1]
+        raise table.at(TIME, table.rows[backward[0] + 1]).refuse(
+            f"time does not increase: {after:.9g} s comes after {before:.9g} s",
+            "Sort the rows or remove the repeated one; if the clock was set back, correct it or "
+            "make two runs of it",
+        )
+
+
+def check_clock(time: FloatArray, commands: FloatArray, clock: Clock, table: Table) -> None:
+    """Refuses a clock that nobody declared and that can hardly be in seconds.
+
+    Args:
+        time: Sample times as read, shape (n,), s.
+        commands: Commands of each row, shape (n, 5), SI.
+        clock: The time column; one whose unit is declared is not questioned.
+        table: The file and run.
+
+    Raises:
+        DatasetError: The samples are too far apart for seconds.
+    """
+    if clock.declared or time.size < FEWEST:
+        return
+    interval = float(np.median(np.diff(time)))
+    if interval < SLOW or (interval < SLOWER and _beats(commands) * interval < SLOW):
+        return
+    unit = _likely_unit(interval)
+    raise table.at(TIME).refuse(
+        f"the samples are {interval:.4g} s apart (median) if this clock is in seconds; "
+        f"it looks like {unit}",
+        f"Declare its unit in dataset.yaml: `time: {{column: {clock.column}, unit: {unit}}}`, or "
+        "`unit: s` if it is in seconds",
+    )
+
+
+def check_seconds(dataset: Dataset) -> None:
+    """Refuses runs whose times can hardly be in seconds, however they came into memory.
+
+    Raises:
+        DatasetError: Names the run, how far its samples are apart and the likely unit.
+    """
+    for run in dataset.runs:
+        interval = float(np.median(np.diff(run.time_s)))
+        if interval > SLOWEST:
+            raise DatasetError(
+                f"{dataset.name}: run {run.id}: the samples are {interval:.4g} s apart (median) "
+                f"as if the clock were in {_likely_unit(interval)}, but times are in seconds; "
+                "give `time` its unit in dataset.yaml, or correct the times"
+            )
+
+
+def _likely_unit(interval: float) -> str:
+    """Unit in which an interval, given as if it were in seconds, is a usual one."""
+    return next((name for name, size in _LARGER if interval / size < SLOW), _LARGER[-1][0])
+
+
+def _beats(commands: FloatArray) -> float:
+    """Median commanded frequency of the beating tail, Hz; 0 if it never beats."""
+    amplitude, frequency = (
+        commands[:, list(COMMANDS).index(name)] for name in ("tail_amplitude", "tail_frequency")
+    )
+    beating = (amplitude > 0.0) & (frequency > 0.0)
+    return float(np.median(frequency[beating])) if beating.any() else 0.0

@@ -1,0 +1,79 @@
+"""Corrections of a guessed mapping, in the words of the mapping itself."""
+
+from pathlib import Path
+from typing import Any
+
+from fish_env.data.importing.plan import Content
+from fish_env.data.mapping import parse_section
+from fish_env.data.place import Place, closest
+from fish_env.data.vocabulary import COMMANDS, FILE_CHANNELS
+from fish_env.params import list_fish
+
+NOTHING = "none"
+KEYS = ("name", "fish", "frame", "start", "tail_phase", "run_column")
+
+
+def corrected(content: Content, text: str) -> Content:
+    """Changes a mapping as one line says.
+
+    `yaw: deg` or `yaw: {unit: deg, sign: -1}` changes a channel or command, `yaw: none` takes it
+    out, `tail_offset: 0` makes a command constant, `frame: enu` changes the dataset, and
+    `pose: {time: {unit: ms}}` changes a source.
+
+    Args:
+        content: The mapping.
+        text: The line, YAML.
+
+    Returns:
+        The changed mapping; the given one is left as it is.
+
+    Raises:
+        DatasetError: The line is no YAML, or names nothing of a mapping.
+    """
+    section = parse_section(text, Place(Path("correction")))
+    sources = content["sources"]
+    for key, value in section.content.items():
+        if key in FILE_CHANNELS or key in COMMANDS:
+            content = _with_entry(content, key, value)
+        elif key in sources:
+            content = {**content, "sources": {**sources, key: _merged(sources[key], value)}}
+        elif key in KEYS:
+            content = {k: v for k, v in content.items() if k != key}
+            content |= {} if value == NOTHING else {key: _resolved(key, value)}
+        else:
+            known = [*FILE_CHANNELS, *COMMANDS, *KEYS, *sources]
+            raise section.at(key).refuse(f"'{key}' is not known", closest(key, known))
+    return content
+
+
+def _resolved(key: str, value: Any) -> Any:
+    if key != "fish" or not isinstance(value, str) or value in list_fish():
+        return value
+    return str(Path(value).expanduser().resolve())
+
+
+def _with_entry(content: Content, name: str, value: Any) -> Content:
+    group = "commands" if name in COMMANDS else "channels"
+    entries = dict(content.get(group, {}))
+    constants = dict(content.get("constant_commands", {}))
+    constants.pop(name, None)
+    old = entries.pop(name, {})
+    if group == "commands" and _is_number(value):
+        constants[name] = float(value)
+    elif value != NOTHING:
+        entries[name] = _merged(old, {"unit": value} if isinstance(value, str) else value)
+    return {**content, group: entries, "constant_commands": constants}
+
+
+def _is_number(value: Any) -> bool:
+    try:
+        float(value)
+    except (TypeError, ValueError):
+        return False
+    return True
+
+
+def _merged(old: Any, new: Any) -> Any:
+    if not (isinstance(old, dict) and isinstance(new, dict)):
+        return new
+    return {**old, **{key: _merged(old.get(key), value) for key, value in new.items()}}

@@ -1,8 +1,9 @@
-"""Runs the hidden-effect suite and writes its confusion matrix and rates to a dated file.
+"""Runs a suite of hidden effects and writes its rates and answers to a dated file.
 
 Each finished case is kept, so a stopped run goes on where it was:
 
     python scripts/benchmark_diagnosis.py --tiers rich,null --limit 20
+    python scripts/benchmark_diagnosis.py --suite realistic
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
@@ -24,16 +26,17 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 from rich.progress import track  # noqa: E402
 
 from scripts.results import RESULTS, commit, today, write_dated  # noqa: E402
-from tests.hidden.scoring import Row  # noqa: E402
-from tests.hidden.suite import FULL, PIPELINE, Job, do, jobs  # noqa: E402
-from tests.hidden.summary import markdown, summarise  # noqa: E402
+from tests.hidden.suite import PIPELINE, SUITES, Job, do, jobs  # noqa: E402
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     options = parse(arguments)
-    work = options.work / ("quick" if options.quick else "full")
+    suite = SUITES[options.suite]
+    root = options.work or ROOT / "out" / f"benchmark-{suite.result}"
+    work = root / ("quick" if options.quick else "full")
     work.mkdir(parents=True, exist_ok=True)
-    todo = jobs(work, options.tiers, options.limit, options.seed0, options.diagnose, options.quick)
+    chosen = options.tiers or tuple(suite.counts)
+    todo = jobs(work, chosen, options.limit, options.seed0, options.diagnose, options.quick)
     if options.fresh:
         for job in todo:
             job.file.unlink(missing_ok=True)
@@ -41,34 +44,35 @@ def main(arguments: Sequence[str] | None = None) -> None:
         todo = [job for job in todo if job.file.exists()]
     finished = track(run(todo, options.processes), f"{len(todo)} cases", total=len(todo))
     rows = sorted(finished, key=lambda row: (row.tier, row.seed))
-    write(rows, options.seed0, options.out, options.quick)
+    write(rows, options)
 
 
 def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     add = parser.add_argument
-    add("--tiers", type=tiers, default=(), help=f"some of {', '.join(FULL)}")
+    add("--suite", choices=SUITES, default="catalogue")
+    add("--tiers", help="some tiers of the suite, separated by commas; default: all")
     add("--limit", type=int, help="at most this many cases")
     add("--seed0", type=int, default=0, help="number of the first case of each tier")
     add("--quick", action="store_true", help="let the diagnosis take its quick way")
     add("--finished", action="store_true", help="only sum up the cases finished so far")
     add("--fresh", action="store_true", help="do finished cases again")
     add("--processes", type=int, default=2)
-    add("--work", type=Path, default=ROOT / "out" / "benchmark-diagnosis")
+    add("--work", type=Path, help="folder of finished cases; default: out/benchmark-...")
     add("--out", type=Path, default=RESULTS, help="folder of the dated result")
     add("--diagnose", default=PIPELINE, help="module:function to judge instead")
-    return parser.parse_args(arguments)
+    options = parser.parse_args(arguments)
+    options.tiers = tuple(options.tiers.split(",")) if options.tiers else ()
+    known = SUITES[options.suite].counts
+    if unknown := set(options.tiers) - set(known):
+        parser.error(
+            f"--tiers: suite {options.suite} has no tier {', '.join(sorted(unknown))}; "
+            f"use some of {', '.join(known)}"
+        )
+    return options
 
 
-def tiers(text: str) -> tuple[str, ...]:
-    names = tuple(text.split(","))
-    unknown = set(names) - set(FULL)
-    if unknown:
-        raise argparse.ArgumentTypeError(f"no tier {', '.join(unknown)}; use {', '.join(FULL)}")
-    return names
-
-
-def run(todo: list[Job], processes: int) -> Iterator[Row]:
+def run(todo: list[Job], processes: int) -> Iterator[Any]:
     if processes == 1:
         yield from map(do, todo)
         return
@@ -77,12 +81,15 @@ def run(todo: list[Job], processes: int) -> Iterator[Row]:
             yield future.result()
 
 
-def write(rows: list[Row], seed0: int, folder: Path, quick: bool) -> None:
-    summary = summarise(rows)
+def write(rows: list[Any], options: argparse.Namespace) -> None:
+    suite, seed0 = SUITES[options.suite], options.seed0
+    summary = suite.summarise(rows)
     said = f"{len(rows)} cases, numbered from {seed0} in each tier, diagnosed at {commit()}."
-    page = f"# Hidden-effect suite, {today()}\n\n{said}\n\n{markdown(summary)}"
+    page = f"# {suite.title}, {today()}\n\n{said}\n\n{suite.markdown(summary)}"
     content = {"seed0": seed0, **summary, "rows": [asdict(row) for row in rows]}
-    write_dated(folder, "diagnosis-quick" if quick else "diagnosis", content, page)
+    write_dated(
+        options.out, f"{suite.result}-quick" if options.quick else suite.result, content, page
+    )
     print(page)
 
 

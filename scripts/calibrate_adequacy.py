@@ -30,9 +30,9 @@ from rich.progress import track  # noqa: E402
 
 from fish_env.data import load_dataset  # noqa: E402
 from fish_env.data.schema import Dataset  # noqa: E402
-from fish_env.diagnosis.adequacy import strongest_alarm  # noqa: E402
-from fish_env.identification.estimator import fit  # noqa: E402
-from fish_env.identification.problem import Problem  # noqa: E402
+from fish_env.identification.series import Problem  # noqa: E402
+from fish_env.inference.adequacy import strongest_alarm  # noqa: E402
+from fish_env.inference.estimate.fit import fit  # noqa: E402
 from scripts.results import RESULTS, write_dated  # noqa: E402
 from tests.hidden.cases import make_case  # noqa: E402
 

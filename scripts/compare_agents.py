@@ -15,15 +15,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from agents.evaluation.metrics import LATE_S, METRICS, success_rate
 from agents.evaluation.record import Record, swim_suite
 from agents.evaluation.suites import RESERVED_SEEDS, Suite, load_suite, suite_names
 from agents.registry import Agent, load_agents
+from fish_env.arrays import FloatArray
 from fish_env.envs.tasks import TASKS
 
-FloatArray = npt.NDArray[np.float64]
 FIRST_SEED = 19_000_000
 assert FIRST_SEED not in RESERVED_SEEDS
 UNITS = {"depth_rmse_m": (100.0, "cm"), "heading_rmse_rad": (57.2958, "degrees")}

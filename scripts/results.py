@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from agents.policies.files import replace_file
+from fish_env.files import write_bytes
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "results"
@@ -18,7 +18,7 @@ RESULTS = ROOT / "results"
 def kept(file: Path, make: Callable[[], Mapping[str, Any]]) -> dict[str, Any]:
     """A result: read back if there is one, made and put in place at once if there is none."""
     if not file.exists():
-        replace_file(file, json.dumps(make(), indent=1, default=str).encode())
+        write_bytes(file, json.dumps(make(), indent=1, default=str).encode())
     result: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
     return result
 

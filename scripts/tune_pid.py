@@ -15,7 +15,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import yaml
 from rich.console import Console
 from rich.progress import Progress
@@ -23,9 +22,9 @@ from scipy.optimize import differential_evolution
 
 from agents.controllers.pid import GAIN_NAMES, PIDController, PIDGains, load_gains
 from agents.evaluation.suites import RESERVED_SEEDS, Suite, load_suite
+from fish_env.arrays import FloatArray
 from fish_env.envs.tasks import TASKS
 
-FloatArray = npt.NDArray[np.float64]
 FILE = Path(__file__).resolve().parents[1] / "configs" / "controllers" / "pid.yaml"
 SUITES = ("calm", "hard")
 FIRST_SEED, CHECK_SEED = 3_000_000, 3_500_000

@@ -27,10 +27,9 @@ from agents.evaluation.suites import RESERVED_SEEDS, load_suite
 from agents.training.config import load_train_config
 from agents.training.teacher import LIFT, MOMENT, ForesightPID, beyond, true_observations
 from agents.training.teacher_gains import TEACHER_GAIN_NAMES, TeacherGains, teacher_gains
+from fish_env.arrays import FloatArray, IntArray
 from scripts.tune_pid import BOUNDS
 
-FloatArray = npt.NDArray[np.float64]
-IntArray = npt.NDArray[np.int64]
 FIRST_SEED, CHECK_SEED = 6_000_000, 7_000_000
 """Of the episodes that are tuned on, and of those that the result is checked on."""
 assert not {FIRST_SEED, CHECK_SEED} & set(RESERVED_SEEDS)

@@ -17,7 +17,7 @@ import fish_env  # noqa: F401  (registers the environment)
 from fish_env.data import Dataset, Run
 from fish_env.data.schema import CommandSteps
 from fish_env.effects.extended import EffectValues
-from fish_env.identification import Problem, fit
+from fish_env.identification import SeriesProblem, fit
 from fish_env.simulator import Simulator
 from fish_env.steady import steady_motion
 
@@ -63,7 +63,7 @@ def filters(effects: EffectValues) -> None:
     noisy = {n: v + 1e-3 * np.sin(np.arange(len(v)) ** 2) for n, v in channels.items()}
     steps = CommandSteps(run.time_s[:1], run.inputs[:1])
     measured = Run("warm", run.time_s, noisy, steps, "rest", 0.0)
-    problem = Problem(Dataset("warm", FISH, (measured,)), paths=["mass.total"])
+    problem = SeriesProblem(Dataset("warm", FISH, (measured,)), paths=["mass.total"])
     fit(problem, list(effects), refit_noise=False, iterations=1)
 
 

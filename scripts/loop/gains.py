@@ -11,13 +11,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-import numpy.typing as npt
 from scipy.stats import t as student
 
 from agents.evaluation.intervals import CONFIDENCE, Interval
+from fish_env.arrays import FloatArray
 from scripts.loop.training import BASELINE, TRUTH, WITHOUT_MEASUREMENTS
 
-FloatArray = npt.NDArray[np.float64]
 Scores = Mapping[str, FloatArray]
 """Arm -> (fish, seeds) of one metric."""
 

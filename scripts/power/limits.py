@@ -15,12 +15,13 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.stats import chi2, ncx2
 
-from fish_env.diagnosis.causes import Cause, probes_of
-from fish_env.diagnosis.detectable import changes
-from fish_env.diagnosis.projection import Projector
-from fish_env.identification.estimator import Fit, fit
 from fish_env.identification.filtering import NoiseModel
-from fish_env.identification.problem import Point, Problem
+from fish_env.identification.series import SeriesProblem
+from fish_env.inference.detectability import changes
+from fish_env.inference.estimate.fit import Fit, fit
+from fish_env.inference.probes import Cause, probes_of
+from fish_env.inference.problem import Point
+from fish_env.inference.projection import Projector
 from fish_env.model.effect import Effect
 from tests.hidden.disturbances import MOMENT_PER_FORCE
 from tests.hidden.truth import Truth
@@ -37,7 +38,7 @@ def noncentrality(level: float, freedom: int = 1, power: float = 0.8) -> float:
     return float(brentq(lambda nc: ncx2.sf(bound, freedom, nc) - power, 1e-3, 4.0 * bound + 100.0))
 
 
-def oracle(problem: Problem, truth: Truth) -> Fit:
+def oracle(problem: SeriesProblem, truth: Truth) -> Fit:
     """The filter at the true coefficients and the true noise, as a fit that takes no step."""
     baseline = problem.baseline
     values = np.array([truth.coefficients[path] for path in baseline.paths])
@@ -49,7 +50,7 @@ def oracle(problem: Problem, truth: Truth) -> Fit:
 
 
 def limits(
-    problem: Problem, truth: Truth, published: Mapping[str, float], threshold: float
+    problem: SeriesProblem, truth: Truth, published: Mapping[str, float], threshold: float
 ) -> dict[str, dict[str, float]]:
     """effect.parameter -> smallest sizes that the information in the data allows.
 
@@ -100,7 +101,7 @@ def _sizes(size: float, signal: Any, threshold: float) -> dict[str, float]:
     }
 
 
-def probe_at(problem: Problem, name: str, size: float) -> dict[str, float]:
+def probe_at(problem: SeriesProblem, name: str, size: float) -> dict[str, float]:
     """An effect at a size, on the side on which the screen probes it."""
     effect_name, parameter = name.split(".")
     effect = problem.known[effect_name]

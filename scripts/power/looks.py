@@ -14,12 +14,12 @@ from scipy.stats import chi2
 from threadpoolctl import threadpool_limits
 
 from fish_env.data import Dataset, load_dataset
-from fish_env.diagnosis.causes import causes_of
 from fish_env.diagnosis.pipeline import diagnose_runs, fitted_and_final
-from fish_env.diagnosis.preconditions import preconditions
-from fish_env.diagnosis.screening import Screen, screen
-from fish_env.identification.estimator import Fit, fit
-from fish_env.identification.problem import Problem
+from fish_env.identification.series import SeriesProblem
+from fish_env.inference.estimate.fit import Fit, fit
+from fish_env.inference.preconditions import preconditions
+from fish_env.inference.probes import causes_of
+from fish_env.inference.screening import Screen, screen
 from scripts.power.limits import limits
 from tests.hidden.designs import Noise, swim_design
 from tests.hidden.records import LIBRARY
@@ -63,7 +63,7 @@ def measured(design: int, repeat: int, noise: str, effects: Values) -> tuple[Dat
 
 def screened(dataset: Dataset, seed: int) -> tuple[Fit, Screen]:
     """The refitted baseline and the screen of all causes, on the runs a diagnosis would fit."""
-    baseline = fit(Problem(dataset, None, fitted_and_final(dataset, seed)[0]), rounds=2)
+    baseline = fit(SeriesProblem(dataset, None, fitted_and_final(dataset, seed)[0]), rounds=2)
     causes = causes_of(baseline.problem)
     return baseline, screen(baseline, causes, np.random.default_rng(seed))
 
@@ -92,7 +92,7 @@ def without_effect(design: int, noise: str) -> dict[str, Any]:
 def allowed(design: int, noise: str, nothing: dict[str, Any]) -> dict[str, dict[str, float]]:
     """What the information in the data of a design would allow."""
     dataset, truth = measured(design, NOTHING[noise], noise, {})
-    problem = Problem(dataset, None, fitted_and_final(dataset, design)[0])
+    problem = SeriesProblem(dataset, None, fitted_and_final(dataset, design)[0])
     with threadpool_limits(1, "blas"):
         return limits(problem, truth, nothing["published"], nothing["threshold"])
 

@@ -14,11 +14,11 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from fish_env.data import Dataset
-from fish_env.diagnosis.causes import Cause, effect_values
 from fish_env.diagnosis.pipeline import fitted_and_final
-from fish_env.diagnosis.projection import Projector
-from fish_env.identification.estimator import Fit, fit
-from fish_env.identification.problem import Problem
+from fish_env.identification.series import SeriesProblem
+from fish_env.inference.estimate.fit import Fit, fit
+from fish_env.inference.probes import Cause, effect_values
+from fish_env.inference.projection import Projector
 from scripts.power.looks import Target, Values, measured
 from tests.hidden.records import LIBRARY
 from tests.hidden.sizes import SIZES
@@ -44,10 +44,10 @@ def agreement(design: int, published: Mapping[str, float]) -> dict[str, dict[str
     return found
 
 
-def problem_of(design: int, effects: Values) -> Problem:
+def problem_of(design: int, effects: Values) -> SeriesProblem:
     """The runs of a design that a diagnosis would fit, with some effects."""
     dataset: Dataset = measured(design, NOISE_NUMBER, "nominal", effects)[0]
-    return Problem(dataset, None, fitted_and_final(dataset, design)[0])
+    return SeriesProblem(dataset, None, fitted_and_final(dataset, design)[0])
 
 
 def compared(base: Fit, design: int, target: Target, size: float) -> dict[str, float] | None:
@@ -71,7 +71,7 @@ def compared(base: Fit, design: int, target: Target, size: float) -> dict[str, f
     }
 
 
-def innovations(base: Fit, problem: Problem, effects: Mapping[str, Any]) -> np.ndarray:
+def innovations(base: Fit, problem: SeriesProblem, effects: Mapping[str, Any]) -> np.ndarray:
     """Whitened residuals of some runs at a fit, with its gains."""
     lanes = {path: np.array([value]) for path, value in effects.items()}
     return problem.innovations(base.point.z[:, None], lanes, base.noise, base.filtered)[0]

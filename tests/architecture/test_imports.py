@@ -4,6 +4,7 @@ import ast
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,9 @@ ROOT = Path(__file__).resolve().parents[2]
 LINTER = Path(sys.executable).with_name("lint-imports")
 # What agents act on; and the one style of pictures, so that theirs look alike.
 OPEN_TO_AGENTS = {
+    "arrays",
     "errors",
+    "files",
     "params",
     "trajectory",
     "simulator",
@@ -21,6 +24,8 @@ OPEN_TO_AGENTS = {
     "rendering",
     "replay",
 }
+BELOW_INFERENCE = {f"fish_env.{part}" for part in ("arrays", "errors", "inference", "threads")}
+NUMERICS = {"numpy", "scipy", "numba", *BELOW_INFERENCE}
 NOT_ON_IMPORT = ("torch", "matplotlib", "pandas", "stable_baselines3", "pyarrow", "pygame")
 
 
@@ -54,15 +59,25 @@ def test_the_contracts_hold():
         ("fish_env/errors.py", "import fish_env.params"),
         ("fish_env/params.py", "import fish_env.model"),
         ("fish_env/params.py", "import agents"),
+        ("fish_env/inference/box_qp.py", "import fish_env.params"),
         ("fish_env/unheard_of.py", ""),
     ],
 )
 def test_the_contracts_notice_a_wrong_import_or_an_unplaced_module(tmp_path, module, line):
     shutil.copy(ROOT / "pyproject.toml", tmp_path)
-    for file in ("agents/__init__", "fish_env/__init__", "fish_env/errors", "fish_env/params"):
-        (tmp_path / file).parent.mkdir(exist_ok=True)
-        (tmp_path / f"{file}.py").touch()
-    (tmp_path / "fish_env/model.py").touch()
+    for folder in ("agents", "fish_env", "fish_env/inference"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "__init__.py").touch()
+    tool = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]
+    contract = tool["importlinter"]["contracts"][2]
+    forbidden = (*contract["forbidden_modules"], *contract["source_modules"][1:])
+    for part in (
+        "arrays",
+        "errors",
+        "threads",
+        *(name.split(".")[1] for name in forbidden if "." in name),
+    ):
+        (tmp_path / f"fish_env/{part}.py").touch()
     assert run_linter(tmp_path).returncode == 0
     (tmp_path / module).write_text(f"{line}\n")
     assert run_linter(tmp_path).returncode == 1
@@ -77,6 +92,27 @@ def test_the_agents_check_notices_a_kernel_import():
     assert foreign_imports("from fish_env.model.tail import force") == {"model"}
     assert foreign_imports("from fish_env import diagnosis, envs") == {"diagnosis"}
     assert foreign_imports("import fish_env.effects") == {"effects"}
+
+
+def roots(source: str) -> set[str]:
+    """Packages that a source imports; of this project, the part."""
+    imported = {a.name for n in ast.walk(ast.parse(source)) if isinstance(n, ast.Import)
+                for a in n.names}  # fmt: skip
+    nodes = [n for n in ast.walk(ast.parse(source)) if isinstance(n, ast.ImportFrom)]
+    imported |= {str(node.module) for node in nodes}
+    parts = [name.split(".") for name in imported]
+    return {".".join(p[:2]) if p[0] == "fish_env" else p[0] for p in parts}
+
+
+@pytest.mark.parametrize("file", sorted((ROOT / "fish_env/inference").rglob("*.py")), ids=str)
+def test_inference_needs_numerics_only(file):
+    foreign = roots(file.read_text(encoding="utf-8")) - NUMERICS
+    assert foreign <= sys.stdlib_module_names
+
+
+def test_the_inference_check_notices_other_packages():
+    source = "import pandas\nfrom fish_env.params import load_fish\nimport scipy.linalg"
+    assert roots(source) - NUMERICS == {"pandas", "fish_env.params"}
 
 
 def loaded_by(statement: str) -> set[str]:

@@ -73,3 +73,59 @@ def test_no_file_names_a_path_of_one_machine():
 def test_the_path_check_notices_one():
     assert ONE_MACHINE.search('open("/' + 'home/ada/fish.yaml")')
     assert not ONE_MACHINE.search("../shared/data and https://example.org/home/page")
+
+
+WRITES = {"write_text", "write_bytes", "savefig", "to_parquet", "write_frames", "unlink", "rmtree"}
+"""Calls that write or remove; only fish_env.files may do so where a file has its final name."""
+REMOVERS = {
+    "agents/training/lock.py",
+    "fish_env/diagnosis/written.py",
+    "fish_env/model/compose.py",
+    "fish_env/model/kernel_cache.py",
+}
+"""Modules that remove files, of which they know that they wrote them."""
+
+
+def careless_writes(source: str) -> list[str]:
+    """Calls that write a file outside a ``with replacing(...)``, by name and line."""
+    found: list[str] = []
+
+    def look(node: ast.AST, safe: bool) -> None:
+        if isinstance(node, ast.With):
+            safe = safe or any("replacing(" in ast.unparse(item) for item in node.items)
+        if isinstance(node, ast.Call):
+            name = getattr(node.func, "attr", getattr(node.func, "id", ""))
+            method = isinstance(node.func, ast.Attribute)
+            opened = name == "open" and any(
+                isinstance(value, ast.Constant) and str(value.value)[:1] in "wax"
+                for value in (*node.args, *(k.value for k in node.keywords if k.arg == "mode"))
+            )
+            helper = name in ("write_text", "write_bytes") and not method
+            if (name in WRITES or opened) and not helper and not safe:
+                found.append(f"{name}:{node.lineno}")
+        for child in ast.iter_child_nodes(node):
+            look(child, safe)
+
+    look(ast.parse(source), False)
+    return found
+
+
+@pytest.mark.parametrize("file", [f for f in PUBLIC if name(f) != "fish_env/files.py"], ids=name)
+def test_files_are_written_by_the_one_helper(file):
+    found = careless_writes(file.read_text(encoding="utf-8"))
+    if name(file) in REMOVERS:
+        found = [call for call in found if not call.startswith(("unlink", "rmtree"))]
+    assert found == []
+
+
+def test_the_writing_check_notices_each_kind():
+    for line in (
+        "path.write_text(text)",
+        "open(path, 'w')",
+        "path.open('ab')",
+        "figure.savefig(path)",
+        "file.unlink()",
+    ):
+        assert careless_writes(line), line
+    safe = "with replacing(path) as part, part.open('w') as stream:\n    figure.savefig(part)\n"
+    assert careless_writes(safe + "write_text(path, text)\nopen(path)\nopen(path, 'rb')") == []

@@ -141,7 +141,7 @@ def test_an_effect_of_ones_own_lies_beside_the_fish(tmp_path):
     with pytest.raises(EffectError, match=r"put leak\.py beside the fish file"):
         RoboticFish3DEnv(fish=fish)
     (tmp_path / "leak.py").write_text(OWN_EFFECT)
-    env = RoboticFish3DEnv(fish=fish)
+    env = RoboticFish3DEnv(fish=fish, trust_effects=True)
     still = np.repeat(REST_ACTION[None], 10, axis=0)
     sunk = []
     for parameters in ({}, {"effects.leak.force": 0.04}, {"effects.leak.force": 0.0}):

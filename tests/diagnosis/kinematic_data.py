@@ -9,7 +9,7 @@ from scipy.integrate import cumulative_simpson
 from scipy.signal import lfilter
 
 from fish_env.data import CommandSteps, Dataset, Run
-from fish_env.diagnosis.kinematics import euler_rates, rotations
+from fish_env.rigidbody.kinematics import euler_rates, rotations
 
 NOISE = {
     **dict.fromkeys(("x", "y", "z"), 0.002),

@@ -6,9 +6,9 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from fish_env.diagnosis.causes import Cause
-from fish_env.identification.descent import Within
-from fish_env.identification.free import Linearised
+from fish_env.inference.estimate.bounds import LinearBounds
+from fish_env.inference.estimate.free import Linearised
+from fish_env.inference.probes import Cause
 
 BLOCKS, PER_BLOCK, COEFFICIENTS = 60, 20, 4
 
@@ -44,9 +44,9 @@ class LinearProblem:
         data = noise - self.slopes @ rng.standard_normal(COEFFICIENTS) + added
         hessian = self.slopes.T @ self.slopes + np.eye(COEFFICIENTS)
         gradient = self.slopes.T @ data
-        bounds = np.full(COEFFICIENTS, reach)
-        within = Within(np.eye(COEFFICIENTS), -bounds, bounds, lambda z: z)
-        z = within.step(hessian, gradient, np.zeros(COEFFICIENTS))
+        ends = np.full(COEFFICIENTS, reach)
+        bounds = LinearBounds(np.eye(COEFFICIENTS), -ends, ends)
+        z = bounds.step(hessian, gradient, np.zeros(COEFFICIENTS))
         times = np.repeat(3.0 * np.arange(BLOCKS) + 1.0, PER_BLOCK)
         linearised = Linearised(
             data + self.slopes @ z, self.slopes, np.zeros(self.size, np.int64), times
@@ -56,7 +56,7 @@ class LinearProblem:
             linearised=linearised,
             problem=SimpleNamespace(baseline=Sized(paths)),
             released=(),
-            held=within.held(hessian, gradient + hessian @ z, z),
+            active=bounds.active(hessian, gradient + hessian @ z, z),
             point=SimpleNamespace(z=z),
         )
 

@@ -44,6 +44,7 @@ def answer(verdict: str = "cause", **changes: Any) -> dict[str, Any]:
     full = {
         "format": "robofish-diagnosis/1", "dataset": "pool <b>", "fish": FISH, "seed": 0,
         "quick": False, "runtime_s": 12.0, "verdict": verdict,
+        "verdict_once_corrected": "no_misfit",
         "causes": [CAUSE] if named else [],
         "alternatives": [[RIVAL]] if verdict == "ambiguous" else [],
         "parameters": [{

@@ -6,11 +6,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fish_env.diagnosis.adequacy import Adequacy, Misfit, adequacy, implausible
-from fish_env.diagnosis.generic_forces import regressors
 from fish_env.effects import catalogue
 from fish_env.identification.filtering import NoiseModel
-from fish_env.identification.free import Linearised
+from fish_env.identification.generic_forces import generic_forces, regressors
+from fish_env.identification.noise import disturbance_range
+from fish_env.inference.adequacy import Adequacy, Misfit, adequacy, implausible_estimates
+from fish_env.inference.estimate.free import Linearised
+from fish_env.inference.problem import Problem
 from fish_env.params import load_fish
 from tests.diagnosis.linear import Sized
 
@@ -34,22 +36,35 @@ def swimming(rng):
     return run, SimpleNamespace(states=states)
 
 
-class Answering:
-    """A problem in which each direction of the wrench moves one of six channels."""
+class Answering(Problem):
+    """A problem in which each direction of a generic force moves one of six channels."""
 
-    def __init__(self, run):
-        self.runs, self.baseline, self.known = (run,), Sized(()), {}
-        self.fish = load_fish("zheng-2021-a")
+    def __init__(self, run, filtered):
+        self.baseline, self.known = Sized(()), {}
+        self.forces = generic_forces([run], [filtered])
 
-    def has_corners(self, effects):
-        return False
+    def disturbance_at_limit(self, noise):
+        return disturbance_range(load_fish("zheng-2021-a")).left_by(noise)
 
-    def changes(self, z, effects, noise, filtered, pushes):
-        out = np.zeros((len(pushes.column), SAMPLES, 6))
-        for lane, (column, size) in enumerate(zip(pushes.column, pushes.size, strict=True)):
+    def generic_terms(self, fit):
+        return self
+
+    @property
+    def columns(self):
+        return self.forces.columns
+
+    def words(self, column):
+        return self.forces.words(column)
+
+    def unit(self, column):
+        return UNIT[column % 6]
+
+    def changes(self, columns):
+        out = np.zeros((len(columns), SAMPLES, 6))
+        for lane, column in enumerate(columns):
             function, direction = divmod(column, 6)
-            out[lane, :, direction] -= size / UNIT[direction] * pushes.bases[0][:, function]
-        return (out[1:] - out[0]).reshape(len(out) - 1, -1)
+            out[lane, :, direction] -= self.forces.bases[0][:, function]
+        return out.reshape(len(out), -1).T
 
 
 QUIET = NoiseModel(np.ones(6), 3e-3, 1e-4, 1.0)
@@ -66,11 +81,11 @@ def fit_with(missing, seed=0, noise=QUIET):
     flat = residuals.ravel()
     lin = Linearised(flat, np.zeros((len(flat), 0)), np.zeros(len(flat), np.int64),
                      np.repeat(run.clock, 6))  # fmt: skip
-    problem = Answering(run)
+    problem = Answering(run, filtered)
     own = SimpleNamespace(
         problem=problem, comparing=problem, filtered=[filtered], linearised=lin, released=(),
         effects=(), noise=noise,
-        held=np.zeros((0, 0)),
+        active=np.zeros((0, 0)),
         point=SimpleNamespace(z=np.zeros(0), effects={}),
     )  # fmt: skip
     own.extrapolated = own
@@ -86,7 +101,7 @@ def test_a_disturbance_that_no_tank_makes_is_a_misfit():
     strong = fit_with([], noise=NoiseModel(np.ones(6), 0.5, 1e-4, 1.0))
     answer = adequacy(strong, np.random.default_rng(0))
     assert not answer.reached
-    assert "force" in answer.strained[0]
+    assert "force" in answer.implausible[0]
 
 
 def test_an_error_of_the_simulation_may_be_tolerated():
@@ -128,7 +143,7 @@ def test_what_foretells_nothing_elsewhere_and_may_be_chance_is_taken_for_it(gain
     [
         (SLIGHT, 0.1),  # the other runs ask for it too
         (replace(SLIGHT, misfits=(Misfit("u", "surge", -22.5, 1e-3),)), -3.0),  # no chance
-        (replace(SLIGHT, strained=("a hull without lift",)), -3.0),
+        (replace(SLIGHT, implausible=("a hull without lift",)), -3.0),
         (replace(SLIGHT, reached=True), -3.0),
     ],
 )
@@ -148,30 +163,30 @@ def named(effects=(), released=(), z=0.0, interval=(0.0, 0.0), at_bounds=()):
 
 
 def test_a_coefficient_far_outside_its_prior_is_no_explanation():
-    assert implausible(named(released=("tail.area",), z=6.0)) == ()
-    (said,) = implausible(named(released=("tail.area",), z=-57.0))
+    assert implausible_estimates(named(released=("tail.area",), z=6.0)) == ()
+    (said,) = implausible_estimates(named(released=("tail.area",), z=-57.0))
     assert "tail.area" in said
-    assert implausible(named(released=("mass.total",), z=-57.0)) == ()
+    assert implausible_estimates(named(released=("mass.total",), z=-57.0)) == ()
     trimmed = named(released=("mass.buoyancy",), z=19.0)
     trimmed.problem.baseline = Sized(("mass.buoyancy", "mass.total"))
-    assert implausible(trimmed) == ()  # a buoyancy_offset may be as large
+    assert implausible_estimates(trimmed) == ()  # a buoyancy_offset may be as large
 
 
 def test_beside_an_effect_a_coefficient_has_to_be_nearer():
     """A slip in the fish's file is no stranger; what helps an effect out is."""
     wave = {"effects": ("wave",), "interval": (0.1, 0.2)}
-    assert implausible(named(released=("tail.area",), z=7.1)) == ()
-    (said,) = implausible(named(released=("tail.area",), z=7.1, **wave))
+    assert implausible_estimates(named(released=("tail.area",), z=7.1)) == ()
+    (said,) = implausible_estimates(named(released=("tail.area",), z=7.1, **wave))
     assert "tail.area 7" in said
-    assert implausible(named(released=("tail.area",), z=4.5, **wave)) == ()
+    assert implausible_estimates(named(released=("tail.area",), z=4.5, **wave)) == ()
 
 
 def test_a_coefficient_at_the_end_of_what_physics_allows_is_no_explanation():
     """A hull without lift makes up for something else."""
     stuck = named(released=("tail.area",), z=-6.0, at_bounds=("tail.area",))
-    (said,) = implausible(stuck)
+    (said,) = implausible_estimates(stuck)
     assert "tail.area" in said
-    assert implausible(named(z=-4.9, at_bounds=("tail.area",))) == ()  # nothing claims it
+    assert implausible_estimates(named(z=-4.9, at_bounds=("tail.area",))) == ()  # nothing claims it
 
 
 @pytest.mark.parametrize(
@@ -189,4 +204,4 @@ def test_a_coefficient_at_the_end_of_what_physics_allows_is_no_explanation():
     ],
 )
 def test_an_effect_needs_a_sign_and_size_that_it_can_have(effect, interval, believed):
-    assert (implausible(named(effects=(effect,), interval=interval)) == ()) is believed
+    assert (implausible_estimates(named(effects=(effect,), interval=interval)) == ()) is believed

@@ -4,9 +4,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from fish_env.diagnosis import attribution
-from fish_env.diagnosis.attribution import explained_away, shortlisted
 from fish_env.effects import catalogue
+from fish_env.inference import attribution
+from fish_env.inference.attribution import explained_away, shortlisted
 
 
 def screen_of(**statistics):
@@ -74,7 +74,7 @@ def drowned(best, other):
 @pytest.mark.parametrize(("gap", "steps"), [(3.0, 1), (300.0, 2), (3000.0, 2)])
 def test_a_tie_ends_the_search_but_not_a_difference_that_a_misfit_drowns(monkeypatch, gap, steps):
     """Two causes that look alike while a third is missing are judged when it is there."""
-    problem = SimpleNamespace(known={}, subset=None)
+    problem = SimpleNamespace(known={}, subset=None, interchangeable=(), variations=())
     screens = SimpleNamespace(best=lambda: [])
     done = []
 
@@ -94,9 +94,10 @@ def test_a_tie_ends_the_search_but_not_a_difference_that_a_misfit_drowns(monkeyp
     for name, value in {
         "refits": refits, "screen": lambda *a: screens,
         "tied": settled, "alike": drowned, "explained_away": lambda *a: True,
-        "shortlisted": lambda *a: [], "implausible": lambda fit: (), "ranking_of": lambda *a: (),
-        "pruned": lambda e: e, "exchanged": lambda e, *a: [e],
-        "_with_wandering_phase": lambda *a: None, "finished": lambda fit: fit,
+        "shortlisted": lambda *a: [], "implausible_estimates": lambda fit: (),
+        "ranking_of": lambda *a: (),
+        "backward_elimination": lambda e: e, "swap_step": lambda e, *a: [e],
+        "_under_relaxed_noise": lambda *a: None, "finished": lambda fit: fit,
     }.items():  # fmt: skip
         monkeypatch.setattr(attribution, name, value)
     begun = attribution.Attribution(nothing, (screens,), nothing, (), (), 0.0)
@@ -105,9 +106,11 @@ def test_a_tie_ends_the_search_but_not_a_difference_that_a_misfit_drowns(monkeyp
     assert len(found.rivals) == (1 if steps == 1 else 0)
 
 
-def effect_signal(name, unwidened):
+def effect_signal(name, uncorrected):
     return SimpleNamespace(
-        cause=SimpleNamespace(name=name, is_effect=True), unwidened=unwidened, log_p=-unwidened
+        cause=SimpleNamespace(name=name, is_effect=True),
+        uncorrected=uncorrected,
+        log_p=-uncorrected,
     )
 
 
@@ -117,12 +120,13 @@ def test_what_puts_a_beat_out_of_step_is_tried_whatever_the_screen_makes_of_it(m
     shown = SimpleNamespace(best=lambda: [*weak, *strong])
     loose = SimpleNamespace()
     for name, value in {
-        "strains": lambda fit: ("a push",),
+        "disturbance_at_limit": lambda fit: ("a push",),
         "screen": lambda *a: shown,
     }.items():  # fmt: skip
         monkeypatch.setattr(attribution, name, value)
-    nothing = SimpleNamespace(causes=(), fit=None, loosened=loose)
-    found, tried = attribution._with_wandering_phase(nothing, strong, (), None)
+    fit = SimpleNamespace(problem=SimpleNamespace(out_of_step=("clock_scale", "battery_sag")))
+    nothing = SimpleNamespace(causes=(), fit=fit, with_relaxed_noise=loose)
+    found, tried = attribution._under_relaxed_noise(nothing, strong, (), None)
     assert found is loose
     names = [s.cause.name for s in tried]
     assert names == ["sensor_delay", "block_lag", "added_mass", "clock_scale", "battery_sag"]
@@ -139,7 +143,7 @@ def test_relatives_of_an_accepted_cause_are_tried_along_with_what_shows_next(mon
         return [], None
 
     monkeypatch.setattr(attribution, "refits", refits)
-    monkeypatch.setattr(attribution, "_with_wandering_phase", lambda *a: None)
+    monkeypatch.setattr(attribution, "_under_relaxed_noise", lambda *a: None)
     monkeypatch.setattr(attribution, "finished", lambda fit: fit)
     fit = SimpleNamespace(
         problem=SimpleNamespace(known=catalogue()), released=(), effects=("servo_delay",)

@@ -10,7 +10,7 @@ import pytest
 
 from fish_env.data import COMMANDS, load_dataset
 from fish_env.diagnosis import diagnose
-from fish_env.diagnosis.suitability import check_runs, doubts
+from fish_env.diagnosis.input_checks import check_runs, doubts
 from fish_env.errors import DatasetError
 from fish_env.params import load_fish, save_fish
 from tests.command_line import run
@@ -124,7 +124,7 @@ def height_as_depth(data: Pool) -> None:
 
 
 UNREADABLE: dict[str, tuple[Spoil, list[str]]] = {
-    "unknown unit": (declared("channels", x="furlong"), ["channels.x", "unknown unit 'furlong'"]),
+    "unknown unit": (declared("channels", x="parsnip"), ["channels.x", "unknown unit 'parsnip'"]),
     "unknown channel": (declared("channels", heading="rad"), ["unknown channel 'heading'"]),
     "unknown column": (declared("channels", u="m/s"), ["r1.csv", "column u", "not in the file"]),
     "time not increasing": (cell(6, "t", "0.04"), ["run r1", "row 6", "does not increase"]),
@@ -199,31 +199,12 @@ MISLEADING: dict[str, tuple[Spoil, list[str]]] = {
     "cut": (cut, ["runs r1 and r4 have the same samples"]),
     "clock jumps far": (forward(60.0), ["run r2", "the clock jumps by 60.04 s"]),
     "clock jumps": (forward(1.0), ["run r2", "jumps by 1.04 s", "as if no time had passed"]),
-    "angles as degrees": (
-        scaled(1 / 57.3, "roll", "pitch", "yaw"), ["is in radians but declared as degrees"]
-    ),
-    "gyro reversed": (scaled(-1.0, "r"), ["yaw changes against what r says"]),
-    "depth reversed": (scaled(-1.0, "z"), ["goes down whenever pitch points up"]),
-    "camera yaw reversed": (
-        both(only("x", "y", "z", "yaw"), lambda data: data.each(
-            lambda c: c | {"yaw": 1.2 - c["yaw"]})),
-        ["the path does not follow yaw"],
-    ),
-    "x and y exchanged": (
-        both(only("x", "y", "yaw"), lambda data: data.each(
-            lambda c: c | {"x": c["y"], "y": c["x"]})),
-        ["x and y are exchanged"],
-    ),
     "tail only": (
         lambda data: (data.each(lambda c: c | {"tail_angle": 0.3 * np.sin(9.0 * c["t"])}),
                       data.description.update(channels={"tail_angle": "rad"})),
         ["measures only tail_angle"],
     ),
 }  # fmt: skip
-
-
-LONGER = {"depth reversed": (4, 16.0)}
-"""Runs and seconds where three of 8 s show too little."""
 
 
 def refusal(capsys, data: Pool, tmp_path, command: str) -> str:
@@ -253,7 +234,7 @@ def test_what_a_file_cannot_mean_is_refused(name, command, tmp_path, capsys):
 @pytest.mark.parametrize("name", sorted(MISLEADING))
 def test_what_would_mislead_a_diagnosis_is_refused(name, tmp_path, capsys):
     spoil, expected = MISLEADING[name]
-    data = pool(*LONGER.get(name, ()))
+    data = pool()
     spoil(data)
     message = refusal(capsys, data, tmp_path, "diagnose")
     assert all(words in message for words in expected), message
@@ -373,11 +354,11 @@ def test_doubts_are_voiced_when_they_should_be(answer, expected):
 
 def test_each_check_is_what_refuses(tmp_path, monkeypatch):
     """Without its checks the module lets the spoilt datasets through: the tests above test them."""
-    from fish_env.diagnosis import suitability
+    from fish_env.diagnosis import input_checks
 
-    for name in ("check_stuck", "check_clock_jumps", "check_conventions"):
-        monkeypatch.setattr(suitability, name, lambda *args: None)
-    for name in ("zeros", "clock jumps", "gyro reversed"):
+    for name in ("check_stuck", "check_clock_jumps"):
+        monkeypatch.setattr(input_checks, name, lambda *args: None)
+    for name in ("zeros", "clock jumps"):
         data = pool()
         MISLEADING[name][0](data)
         folder = data.write(tmp_path / name)

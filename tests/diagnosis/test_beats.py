@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from fish_env.data import CommandSteps, Dataset, Run
+from fish_env.data.vocabulary import COMMANDS
 from fish_env.diagnosis.beats import beats_of, by_run, frequency_of, uneven, with_measured_beats
 from fish_env.diagnosis.pipeline import diagnose
-from fish_env.diagnosis.suitability import doubts
 from fish_env.errors import DatasetError
+from fish_env.params import load_fish
+from fish_env.simulator import Simulator
 
 RATE, LENGTH = 13.0, 20.0
 
@@ -75,22 +77,42 @@ def test_runs_that_beat_alike_are_told_from_others(ratios, expected):
 
 
 def test_measured_beats_take_the_place_of_commands():
-    rng = np.random.default_rng(4)
+    rng, fish = np.random.default_rng(4), load_fish("zheng-2021-a")
     quiet = replace(run_of("c", rng, 1.0), channels={"yaw": rng.standard_normal(260)})
     data = dataset_of([run_of("a", rng, 0.9, 1.2), run_of("b", rng, 0.98), quiet])
-    frequencies = [run.commands.values[0, 2] for run in with_measured_beats(data).runs]
+    told = with_measured_beats(data, fish)
+    frequencies = [run.commands.values[0, 2] for run in told.runs]
     assert frequencies == pytest.approx([1.08, 0.98, 0.94], abs=4e-3)  # the last by the mean ratio
-    assert "0.94" in with_measured_beats(data).notes[-1]
-    assert with_measured_beats(dataset_of([quiet])) == dataset_of([quiet])
+    assert "0.94" in told.notes[-1]
+    assert with_measured_beats(dataset_of([quiet]), fish) == dataset_of([quiet])
 
 
-def test_uneven_beats_are_spoken_of_where_nothing_explains_them():
-    beats = {"uneven": True, "runs": {"a": {"ratio": 0.9}, "b": {"ratio": 0.98}}}
-    said = {"parameters": [], "causes": [], "beats": beats}
-    (doubt,) = doubts({**said, "verdict": "outside_library"})
-    assert "0.900 to 0.980" in doubt
-    assert "--measured-beats" in doubt
-    assert doubts({**said, "verdict": "cause"}) == []
+@pytest.mark.parametrize(
+    "effects",
+    [
+        {"frequency_scale": {"scale": 0.93}},
+        {"clock_scale": {"scale": 1.04}},
+        {"frequency_scale": {"scale": 0.93}, "clock_scale": {"scale": 1.04}},
+    ],
+)
+def test_measured_beats_are_scaled_once(effects):
+    """A fish that knows its frequency beats as measured, not at that multiple of it."""
+    fish = load_fish("zheng-2021-a")
+    slow = replace(fish, effects=effects)
+    measured = dataset_of([run_of("a", np.random.default_rng(5), 0.93 * 1.04)])
+    (run,) = with_measured_beats(measured, slow).runs
+    assert recorded_beat(slow, run.commands) == pytest.approx(0.93 * 1.04, abs=4e-3)
+    (run,) = with_measured_beats(measured, fish).runs
+    assert recorded_beat(slow, run.commands) != pytest.approx(0.93 * 1.04, abs=0.02)
+
+
+def recorded_beat(fish, commands):
+    """Frequency (Hz) of the tail of a simulated fish, on its recorder's clock."""
+    row = dict(zip(COMMANDS, commands.values[0].tolist(), strict=True))
+    trajectory = Simulator(fish).run([{"t": 0.0, **row}], 10.0)
+    phase = trajectory["tail_phase"]
+    clock = fish.effects.get("clock_scale", {}).get("scale", 1.0)
+    return (phase[-1] - phase[0]) / (2 * np.pi) / (trajectory.time_s[-1] / clock)
 
 
 def test_a_table_of_means_holds_no_beat():

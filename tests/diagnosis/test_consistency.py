@@ -5,15 +5,16 @@ import json
 import numpy as np
 import pytest
 
-from fish_env.diagnosis import kinematic_fit
-from fish_env.diagnosis.consistency import (
+from fish_env.diagnosis.recorded import recorded
+from fish_env.effects import catalogue
+from fish_env.rigidbody import kinematic_fit
+from fish_env.rigidbody.consistency import (
     NEEDS,
     as_dict,
     check_consistency,
     sentences,
 )
-from fish_env.diagnosis.kinematics import integrator, relations_of
-from fish_env.effects import catalogue
+from fish_env.rigidbody.kinematics import integrator, relations_of
 from tests.diagnosis.kinematic_data import NOISE, measured
 
 EVERY = ("x", "y", "z", "roll", "pitch", "yaw", "u", "v", "w", "p", "q", "r")
@@ -26,7 +27,7 @@ def few_draws(monkeypatch):
 
 
 def checked(seed=0, **wrong):
-    return check_consistency(measured(seed, **wrong), np.random.default_rng(seed))
+    return check_consistency(recorded(measured(seed, **wrong)), np.random.default_rng(seed))
 
 
 def estimates(consistency):
@@ -98,7 +99,7 @@ def test_errors_that_trust_white_noise_would_raise_false_alarms():
     for seed in range(12):
         dataset = measured(100 + seed, colour=1.0)
         relation = relations_of(dataset.channels)[0]
-        values, scores, _ = kinematic_fit._fit(dataset, relation, NOISE)
+        values, scores, _ = kinematic_fit._fit(recorded(dataset), relation, NOISE)
         naive = np.sqrt(np.diag(np.linalg.inv(scores.curvature.sum(0))))
         alarms += np.abs(values / naive).max() > 3.3
     assert alarms >= 3
@@ -137,7 +138,7 @@ def test_a_film_from_above_is_taken_to_be_level_and_says_so():
 
 def test_runs_that_do_not_begin_at_rest_though_declared_so():
     dataset = measured(0, start="rest")
-    found = check_consistency(dataset, np.random.default_rng(0))
+    found = check_consistency(recorded(dataset), np.random.default_rng(0))
     assert any(e.name.startswith("start.") for e in found.unnamed)
     assert any("start: unknown" in s for s in sentences(found))
 
@@ -162,7 +163,7 @@ def test_gaps_and_patchy_samples_do_not_bias():
         for values in run.channels.values():
             values[rng.random(len(values)) < 0.05] = np.nan
             values[100:140] = np.nan
-    found = check_consistency(dataset, rng)
+    found = check_consistency(recorded(dataset), rng)
     assert found.found == ()
     assert found.tested[0].windows >= 8
 

@@ -5,10 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fish_env.diagnosis import search
-from fish_env.diagnosis.effort import FULL, QUICK
-from fish_env.diagnosis.explanation import Explanation
-from fish_env.diagnosis.search import refits
+from fish_env.inference import search
+from fish_env.inference.effort import FULL, QUICK
+from fish_env.inference.explanation import Explanation
+from fish_env.inference.policy import POLICY
+from fish_env.inference.search import refits
 
 PRESENT, NOTHING_MORE = 100.0, 90.0
 """Objective of the present explanation on the runs of a sketch, and of a sketch of it alone."""
@@ -37,20 +38,20 @@ def contest(monkeypatch):
     """
 
     def run(
-        sketches, scores, causes=("first",), strained=(), unseen=(), wandering=(), effort=FULL,
+        sketches, scores, causes=("first",), at_limit=(), unseen=(), wandering=(), effort=FULL,
         base=PRESENT,
     ):  # fmt: skip
         fits = {name: fake(name, score) for name, score in scores.items()}
         done = SimpleNamespace(at_noise=[], in_full=[], noise_too=[], enough={})
 
-        class Sketcher:
+        class CoarseFitter:
             def __init__(self, fit):
                 self.fit, self.base = fit, base
 
-            def sketch(self, effects, released, begin):
+            def coarse_fit(self, effects, released, begin):
                 return SimpleNamespace(objective=NOTHING_MORE)
 
-        def sketched(sketcher, base, signal, begin, enough=np.inf):
+        def sketched(fitter, base, signal, begin, enough=np.inf):
             done.enough[str(signal)] = enough
             found = SimpleNamespace(name=str(signal), objective=sketches[signal], point=None)
             return [(signal, found)]
@@ -68,8 +69,8 @@ def contest(monkeypatch):
             return own
 
         for name, value in {
-            "Sketcher": Sketcher, "_sketches": sketched, "starts": lambda *a: [],
-            "strains": lambda fit: strained,
+            "CoarseFitter": CoarseFitter, "_coarse_fits": sketched, "starts": lambda *a: [],
+            "disturbance_at_limit": lambda fit: at_limit,
             "_at_noise": at_noise, "_in_full": in_full, "_noise_too": noise_too,
         }.items():  # fmt: skip
             monkeypatch.setattr(search, name, value)
@@ -99,11 +100,11 @@ def test_what_gains_leaves_its_own_noise_and_the_others_are_fitted_under_that(co
     assert done.at_noise[2:] == [("b", "c"), ("present", "c")]
 
 
-@pytest.mark.parametrize(("causes", "strained"), [((), ()), (("first",), ("a disturbing force",))])
+@pytest.mark.parametrize(("causes", "at_limit"), [((), ()), (("first",), ("a disturbing force",))])
 def test_where_the_present_noise_says_little_the_likeliest_brings_its_own(
-    contest, causes, strained
+    contest, causes, at_limit
 ):
-    tried, _, done = contest({"b": 80.0, "c": 85.0}, {"b": 1.0, "c": 2.0}, causes, strained)
+    tried, _, done = contest({"b": 80.0, "c": 85.0}, {"b": 1.0, "c": 2.0}, causes, at_limit)
     assert len(tried) == 2
     assert done.in_full == ["b"]
     assert done.at_noise[0] == ("c", "b")
@@ -122,10 +123,16 @@ def test_later_sketches_end_where_they_cannot_get_among_the_finalists(contest):
     scores = dict.fromkeys(("b", "c", "d"), 1.0)
     given = {"b": 8000.0, "c": 6000.0, "d": 7000.0}
     *_, done = contest(given, scores, (), unseen=("d",), base=10_000.0)
-    assert done.enough == {"b": np.inf, "c": np.inf, "d": 6000.0 + search.BEHIND * 4000.0}
+    assert done.enough == {
+        "b": np.inf,
+        "c": np.inf,
+        "d": 6000.0 + POLICY.coarse_fit_behind * 4000.0,
+    }
     assert "d" in dict(done.at_noise)
     *_, done = contest(given, scores, (), unseen=("d",), base=6500.0)
-    assert done.enough["d"] == 6000.0 + max(search.LEEWAY, search.BEHIND * 500.0)
+    assert done.enough["d"] == 6000.0 + max(
+        POLICY.coarse_fit_leeway, POLICY.coarse_fit_behind * 500.0
+    )
     assert "d" not in dict(done.at_noise)
 
 
@@ -140,7 +147,7 @@ def test_what_was_begun_with_a_wandering_phase_has_to_get_among_the_finalists_to
     given = {"b": 6000.0, "w": 6500.0, "x": 9000.0}
     scores = dict.fromkeys(given, 1.0)
     *_, done = contest(given, scores, (), wandering=("w", "x"), base=10_000.0)
-    assert done.enough["w"] == done.enough["x"] == 6000.0 + search.BEHIND * 4000.0
+    assert done.enough["w"] == done.enough["x"] == 6000.0 + POLICY.coarse_fit_behind * 4000.0
     assert "w" in dict(done.at_noise)
     assert "x" not in dict(done.at_noise)
 

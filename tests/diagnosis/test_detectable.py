@@ -6,17 +6,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fish_env.diagnosis.causes import Cause, effect_values
-from fish_env.diagnosis.detectable import (
+from fish_env.inference.detectability import (
     Setting,
     changes,
     in_proportion,
     noncentrality,
     simulated,
 )
-from fish_env.diagnosis.projection import Projector
-from fish_env.diagnosis.screening import Screen
-from fish_env.identification.free import Linearised
+from fish_env.inference.estimate.free import Linearised
+from fish_env.inference.probes import Cause, effect_values
+from fish_env.inference.projection import Projector
+from fish_env.inference.screening import Screen
 from fish_env.model.effect import Effect, EffectParameter
 
 SIZE, THRESHOLD, STEP = 600, -7.5, 0.01
@@ -55,7 +55,7 @@ class Bending:
     def neutral(self, names) -> dict[str, float]:
         return {PATH: 0.0}
 
-    def has_corners(self, effects) -> bool:
+    def refines_steps(self, effects) -> bool:
         return False
 
     def freedoms(self, names) -> tuple:
@@ -81,7 +81,7 @@ def prepared(change: Callable, probe: float = 1.0, fastest: Callable | None = No
         comparing=problem,
         linearised=lines,
         released=(),
-        held=np.zeros((0, 2)),
+        active=np.zeros((0, 2)),
         point=SimpleNamespace(z=np.zeros(2), effects={}),
         noise=None,
         filtered=None,
@@ -114,7 +114,7 @@ def least_energy(change: Callable, size: float) -> float:
 def needed(change: Callable) -> float:
     """Noncentrality that the screen's test of one setting needs."""
     _, _, setting = prepared(change)
-    information = float(setting.signal.projected[0, 0]) / setting.signal.inflation
+    information = float(setting.signal.projected[0, 0]) / setting.signal.variance_inflation
     return information * float(in_proportion([setting], THRESHOLD)[0]) ** 2
 
 

@@ -1,21 +1,21 @@
-"""A tail far out of step with its command is found from a comb of sizes, and from nothing less."""
+"""A tail far out of step with its command is found from a grid of sizes, and from nothing less."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from fish_env.diagnosis.causes import causes_of, comb
-from fish_env.diagnosis.screening import screen
-from fish_env.diagnosis.starts import starts
 from fish_env.effects import catalogue
-from fish_env.identification import Problem, fit
+from fish_env.identification import SeriesProblem, fit
 from fish_env.identification.runs import FREQUENCY
-from fish_env.identification.sketch import Sketcher
+from fish_env.inference.estimate.coarse_fit import CoarseFitter
+from fish_env.inference.probes import causes_of, phase_grid
+from fish_env.inference.screening import screen
+from fish_env.inference.starts import starts
 from tests.identification.synthetic import Setup, simulate
 
 SCALE = "effects.frequency_scale.scale"
-DETUNING = sorted(name for name, effect in catalogue().items() if effect.detunes)
+DETUNING = sorted(name for name, effect in catalogue().items() if effect.drifts_in_phase)
 
 
 def out_of_step(scale):
@@ -32,13 +32,15 @@ def out_of_step(scale):
 @pytest.fixture(scope="module", params=[0.915, 0.96, 1.045, 1.08])
 def case(request):
     """The scale, and a baseline fitted without it."""
-    return request.param, fit(Problem(out_of_step(request.param)), refit_noise=False, iterations=2)
+    return request.param, fit(
+        SeriesProblem(out_of_step(request.param)), refit_noise=False, iterations=2
+    )
 
 
 def sketched(base):
     (cause,) = (c for c in causes_of(base.problem) if c.name == "frequency_scale")
     signal = screen(base, [cause], np.random.default_rng(0)).best()[0]
-    return Sketcher(base).sketch(("frequency_scale",), (), starts(base, signal))
+    return CoarseFitter(base).coarse_fit(("frequency_scale",), (), starts(base, signal))
 
 
 def test_a_tail_far_out_of_step_is_put_in_step(case):
@@ -48,15 +50,15 @@ def test_a_tail_far_out_of_step_is_put_in_step(case):
 
 def test_the_probes_alone_do_not_lead_there(case, monkeypatch):
     scale, base = case
-    monkeypatch.setattr("fish_env.diagnosis.starts.comb", lambda effect, beats: ())
+    monkeypatch.setattr(SeriesProblem, "starting_grid", lambda self, name: ())
     assert sketched(base).point.effects[SCALE] != pytest.approx(scale, abs=1e-2)
 
 
 @pytest.mark.parametrize("name", DETUNING)
-def test_the_comb_is_dense_and_lies_on_both_sides(name):
+def test_the_grid_is_dense_and_lies_on_both_sides(name):
     effect, length, frequency = catalogue()[name], 30.0, 2.0
     (size,) = effect.switching
-    values = [probe[size.name] for probe in comb(effect, frequency * length)]
+    values = [probe[size.name] for probe in phase_grid(effect, frequency * length)]
     beats = {"frequency_scale": length, "battery_sag": 0.5 * length**2}[name] * frequency
     assert np.diff(values).max() * beats < 0.35
     assert min(values) <= size.plausible[0] if size.neutral > 0.0 else min(values) < 0.0
@@ -64,13 +66,13 @@ def test_the_comb_is_dense_and_lies_on_both_sides(name):
     assert size.neutral not in values
 
 
-def test_only_what_detunes_gets_a_comb_and_no_run_is_too_long_for_one():
+def test_only_what_detunes_gets_a_grid_and_no_run_is_too_long_for_one():
     assert DETUNING == ["battery_sag", "frequency_scale"]
-    assert comb(catalogue()["servo_lag"], 60.0) == ()
-    assert len(comb(catalogue()["frequency_scale"], 1e5)) == 96
+    assert phase_grid(catalogue()["servo_lag"], 60.0) == ()
+    assert len(phase_grid(catalogue()["frequency_scale"], 1e5)) == 96
 
 
 def test_beats_are_counted_as_commanded():
-    (run,) = Problem(simulate(Setup(runs=1, duration=8.0))).runs
+    (run,) = SeriesProblem(simulate(Setup(runs=1, duration=8.0))).runs
     assert run.beats == pytest.approx(run.command_values[-8:, FREQUENCY].sum())
     assert run.until(4.0).beats == pytest.approx(run.command_values[-8:-4, FREQUENCY].sum())

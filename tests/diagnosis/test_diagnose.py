@@ -10,7 +10,8 @@ from fish_env.cli import main
 from fish_env.commands.diagnose import diagnose_dataset
 from fish_env.diagnosis import diagnose
 from fish_env.diagnosis.answer import FORMAT, words
-from fish_env.diagnosis.verdict import VERDICTS
+from fish_env.diagnosis.writing import write_answer
+from fish_env.inference.verdict import VERDICTS
 from fish_env.params import load_fish
 from fish_env.simulator import Simulator
 from tests.diagnosis.small_cases import small_case
@@ -72,8 +73,7 @@ def test_the_extended_model_swims(lagging):
 def test_nothing_is_found_where_nothing_is_hidden(tmp_path):
     small_case(tmp_path / "data", {}, runs=3, duration=8.0)
     out = tmp_path / "out"
-    out.mkdir()
-    (out / "extended.yaml").write_text("of an earlier diagnosis")
+    write_answer({}, load_fish("zheng-2021-a"), out)  # of an earlier diagnosis
     steps = []
     answer = diagnose(tmp_path / "data", out=out, quick=True, progress=steps.append)
     assert answer["verdict"] in ("no_misfit", "not_excited")
@@ -118,6 +118,7 @@ def test_every_verdict_has_words(verdict):
     assert 1 <= said.count(". ") + 1 <= 3
     mentioned = {
         "no_misfit": "wave", "not_excited": "wave", "parameters": "current", "cause": "90 %",
-        "ambiguous": "tether", "outside_library": "depth",
+        "ambiguous": "tether", "outside_library": "depth", "partial": "current",
+        "inputs": "With that put right",
     }  # fmt: skip
     assert mentioned[verdict] in said

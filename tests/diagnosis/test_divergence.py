@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fish_env.diagnosis import attribution, search
-from fish_env.diagnosis.explanation import Explanation, reached
-from fish_env.diagnosis.search import refits, without
+from fish_env.inference import attribution, search
+from fish_env.inference.explanation import Explanation, reached
+from fish_env.inference.search import refits, without
 
 
 def diverge(*arguments, **options):
@@ -33,17 +33,17 @@ def test_a_cause_without_which_the_simulation_diverges_is_not_dropped(monkeypatc
     monkeypatch.setattr(search, "fit", diverge)
     both = Explanation(("a", "b"), fake())
     assert without(both, "a") is None
-    assert attribution.pruned(both) is both
+    assert attribution.backward_elimination(both) is both
 
 
 def contest(monkeypatch, results, shown="abc"):
     """Three sketches, best first, and what becomes of each when it is fitted in full."""
     sketches = [(name, SimpleNamespace(objective=i, name=name)) for i, name in enumerate("abc")]
-    monkeypatch.setattr(search, "Sketcher", lambda base: SimpleNamespace(base=1000.0))
+    monkeypatch.setattr(search, "CoarseFitter", lambda base: SimpleNamespace(base=1000.0))
     monkeypatch.setattr(search, "starts", lambda *arguments: [])
     by_name = dict(sketches)
     monkeypatch.setattr(
-        search, "_sketches", lambda s, base, signal, *rest: [(signal, by_name[signal])]
+        search, "_coarse_fits", lambda s, base, signal, *rest: [(signal, by_name[signal])]
     )
     monkeypatch.setattr(search, "_in_full", lambda problem, s, noise: results[s.name])
     monkeypatch.setattr(

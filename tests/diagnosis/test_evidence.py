@@ -5,10 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fish_env.diagnosis.attribution import alike, ranking_of
-from fish_env.diagnosis.explanation import Explanation
-from fish_env.diagnosis.left_out import left_out_scores
-from fish_env.identification.free import REACH, Linearised
+from fish_env.inference.attribution import alike, ranking_of
+from fish_env.inference.estimate.free import Linearised
+from fish_env.inference.explanation import Explanation
+from fish_env.inference.left_out import left_out_scores
+from fish_env.inference.policy import POLICY
 from tests.diagnosis.linear import COEFFICIENTS, LinearProblem, Sized
 
 LINEAR = LinearProblem(signals=2)
@@ -38,7 +39,7 @@ def explanation(data, effects=(), released=()):
     fit = SimpleNamespace(
         effects=effects,
         released=released,
-        held=np.zeros((0, slopes.shape[1])),
+        active=np.zeros((0, slopes.shape[1])),
         objective=residuals @ residuals + prior @ best**2,
         point=SimpleNamespace(z=best[:COEFFICIENTS]),
         linearised=Linearised(
@@ -52,7 +53,7 @@ def explanation(data, effects=(), released=()):
 
 def exact(data, effects=(), released=()):
     """-2 log of the density of the data, everything unknown integrated out."""
-    widths = np.array([REACH if path in released else 1.0 for path in PATHS])
+    widths = np.array([POLICY.prior_reach_sd if path in released else 1.0 for path in PATHS])
     parts = [LINEAR.slopes * widths]
     parts += [COLUMNS[name] * RANGE / np.sqrt(12.0) for name in effects]
     factor = np.hstack(parts)

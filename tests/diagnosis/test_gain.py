@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from fish_env.data import CommandSteps, Dataset, Run
-from fish_env.diagnosis import open_loop
-from fish_env.diagnosis.gain import measure_gain, reachable_share
-from fish_env.identification import Problem
+from fish_env.diagnosis.gain import measure_gain
+from fish_env.identification import SeriesProblem, open_loop
 from fish_env.identification.filtering import NoiseModel
-from fish_env.identification.problem import Point
 from fish_env.identification.runs import RunData
+from fish_env.inference.gain import gap_closed, reachable_share
+from fish_env.inference.problem import Point
 from fish_env.params import load_fish
 from fish_env.simulator import Simulator
 from tests.identification.synthetic import ALL, FISH, Setup, simulate
@@ -88,7 +88,9 @@ def test_a_window_does_not_begin_with_a_soft_tail_unbent():
     shown = {name: np.asarray(swum[name]) for name in ALL}
     run = Run("r", swum.time_s, shown, CommandSteps(np.zeros(1), beat), "rest", 0.0)
     sd = dict.fromkeys(ALL, 1e-3)
-    problem = Problem(Dataset("soft", FISH, (run,), sd), paths=(), effects=["tail_flexibility"])
+    problem = SeriesProblem(
+        Dataset("soft", FISH, (run,), sd), paths=(), effects=["tail_flexibility"]
+    )
     truth = Point(np.zeros(0), {f"effects.tail_flexibility.{n}": v for n, v in soft.items()})
     noise = NoiseModel(np.full(len(problem.channels), 1e-3), 1e-4, 1e-6, 1.0)
 
@@ -108,12 +110,13 @@ def test_runs_of_unknown_phase_are_judged_in_step():
         Setup(runs=4, changes={path: fish.get(path) + 3.0 * fish.prior_sd(path)},
               phase=2.8, phase_known=False, channels=("x", "y", "z", "yaw"))
     )  # fmt: skip
-    problem = Problem(data, paths=(path,))
+    problem = SeriesProblem(data, paths=(path,))
     noise = Setup(channels=problem.channels).noise
     baseline, extended = (
         SimpleNamespace(point=Point(np.array([z]), {}), noise=noise) for z in (0.0, 3.0)
     )
-    found = measure_gain(problem, baseline, extended, np.random.default_rng(0))
+    gap = gap_closed(problem, baseline, extended, np.random.default_rng(0))
+    found = measure_gain(problem, baseline, extended, gap)
     assert all(pair.extended == pytest.approx(1.0, abs=0.15) for pair in found.misfit.values())
     assert found.share == pytest.approx(1.0, abs=0.2)
     out_of_step = problem.filtered(extended.point, noise)

@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fish_env.diagnosis.generic_forces import changes as pushed
-from fish_env.diagnosis.generic_forces import generic_forces
-from fish_env.diagnosis.screening import residual_changes
-from fish_env.identification import Problem, fit
-from fish_env.identification.problem import Point
-from fish_env.identification.sketch import Sketcher
+from fish_env.identification import SeriesProblem, fit
+from fish_env.identification.generic_forces import BoundForces, generic_forces
+from fish_env.inference.estimate.coarse_fit import CoarseFitter
+from fish_env.inference.problem import Point
+from fish_env.inference.screening import residual_changes
 from tests.identification.synthetic import PATHS, Setup, simulate
 
 QUICK_LAG = ("servo_lag", {"time_constant": 0.01})
@@ -20,7 +19,7 @@ SLOW_LAG = ("servo_lag", {"time_constant": 0.1})
 @pytest.fixture
 def fitted():
     setup = Setup(runs=1, duration=4.0)
-    problem = Problem(simulate(setup), paths=PATHS)
+    problem = SeriesProblem(simulate(setup), paths=PATHS)
     return fit(problem, iterations=1, refit_noise=False, noise=setup.noise)
 
 
@@ -67,16 +66,16 @@ def test_a_setting_that_long_steps_do_not_follow_takes_the_usual_ones(fitted):
 
 def test_only_what_jumps_is_sketched_in_the_usual_steps(fitted, monkeypatch):
     seen = []
-    settled = Sketcher._surveyed
+    settled = CoarseFitter._surveyed
 
     def surveyed(self, problem, free, vector):
         seen.append(problem.longest_step)
         return settled(self, problem, free, vector)
 
-    monkeypatch.setattr(Sketcher, "_surveyed", surveyed)
+    monkeypatch.setattr(CoarseFitter, "_surveyed", surveyed)
     for effect, value in (("servo_lag.time_constant", 0.05), ("servo_backlash.gap", 0.05)):
         start = Point(fitted.point.z, {f"effects.{effect}": value})
-        Sketcher(fitted).sketch((effect.split(".")[0],), (), [start])
+        CoarseFitter(fitted).coarse_fit((effect.split(".")[0],), (), [start])
     usual = fitted.problem.longest_step
     assert sorted(set(seen)) == pytest.approx([usual, 2.0 * usual])
     assert seen[0] == pytest.approx(2.0 * usual)
@@ -86,7 +85,7 @@ def test_only_what_jumps_is_sketched_in_the_usual_steps(fitted, monkeypatch):
 def limited():
     """A fit with a rate limit in it, and forces along it."""
     setup = Setup(runs=1, duration=4.0)
-    problem = Problem(simulate(setup), paths=PATHS)
+    problem = SeriesProblem(simulate(setup), paths=PATHS)
     limit = Point(np.zeros(len(problem.baseline)), {"effects.servo_rate_limit.rate": 2.5})
     held = {"refit_noise": False, "noise": setup.noise}
     own = fit(problem, ("servo_rate_limit",), limit, iterations=1, **held)
@@ -95,9 +94,9 @@ def limited():
 
 def test_a_push_does_the_same_in_long_steps_where_the_tails_rate_jumps(limited, monkeypatch):
     own, forces = limited
-    long = pushed(own, forces, forces.columns)
-    monkeypatch.setattr(Problem, "with_long_steps", lambda self: self)
-    usual = pushed(own, forces, forces.columns)
+    long = BoundForces(own, forces).changes(forces.columns)
+    monkeypatch.setattr(SeriesProblem, "with_long_steps", lambda self: self)
+    usual = BoundForces(own, forces).changes(forces.columns)
     assert not np.array_equal(long, usual)
     apart = np.linalg.norm(long - usual, axis=0) / np.linalg.norm(usual, axis=0)
     assert apart.max() < 0.05
@@ -106,5 +105,5 @@ def test_a_push_does_the_same_in_long_steps_where_the_tails_rate_jumps(limited, 
 
 def test_pushes_that_long_steps_do_not_follow_take_the_usual_ones(limited, monkeypatch):
     own, forces = limited
-    monkeypatch.setattr(Problem, "with_long_steps", lambda self: Diverging(self))
-    assert np.isfinite(pushed(own, forces, forces.columns[:6])).all()
+    monkeypatch.setattr(SeriesProblem, "with_long_steps", lambda self: Diverging(self))
+    assert np.isfinite(BoundForces(own, forces).changes(forces.columns[:6])).all()

@@ -8,7 +8,7 @@ import pytest
 from fish_env.diagnosis import next_experiment
 from fish_env.diagnosis.manoeuvres import DURATION_S, MENU, Manoeuvre
 from fish_env.diagnosis.next_experiment import unfollowed
-from fish_env.diagnosis.verdict import Verdict
+from fish_env.inference.verdict import Verdict
 
 LIMITS = {"tail_offset": 0.6, "tail_amplitude": 0.6, "tail_frequency": 2.6,
           "block_displacement": 0.01, "block_angle": 0.6}  # fmt: skip

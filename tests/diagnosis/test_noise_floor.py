@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from fish_env.data import CommandSteps, Dataset, Run
-from fish_env.diagnosis.noise_floor import (
+from fish_env.diagnosis.recorded import recorded
+from fish_env.rigidbody.noise_floor import (
     _contrasts,
     _correlation,
     _differences,
@@ -32,7 +33,7 @@ def dataset(seed=0, sd=0.01, beat=2.0, size=0.1, runs=4, seconds=20.0, rate=25.0
         values = {"yaw": motion + sd * rng.standard_normal(len(time))}
         about_run = {"start": "rest", "tail_phase": 0.0, "condition": about.get("condition")}
         made.append(Run.from_steps(f"r{number}", time, values, steps, **about_run))
-    return Dataset("made", "zheng-2021-a", tuple(made), about.get("noise", {}))
+    return recorded(Dataset("made", "zheng-2021-a", tuple(made), about.get("noise", {})))
 
 
 @pytest.mark.parametrize("rate", [15.0, 25.0, 60.0])

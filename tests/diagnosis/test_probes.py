@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from fish_env.diagnosis.causes import (
+from fish_env.effects import catalogue
+from fish_env.inference.probes import (
     Cause,
     combined,
     each_alone,
@@ -12,7 +13,6 @@ from fish_env.diagnosis.causes import (
     of_visible,
     probes_of,
 )
-from fish_env.effects import catalogue
 from fish_env.model.effect import Effect, EffectParameter
 
 EFFECTS = sorted(catalogue())

@@ -20,8 +20,9 @@ from fish_env.studies.real_fish import (
     second_half,
     summary,
 )
+from fish_env.studies.rollouts import PACE, WholeRuns
 from fish_env.studies.tracks import Track, Weights, integrated_ou, track_of, tracks_of
-from fish_env.studies.whole_runs import PACE, WholeRuns, fit_runs, predict
+from fish_env.studies.whole_runs import fit_runs, predict
 from tests.fixtures.measured_data import measured_runs
 
 IDENTIFIED = "msu-tail-fish-identified"

@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 
 from fish_env.diagnosis.answer import words
-from fish_env.diagnosis.effort import QUICK
 from fish_env.diagnosis.regimes import localise_fits
 from fish_env.diagnosis.report import series_from, write_report
 from fish_env.diagnosis.report.html import inline, text
-from fish_env.diagnosis.verdict import VERDICTS
-from fish_env.identification.estimator import fit
-from fish_env.identification.problem import Point, Problem
+from fish_env.identification.series import SeriesProblem
+from fish_env.inference.effort import QUICK
+from fish_env.inference.estimate.fit import fit
+from fish_env.inference.gain import ClosedGap
+from fish_env.inference.problem import Point
+from fish_env.inference.verdict import VERDICTS
 from tests.diagnosis.report_cases import answer, run_series, steady_series
 
 NETWORK = re.compile(r"""(src|href)=["'](?!data:|#)|@import|url\((?!['"]?(#|data:))""")
@@ -142,7 +144,7 @@ def test_series_are_predictions_of_the_two_models(tmp_path):
 
     truth = small_case(tmp_path / "data", {"servo_lag": 1.0}, runs=3, duration=7.0)
     dataset = load_dataset(tmp_path / "data")
-    baseline = fit(Problem(dataset, None, ("r01", "r02")), rounds=1, iterations=2)
+    baseline = fit(SeriesProblem(dataset, None, ("r01", "r02")), rounds=1, iterations=2)
     lag = {"effects.servo_lag.time_constant": truth.effects["servo_lag"]["time_constant"]}
     start = Point(np.zeros_like(baseline.point.z), lag)
     extended = fit(baseline.problem, ("servo_lag",), start, rounds=1, iterations=2)
@@ -157,7 +159,9 @@ def test_series_are_predictions_of_the_two_models(tmp_path):
         for name, predicted in (("before", judged.baseline), ("after", judged.extended))
     }
     assert error["after"] < 0.5 * error["before"]
-    measured_gain = measure_gain(Problem(dataset, None, ("r03",)), baseline, extended, rng)
+    gap = ClosedGap(None, None)
+    final = SeriesProblem(dataset, None, ("r03",))
+    measured_gain = measure_gain(final, baseline, extended, gap)
     assert judged.fit_percent["extended"] == pytest.approx(measured_gain.fit_percent.extended)
     assert judged.fit_percent["baseline"] == pytest.approx(measured_gain.fit_percent.baseline)
     assert [motion.role for motion in judged.motions] == ["measured", "baseline", "extended"]
@@ -171,16 +175,16 @@ def test_series_are_predictions_of_the_two_models(tmp_path):
 def test_series_of_a_table_hold_its_repeats_together():
     from fish_env.data import load_dataset
     from fish_env.diagnosis.report.steady import steady_series_from
-    from fish_env.diagnosis.steady.fitting import fit as fit_table
-    from fish_env.diagnosis.steady.problem import SteadyProblem
-    from fish_env.diagnosis.steady.table import table_of
+    from fish_env.identification.tables.problem import TableProblem
+    from fish_env.identification.tables.table import table_of
+    from fish_env.inference.estimate.fit import fit
     from fish_env.params import load_fish
 
     dataset = load_dataset("msu-steady")
     table = table_of(dataset)
-    few = SteadyProblem(table, load_fish(dataset.fish), ("mass.total",)).on(np.arange(3))
-    baseline = fit_table(few)
-    series = steady_series_from(dataset, baseline, baseline, table.conditions[-2:])
+    few = TableProblem(table, load_fish(dataset.fish), ("mass.total",)).on(np.arange(3))
+    baseline = fit(few)
+    series = steady_series_from(dataset, few, baseline, baseline, table.conditions[-2:])
     assert series.conditions == table.conditions
     assert series.left_out.sum() == 2
     assert series.extended == {}
@@ -188,5 +192,6 @@ def test_series_of_a_table_hold_its_repeats_together():
     speed = series.measured["surge_speed"][0]
     assert speed == pytest.approx(np.nanmean(dataset.observations["surge_speed"][rows]))
     assert series.baseline["surge_speed"][:3] == pytest.approx(
-        baseline.means[:, table.observations.index("surge_speed")], rel=1e-3
+        few.means(few.orbits(baseline.point))[0][:, table.observations.index("surge_speed")],
+        rel=1e-3,
     )

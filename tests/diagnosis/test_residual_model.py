@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from fish_env.data import load_dataset
-from fish_env.diagnosis.adequacy import adequacy
 from fish_env.diagnosis.answer import words
-from fish_env.diagnosis.gain import by_window
-from fish_env.diagnosis.generic_forces import changes, generic_forces
 from fish_env.diagnosis.pipeline import fitted_and_final
 from fish_env.diagnosis.report.remainder import residual_model as shown
 from fish_env.diagnosis.residual_model import log_likelihoods, residual_model
-from fish_env.identification import Problem, fit
+from fish_env.identification import SeriesProblem, fit
+from fish_env.identification.generic_forces import BoundForces, generic_forces
+from fish_env.inference.adequacy import adequacy
+from fish_env.inference.gain import by_window
 from tests.diagnosis.report_cases import RESIDUAL, answer
 from tests.hidden.cases import make_case
 from tests.identification.synthetic import PATHS, Setup, simulate
@@ -27,8 +27,8 @@ def fits(tier, number, folder):
     truth = make_case(tier, number, folder)
     dataset = load_dataset(folder)
     fitted, final = fitted_and_final(dataset, 0)
-    own = fit(Problem(dataset, None, fitted), rounds=2)
-    return own, Problem(dataset, None, final), truth
+    own = fit(SeriesProblem(dataset, None, fitted), rounds=2)
+    return own, SeriesProblem(dataset, None, final), truth
 
 
 @pytest.fixture(scope="module")
@@ -96,31 +96,30 @@ def test_runs_kept_for_judging_refute_chance_and_nothing_else(swirled, tmp_path)
 def just_asked(left):
     """A test with the threshold a little above what is asked for most, and nothing strained."""
     asked = left.misfits[0].log_p
-    lax = replace(left, reached=False, threshold=asked + 0.1, strained=())
+    lax = replace(left, reached=False, threshold=asked + 0.1, implausible=())
     assert lax.slight
     return lax
 
 
 def test_scores_of_samples_add_up_to_the_likelihood_of_the_run():
     setup = Setup(runs=1)
-    problem = Problem(simulate(setup), paths=PATHS)
+    problem = SeriesProblem(simulate(setup), paths=PATHS)
     measured = problem.runs[0].measured.copy()
     measured[40:60, 2] = np.nan
     problem = problem.with_runs([replace(problem.runs[0], measured=measured)])
     result = problem.filtered(problem.start, setup.noise)
-    scores = [log_likelihoods(own) for own in result]
-    total = np.concatenate(by_window(problem.runs, scores, np.nansum)).sum()
+    total = np.concatenate(by_window(problem, log_likelihoods(problem, result), np.nansum)).sum()
     assert total == pytest.approx(result[0].log_likelihood, rel=1e-9)
 
 
 def test_a_known_wrench_does_what_the_same_push_does():
     """In the filter, in the lanes with its gains, and as a probe of a generic force."""
     setup = Setup(runs=2)
-    problem = Problem(simulate(setup), paths=PATHS)
+    problem = SeriesProblem(simulate(setup), paths=PATHS)
     own = fit(problem, iterations=1, refit_noise=False, noise=setup.noise)
     forces = generic_forces(problem.runs, own.filtered)
     [column] = [c for c in forces.columns if forces.words(c) == ("u|u|", "yaw")]
-    push = changes(own, forces, np.array([column]))[:, 0]
+    push = BoundForces(own, forces).changes(np.array([column]))[:, 0]
     wrenches = [np.zeros((len(basis), 6)) for basis in forces.bases]
     for wrench, basis in zip(wrenches, forces.bases, strict=True):
         wrench[:, 5] = 1e-5 * basis[:, column // 6]
@@ -139,7 +138,7 @@ def test_a_known_wrench_does_what_the_same_push_does():
 
 
 def test_the_beginning_of_a_run_keeps_its_wrench():
-    run = Problem(simulate(Setup(runs=1)), paths=PATHS).runs[0]
+    run = SeriesProblem(simulate(Setup(runs=1)), paths=PATHS).runs[0]
     known = np.random.default_rng(0).standard_normal((len(run.clock), 6))
     cut = replace(run, wrench=known).until(2.0)
     assert np.array_equal(cut.known_wrench, known[: len(cut.clock)])

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from fish_env.diagnosis.causes import Cause, best_of_each, causes_of, coefficient_sizes
-from fish_env.diagnosis.projection import Projector, Signal
-from fish_env.diagnosis.screening import confusability, null_threshold, screen, smallest_detectable
-from fish_env.identification import Problem, fit
+from fish_env.identification import SeriesProblem, fit
+from fish_env.inference.probes import Cause, best_of_each, causes_of, coefficient_sizes
+from fish_env.inference.projection import Projector, Signal
+from fish_env.inference.screening import confusability, null_threshold, screen, smallest_detectable
 from fish_env.params import load_fish
 from tests.diagnosis.linear import COEFFICIENTS, LinearProblem
 from tests.identification.synthetic import FISH, PATHS, Setup, simulate
@@ -30,7 +30,7 @@ def alarms(problem, threshold, repeats=400, corrected=True, **data):
         tested = signals(problem.fit(rng, **data), problem)
         if not corrected:
             for s in tested:
-                object.__setattr__(s, "inflation", 1.0)
+                object.__setattr__(s, "variance_inflation", 1.0)
         found += min(s.log_p for s in tested) < threshold
     return found / repeats
 
@@ -83,16 +83,16 @@ def test_what_a_bound_holds_back_hides_no_cause():
     data = np.random.default_rng(3)
     fit = PROBLEM.fit(data, added=6.0 * column[:, 0], reach=2.0)
     assert fit.point.z[1] == pytest.approx(-2.0)
-    np.testing.assert_array_equal(fit.held, np.eye(COEFFICIENTS)[[1]])
+    np.testing.assert_array_equal(fit.active, np.eye(COEFFICIENTS)[[1]])
     signal = Projector(fit).signal(PROBLEM.causes[0], 0, column)
     # Without the coefficient that is held, the cause in its place.
     free = np.column_stack([np.delete(PROBLEM.slopes, 1, axis=1), column])
     prior = np.diag(np.r_[np.ones(COEFFICIENTS - 1), 0.0])
     pull = free.T @ fit.linearised.residuals + prior @ np.r_[np.delete(fit.point.z, 1), 0.0]
     gain = pull @ np.linalg.solve(free.T @ free + prior, pull)
-    assert signal.unwidened == pytest.approx(gain, rel=1e-5)
-    fit.held = fit.held[:0]
-    assert Projector(fit).signal(PROBLEM.causes[0], 0, column).unwidened < 0.01 * gain
+    assert signal.uncorrected == pytest.approx(gain, rel=1e-5)
+    fit.active = fit.active[:0]
+    assert Projector(fit).signal(PROBLEM.causes[0], 0, column).uncorrected < 0.01 * gain
 
 
 def test_a_coefficient_at_its_bound_counts_with_where_it_would_go():
@@ -101,8 +101,8 @@ def test_a_coefficient_at_its_bound_counts_with_where_it_would_go():
     bounded = PROBLEM.fit(rng, added=added, reach=2.0)
     unbounded = PROBLEM.fit(np.random.default_rng(3), added=added)
     for i in range(COEFFICIENTS):
-        at, variance = Projector(bounded).let_go(i)
-        free_at, free_variance = Projector(unbounded).let_go(i)
+        at, variance = Projector(bounded).without_own_bound(i)
+        free_at, free_variance = Projector(unbounded).without_own_bound(i)
         if i == 1:
             assert (at, variance) == pytest.approx((free_at, free_variance))
         else:
@@ -116,7 +116,7 @@ def test_p_values_are_uniform_where_nothing_is_wrong(settings):
     rng, values = np.random.default_rng(2), []
     for _ in range(500):
         signal = signals(problem.fit(rng), problem)[0]
-        object.__setattr__(signal, "inflation", 1.0)
+        object.__setattr__(signal, "variance_inflation", 1.0)
         values.append(np.exp(signal.log_p))
     assert kstest(values, "uniform").pvalue > 0.01
     assert kstest(np.array(values) ** 1.5, "uniform").pvalue < 0.01
@@ -153,7 +153,7 @@ def test_the_smallest_detectable_size_is_found_four_times_in_five():
     threshold = threshold_of(problem)
     rng = np.random.default_rng(3)
     first = signals(problem.fit(rng), problem)[0]
-    object.__setattr__(first, "inflation", 1.0)
+    object.__setattr__(first, "variance_inflation", 1.0)
     size = smallest_detectable(first, 0, threshold)
     shift = -size * problem.columns[0][:, 0]
     power = alarms(problem, threshold, 400, corrected=False, added=shift)
@@ -209,13 +209,13 @@ def test_a_cause_like_a_coefficient_is_found_where_that_has_gone_as_far_as_it_ma
     path = "inertia.rest[2]"
     far = fish.get(path) + 9.0 * fish.prior_sd(path)
     data = simulate(Setup(seed=4, runs=3, duration=10.0, changes={path: far}))
-    problem = Problem(data, paths=PATHS)
+    problem = SeriesProblem(data, paths=PATHS)
     refitted = fit(problem, rounds=1)
     assert path in refitted.at_bounds
     causes = [cause for cause in causes_of(problem) if cause.name == "added_mass"]
     found, hidden = (
         screen(baseline, causes, np.random.default_rng(0)).best()[0]
-        for baseline in (refitted, replace(refitted, held=refitted.held[:0]))
+        for baseline in (refitted, replace(refitted, active=refitted.active[:0]))
     )
     assert found.statistic > 100.0
     assert hidden.statistic < 0.25 * found.statistic

@@ -12,8 +12,7 @@ import pytest
 
 from fish_env.data import load_dataset
 from fish_env.effects.extended import PREFIX
-from fish_env.identification.estimator import default_noise
-from fish_env.identification.problem import Problem
+from fish_env.identification.series import SeriesProblem
 from fish_env.params import load_fish
 from tests.hidden.designs import swim_design
 from tests.hidden.plans import PLANS
@@ -38,7 +37,7 @@ def swum(tmp_path_factory):
         truth = swim_design(0, 0, folder, {name: values_of(name)} if name else {}, plan=PLAN)
         nominal = load_fish(truth.fish)
         known = {path: v for path, v in truth.coefficients.items() if nominal.prior_sd(path) > 0.0}
-        return Problem(load_dataset(folder), nominal.replace(known))
+        return SeriesProblem(load_dataset(folder), nominal.replace(known))
 
     return problem
 
@@ -46,7 +45,7 @@ def swum(tmp_path_factory):
 @pytest.fixture(scope="module")
 def still(swum):
     problem = swum("")
-    noise = default_noise(problem)
+    noise = problem.default_noise()
     return problem, noise, problem.filtered(problem.start, noise)
 
 

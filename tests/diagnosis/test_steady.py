@@ -8,16 +8,17 @@ import pytest
 
 from fish_env.data import SteadyDataset, load_dataset
 from fish_env.diagnosis import diagnose
-from fish_env.diagnosis.steady.adequacy import lack_of_fit
-from fish_env.diagnosis.steady.fitting import fit, with_scatter
-from fish_env.diagnosis.steady.orbit import dies_out
-from fish_env.diagnosis.steady.problem import SteadyProblem
-from fish_env.diagnosis.steady.scatter import linear_changes, scatter_of
-from fish_env.diagnosis.steady.screening import Signal, needs_place_or_time, null_threshold
-from fish_env.diagnosis.steady.table import table_of
+from fish_env.diagnosis.tables.pipeline import diagnose_steady, refitted, untold
 from fish_env.effects.extended import build_model
 from fish_env.errors import DatasetError
-from fish_env.identification.problem import Point
+from fish_env.identification.tables.orbit import dies_out
+from fish_env.identification.tables.problem import TableProblem
+from fish_env.identification.tables.table import table_of
+from fish_env.inference.adequacy import adequacy
+from fish_env.inference.estimate.fit import fit
+from fish_env.inference.problem import Point
+from fish_env.inference.projection import Signal
+from fish_env.inference.screening import null_threshold
 from fish_env.params import load_fish
 from fish_env.steady import steady_motion
 from tests.hidden.cases import make_case
@@ -52,33 +53,35 @@ def table(effects=None, values=None, repeats=2, seed=0):
 @cache
 def honest():
     """A table without any effect, as a problem."""
-    return SteadyProblem(table_of(table()), load_fish("zheng-2021-a"))
+    return TableProblem(table_of(table()), load_fish("zheng-2021-a"))
 
 
 @cache
 def fitted():
-    return fit(honest())
+    return refitted(honest())
 
 
 def test_orbits_are_the_motion_that_waiting_leads_to():
     problem = honest()
-    orbits = problem.orbits([problem.start])
+    orbits = problem.orbits(problem.start)
     assert orbits.found.all()
     waited = steady_motion(problem.fish, problem.table.commands, tolerance=1e-5)
     for name, found in zip(NAMES, problem.means(orbits)[0].T, strict=True):
         np.testing.assert_allclose(found, waited[name], atol=2e-5)
     straight = waited["turn_radius"] > 1e3
     curvature = np.where(straight, 0.0, 1.0 / waited["turn_radius"])
-    np.testing.assert_allclose(orbits.means["curvature"], curvature, atol=1e-3)
+    told = replace(problem.table, observations=("curvature",))
+    found = problem.with_table(told).means(orbits)[0, :, 0]
+    np.testing.assert_allclose(found, curvature, atol=1e-3)
 
 
 def test_an_effect_that_slows_the_tail_is_the_slower_command():
     problem = honest()
-    slowed = problem.orbits([Point(problem.start.z, {"effects.frequency_scale.scale": 0.9})])
+    slowed = problem.orbits(Point(problem.start.z, {"effects.frequency_scale.scale": 0.9}))
     commands = problem.table.commands.copy()
     commands[:, 2] *= 0.9
     told = problem.with_table(replace(problem.table, commands=commands))
-    expected = told.means(told.orbits([told.start]))
+    expected = told.means(told.orbits(told.start))
     np.testing.assert_allclose(problem.means(slowed), expected, atol=2e-5)
 
 
@@ -90,72 +93,95 @@ def test_measurement_effects_are_those_of_the_simulator():
         {f"effects.{e}.{p}": v for e, own in effects.items() for p, v in own.items()}
         | {"effects.attitude_misalignment.roll": 0.0, "effects.attitude_misalignment.pitch": 0.0},
     )
-    found = problem.means(problem.orbits([point]))[0]
+    found = problem.means(problem.orbits(point))[0]
     waited = steady_motion(build_model(problem.fish, effects), problem.table.commands)
     for name, values in zip(NAMES, found.T, strict=True):
         np.testing.assert_allclose(values, waited[name], atol=5e-5)
 
 
-def test_linear_changes_are_those_of_full_orbits():
+def test_a_batch_is_what_each_point_is_alone():
+    problem, noise = honest(), honest().default_noise()
+    z = np.column_stack([problem.start.z, 0.1 * np.eye(len(problem.baseline))[:, :6]])
+    effects = {"effects.tail_gain.gain": np.r_[np.ones(6), 0.9]}
+    together = problem.innovations(z, effects, noise, problem.filtered(problem.start, noise))
+    for i, row in enumerate(together):
+        point = Point(z[:, i], {path: float(own[i]) for path, own in effects.items()})
+        alone = np.concatenate([s.residuals for s in problem.filtered(point, noise)])
+        np.testing.assert_allclose(row, alone, atol=5e-3)
+    assert np.abs(together[1:] - together[0]).max() > 0.1
+
+
+def test_what_is_not_steady_is_told_and_has_no_likelihood():
     problem = honest()
-    base = problem.orbits([problem.start])
-    nudged = [Point(0.1 * np.eye(len(problem.baseline))[i], {}) for i in range(12)]
-    linear = linear_changes(problem, problem.start, base, nudged)
-    full = problem.means(problem.orbits(nudged, base)) - problem.means(base)
-    np.testing.assert_allclose(linear, full, atol=0.05 * np.abs(full).max(axis=(1, 2)).max())
+    noise = problem.default_noise()
+    lost = Point(problem.start.z, {"effects.frequency_scale.scale": 0.05})
+    near = problem.filtered(problem.start, noise)
+    found = problem.filtered(lost, noise, near)
+    assert not np.isfinite(sum(s.log_likelihood for s in found))
+    effects = {path: np.array([value]) for path, value in lost.effects.items()}
+    assert not np.isfinite(problem.innovations(lost.z[:, None], effects, noise, near)).all()
 
 
 def test_an_orbit_that_grows_is_not_steady():
-    slopes = np.stack([0.9 * np.eye(8), np.diag([1.2, *[0.5] * 7]), np.full((8, 8), np.nan)])
+    map_of = [0.9 * np.eye(8), np.diag([1.2, *[0.5] * 7]), np.full((8, 8), np.nan)]
+    slopes = np.stack([np.vstack([own, np.full((7, 8), 3.0)]) for own in map_of])
     assert dies_out(slopes).tolist() == [True, False, False]
 
 
-def test_effects_of_place_heading_and_time_are_found_out():
-    names = ["current", "wave", "water_ingress", "surface_drag", "servo_lag", "linear_drag"]
-    assert needs_place_or_time(fitted(), names) == set(names[:4])
+def test_effects_that_averages_tell_nothing_of_are_found_out():
+    absent = untold(honest(), fitted())
+    assert absent > {"current", "wave", "water_ingress", "surface_drag", "tether"}
+    assert absent > {"servo_delay", "sensor_delay", "gyro_bias"}
+    assert not absent & {"servo_lag", "linear_drag", "tail_bias", "position_scale"}
 
 
 def test_the_noise_is_found():
-    found = fitted().scatter
+    found = fitted().noise
     assert found.sd.mean(axis=0) == pytest.approx(SD, rel=0.5)
     assert not found.assumed
 
 
-def test_residuals_reach_the_floor_and_a_broken_model_does_not():
-    good, p_value = lack_of_fit(fitted())
-    assert good < 2.0
-    assert p_value > 0.005
-    problem = SteadyProblem(table_of(table({"tail_bias": {"offset": 0.15}})), honest().fish)
-    broken = fit(problem)
-    assert lack_of_fit(broken)[1] < 1e-6
+def test_the_fit_reaches_the_floor_and_a_broken_model_does_not():
+    left = adequacy(fitted(), np.random.default_rng(0))
+    assert left.reached
+    assert left.lack.ratio < 2.0
+    problem = TableProblem(table_of(table({"tail_bias": {"offset": 0.15}})), honest().fish)
+    broken = adequacy(refitted(problem), np.random.default_rng(0))
+    assert not broken.reached
+    assert broken.lack.p_value < 1e-6
 
 
-def test_noise_judges_but_does_not_move_estimates():
-    known = fitted()
-    doubled = scatter_of(
-        2.0 * known.scatter.sensor_sd,
-        4.0 * known.scatter.force,
-        4.0 * known.scatter.moment,
-        np.zeros((2, *known.scatter.sd.shape)),
-        False,
-    )
-    judged = with_scatter(known, replace(doubled, sd=2.0 * known.scatter.sd))
-    np.testing.assert_array_equal(judged.estimates, known.estimates)
-    count = int(known.problem.table.present.sum())
-    np.testing.assert_allclose(judged.residuals[:count], known.residuals[:count] / 2.0)
+def test_where_repeats_are_few_nothing_is_said_of_the_fit():
+    problem = TableProblem(table_of(table(repeats=1)), honest().fish)
+    assert problem.lack_of_fit(fit(problem, rounds=1)) is None
 
 
-def test_the_threshold_holds_for_the_largest_of_many():
+def test_a_held_wrench_is_what_an_added_force_does():
+    """The generic term of a constant yaw moment, against a fish with that moment."""
+    own = fitted()
+    terms = own.problem.generic_terms(own)
+    words = [terms.words(column) for column in terms.columns.tolist()]
+    column = words.index(("constant", "yaw"))
+    size = terms.unit(column)
+    point = Point(own.point.z, {"effects.applied_wrench.mz": size})
+    pushed = own.problem.filtered(point, own.noise, own.filtered)
+    change = np.concatenate([s.residuals for s in pushed]) - own.linearised.residuals
+    found = terms.changes(np.array([column]))[:, 0]
+    np.testing.assert_allclose(found, change, atol=0.05 * np.abs(change).max())
+
+
+def test_the_threshold_holds_for_the_largest_of_many_under_a_noise_that_is_estimated():
     rng = np.random.default_rng(1)
     left = np.linalg.qr(rng.standard_normal((60, 20)))[0]
-    signals = [Signal(None, 0, left[:, [i]], 1.0, np.eye(1), np.zeros(1), False) for i in range(20)]
-    threshold = null_threshold(signals, 40, rng, 0.05)
+    signals = [Signal(None, 0, left[:, [i]], 1.0, np.eye(1), np.zeros(1), 1.0) for i in range(20)]
+    threshold = null_threshold(signals, rng, 0.05, freedom=40.0)
     draws = rng.standard_normal((2000, 60)) @ left
     size = rng.chisquare(40, 2000) / 40
     from scipy.stats import chi2
 
     smallest = chi2.logsf(draws**2 / size[:, None], 1).min(axis=1)
     assert np.mean(smallest < threshold) == pytest.approx(0.05, abs=0.025)
+    assert threshold < null_threshold(signals, rng, 0.05)
 
 
 def test_repeats_are_found_with_and_without_names():
@@ -182,8 +208,6 @@ def test_too_few_conditions_are_refused():
         "few", dataset.fish, dataset.ids[:4], dataset.conditions[:4], dataset.commands[:4],
         {name: values[:4] for name, values in dataset.observations.items()},
     )  # fmt: skip
-    from fish_env.diagnosis.steady.pipeline import diagnose_steady
-
     with pytest.raises(DatasetError, match="measure at least"):
         diagnose_steady(few)
 
@@ -221,3 +245,18 @@ def test_the_packaged_table_names_no_cause():
     assert answer["floor"]["ratio"] > 2.0
     assert answer["unexplained"]
     assert isinstance(load_dataset("msu-steady"), SteadyDataset)
+
+
+@pytest.mark.parametrize("frequency", [0.0, 1.0])
+def test_a_table_whose_tail_never_beats_is_answered(frequency):
+    """It says nothing of the tail, so the next condition lets it beat."""
+    commands = np.array([(o, 0.0, frequency, 0.0, 0.0) for o in (-0.3, 0.0, 0.3) for _ in range(3)])
+    rng = np.random.default_rng(0)
+    observed = {name: 1e-3 * rng.standard_normal(len(commands)) for name in NAMES[:3]}
+    ids = tuple(f"s{i}" for i in range(len(commands)))
+    still = SteadyDataset("still", "zheng-2021-a", ids, (None,) * len(ids), commands, observed)
+    answer = diagnose_steady(still, quick=True)
+    assert answer["verdict"] == "not_excited"
+    row = answer["next_experiment"]["schedule"][0]
+    assert row["tail_amplitude"] > 0.0
+    assert row["tail_frequency"] > 0.0

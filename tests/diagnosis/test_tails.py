@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, ncx2
 
-from fish_env.diagnosis.tails import chi2_log_tail, noncentrality
+from fish_env.inference.tails import chi2_log_tail, noncentrality
 
 
 @pytest.mark.parametrize("freedom", [1, 2, 3, 8])

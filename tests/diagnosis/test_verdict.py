@@ -1,10 +1,10 @@
-"""The six verdicts, and that adequacy comes before a name."""
+"""The verdicts of an attribution, and that adequacy comes before a name."""
 
 from types import SimpleNamespace
 
 import pytest
 
-from fish_env.diagnosis.verdict import VERDICTS, decide
+from fish_env.inference.verdict import VERDICTS, decide
 
 
 def attribution(causes=(), rivals=()):
@@ -31,11 +31,12 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("name", VERDICTS)
+@pytest.mark.parametrize("name", CASES)
 def test_each_verdict(name):
     causes, rivals, reached, preconditions = CASES[name]
     verdict = decide(attribution(causes, rivals), SimpleNamespace(reached=reached), preconditions)
     assert verdict.name == name
+    assert name in VERDICTS
     assert verdict.causes == (() if name == "outside_library" else causes)
     assert verdict.alternatives == rivals
 

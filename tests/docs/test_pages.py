@@ -20,7 +20,7 @@ from scripts import (
 from tests.docs.pages import PAGES, ROOT
 
 REMEDY = "run `make docs`"
-EXAMPLES = ("examples/my-fish.yaml", "examples/cable_drag.py")
+EXAMPLES = ("examples/my-fish.yaml", "examples/cable_drag.py", "examples/rover.py")
 
 
 GENERATED = [make_benchmarks_page, make_effects_page, make_environment_page]

@@ -86,9 +86,12 @@ def plane_force(flow, normal, fish, c0, c2, c1, k, drag_factor):
 
 
 @helper
-def hull_force(velocity, depth, fish, e):
-    """Force and moment of both planes, V the velocity through the water."""
-    factor = 1.0
+def hull_force(velocity, depth, more, fish, e):
+    """Force and moment of both planes, V the velocity through the water.
+
+    `more` is the share of drag that walls add.
+    """
+    factor = 1.0 + more
     if e.surface_drag_gain != 0.0:
         factor += e.surface_drag_gain * math.exp(-depth / e.surface_drag_depth)
     vertical, pitching = plane_force(
@@ -136,7 +139,7 @@ def extra_drag(velocity, offset, e):
 
 
 @helper
-def weight(down, depth, t, centre, fish, e):
+def weight(down, depth, t, mass, centre, fish, e):
     """Force and moment of gravity and buoyancy; `down` is g in the body frame."""
     displaced = (
         fish.buoyancy
@@ -147,5 +150,5 @@ def weight(down, depth, t, centre, fish, e):
     if e.thermocline_mass != 0.0:
         below = math.tanh((depth - e.thermocline_depth) / e.thermocline_width)
         displaced += e.thermocline_mass * below
-    heavy = scale(fish.mass, down)
+    heavy = scale(mass, down)
     return add(heavy, scale(-displaced, down)), cross(centre, heavy)

@@ -31,7 +31,7 @@ def cache_folder() -> Path:
     try:
         root.mkdir(parents=True, exist_ok=True)
     except OSError:
-        root = Path(tempfile.gettempdir()) / "robofish"
+        root = Path(tempfile.mkdtemp(prefix="robofish-"))  # of this user alone
     return root / f"hidden-{source_hash()}"
 
 

@@ -3,7 +3,9 @@
 State: 0-2 position, 3-11 rotation matrix body to inertial by rows, 12-14 velocity and 15-17
 angular velocity in the body frame, 18 lagged tail, 19-20 flexible tail, 21 lagged block,
 22-24 remembered tail force, 25-26 sloshing water, 27-32 remembered wrench of the hull,
-33-36 displacement and angle of the block that reacts, each with its rate.
+33-36 displacement and angle of the block that reacts, each with its rate, 37-38 bending of the
+body before the tail, 39-42 joints of a tail of three links and their rates, 43-44 wake oscillator,
+45 side of the wake.
 """
 
 from __future__ import annotations
@@ -22,11 +24,27 @@ from tests.hidden.hull import (
     weight,
 )
 from tests.hidden.jit import helper
-from tests.hidden.servo import AMPLITUDE, FREQUENCY, OFFSET, TWO_PI, block_motion, tail_motion
+from tests.hidden.plants import foreign_plants, linked_tail
+from tests.hidden.servo import (
+    AMPLITUDE,
+    FREQUENCY,
+    HINGE,
+    OFFSET,
+    TWO_PI,
+    block_motion,
+    tail_motion,
+)
+from tests.hidden.surroundings import (
+    bend_body,
+    drag_near_walls,
+    flooded,
+    orbital_wave,
+    surroundings,
+)
 from tests.hidden.tail import centre_of_pressure, reactive, steady_tail_force
 from tests.hidden.vectors import add, cross, scale, solve6, to_body, to_inertial
 
-STATES = 37
+STATES = 46
 DRIVE_TIME = 0.02
 """s. How fast the block follows where nothing slower holds it back."""
 
@@ -56,7 +74,10 @@ def water_flow(t, y, rise, e):
         scale(shear * (z - e.shear_current_depth), along),
     )
     wave_rate = height * (turn * math.cos(angle) - e.wave_decay * rise * math.sin(angle))
-    return flow, add((0.0, 0.0, wave_rate), scale(shear * rise, along))
+    rate = add((0.0, 0.0, wave_rate), scale(shear * rise, along))
+    if e.orbital_wave_amplitude != 0.0:
+        return orbital_wave(t, y, flow, rate, e)
+    return flow, rate
 
 
 @helper
@@ -123,13 +144,18 @@ def remembered(y, dy, first, now, time_constant):
 
 
 @helper
-def water_wrench(t, y, dy, velocity, spin, angle, rate, row, fish, e, table, wrench):
+def water_wrench(y, dy, velocity, spin, angle, rate, row, fish, e, table, drive, wrench):
     """Adds all quasi-steady forces of the water."""
     tail = steady_tail_force(velocity, spin, angle, rate, fish, e)
+    arm, place = centre_of_pressure(angle, fish)
+    drive[HINGE] = arm[0] * tail[1] - arm[1] * tail[0]
+    bend_body(y, dy, drive[HINGE], e)
+    if e.linked_tail_share != 0.0:
+        linked_tail(y, dy, velocity, spin, angle, rate, tail, place, fish, e, wrench)
     if e.wake_memory_time_constant > 0.0:
         tail = remembered(y, dy, 22, tail, e.wake_memory_time_constant)
-    put(wrench, tail, cross(centre_of_pressure(angle, fish)[1], tail))
-    force, moment = hull_force(velocity, y[2], fish, e)
+    put(wrench, tail, cross(place, tail))
+    force, moment = hull_force(velocity, y[2], drag_near_walls(y, e), fish, e)
     if e.hull_memory_time_constant > 0.0:
         force = remembered(y, dy, 27, force, e.hull_memory_time_constant)
         moment = remembered(y, dy, 30, moment, e.hull_memory_time_constant)
@@ -144,22 +170,28 @@ def derivative(t, y, dy, row, late, fish, e, table, push, drive, matrix, wrench)
     spin = (y[15], y[16], y[17])
     path = to_inertial(y, ground)
     angle, rate, bend = tail_motion(t, y, dy, late, e, table, drive)
+    angle, rate = angle + y[37], rate + y[38]
     shift, shift_rate, turn = block_motion(y, dy, row, e, table, drive)
     place = block_place(shift, turn, fish)
     centre = centre_of_mass(place, fish, e)
     inertia = inertia_about_origin(place, fish)
+    mass = fish.mass
+    if e.flooding_rate != 0.0:
+        mass, centre, inertia = flooded(t, mass, centre, inertia, e)
     flow, flow_rate = water_flow(t, y, path[2], e)
     stream = to_body(y, flow)
     velocity = add(ground, scale(-1.0, stream))
     # d(V_rel)/dt - dV/dt: the flow seen from the turning body, and its own change.
     drift = add(cross(spin, stream), scale(-1.0, to_body(y, flow_rate)))
 
-    rigid_matrix(centre, inertia, fish.mass, matrix)
+    rigid_matrix(centre, inertia, mass, matrix)
     wrench[:] = 0.0
-    water_wrench(t, y, dy, velocity, spin, angle, rate, row, fish, e, table, wrench)
+    water_wrench(y, dy, velocity, spin, angle, rate, row, fish, e, table, drive, wrench)
     down = to_body(y, (0.0, 0.0, fish.gravity))
-    force, moment = weight(down, y[2], t, centre, fish, e)
+    force, moment = weight(down, y[2], t, mass, centre, fish, e)
     put(wrench, force, moment)
+    surroundings(y, down, to_body(y, flow_rate), fish, e, wrench)
+    foreign_plants(y, dy, velocity, spin, fish, e, wrench)
     disturbance(t, y, e, push, wrench)
     k = -e.tether_stiffness
     pull = (k * (y[0] - e.tether_x), k * (y[1] - e.tether_y), k * (y[2] - e.tether_z))
@@ -173,10 +205,9 @@ def derivative(t, y, dy, row, late, fish, e, table, push, drive, matrix, wrench)
     slosh(y, dy, ground, spin, down, e, matrix, wrench)
 
     drive_out = (inertia[0] * spin[0], inertia[1] * spin[1], inertia[2] * spin[2])
-    m = fish.mass
     carried = cross(spin, add(ground, cross(spin, centre)))
-    turned = add(cross(spin, drive_out), scale(m, cross(centre, cross(spin, ground))))
-    put(wrench, scale(-m, carried), scale(-1.0, turned))
+    turned = add(cross(spin, drive_out), scale(mass, cross(centre, cross(spin, ground))))
+    put(wrench, scale(-mass, carried), scale(-1.0, turned))
     solve6(matrix, wrench)
 
     for i in range(3):

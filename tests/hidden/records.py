@@ -101,13 +101,38 @@ FOREIGN: dict[str, dict[str, float]] = {
 }
 """What no catalogue entry describes, off."""
 
+REAL: dict[str, dict[str, float]] = {
+    "offset_gain": {"gain": 1.0},
+    "swing_loss": {"per_radian": 0.0},
+    "angle_limit": {"lower": -INF, "upper": INF},
+    "beat_slowing": {"offset": 0.0, "load": 0.0},
+    "servo_torque_limit": {"torque": INF},
+    "body_flexibility": {"stiffness": INF},
+    "wall_effect": {"gain": 0.0, "distance": 1.0, "heading": 0.0, "range": 0.3},
+    "floor_effect": {"gain": 0.0, "depth": 1.5, "range": 0.2},
+    "surface_piercing": {"height": 0.0},
+    "bubbles": {"mass": 0.0, "x": 0.0},
+    "orbital_wave": {
+        "amplitude": 0.0, "frequency": 0.5, "phase": 0.0, "heading": 0.0, "number": 1.0,
+        "mirror": 0.0,
+    },
+    "flooding": {"rate": 0.0, "x": 0.0},
+    "cable": {"stiffness": 0.0, "x": 0.0, "y": 0.0, "z": 0.0, "slack": 0.0, "attach_x": 0.0},
+}  # fmt: skip
+"""Further physics of real robots, off. The last three correct a wave, a leak and a tether."""
+
+PLANTS: dict[str, dict[str, float]] = {
+    "linked_tail": {"share": 0.0, "stiffness": 0.05},
+    "strip_hull": {"coefficient": 0.0, "onset": 0.4},
+    "wake_oscillator": {"lift": 0.0},
+    "bistable_wake": {"coefficient": 0.0},
+}
+"""Water and bodies of another kind than the model's, off."""
+
 PUSH = {"push_start": 0.0, "push_step": 1.0, "push_inertial": 0.0}
+ADDED = {**LIBRARY, **FOREIGN, **REAL, **PLANTS}
 EXTRA = np.dtype(
-    [
-        (f"{name}_{key}", np.float64)
-        for name, values in {**LIBRARY, **FOREIGN}.items()
-        for key in values
-    ]
+    [(f"{name}_{key}", np.float64) for name, values in ADDED.items() for key in values]
     + [(name, np.float64) for name in PUSH]
 )
 
@@ -123,11 +148,10 @@ def fish_record(values: Mapping[str, float]) -> np.void:
 def extra_record(effects: Mapping[str, Mapping[str, float]]) -> np.void:
     """The record of everything added; what is not named stays off."""
     record = np.zeros(1, EXTRA)
-    off = {**LIBRARY, **FOREIGN}
     for name in effects:
-        if name not in off or set(effects[name]) - set(off[name]):
+        if name not in ADDED or set(effects[name]) - set(ADDED[name]):
             raise KeyError(f"{name}: {effects[name]}")
-    for name, values in off.items():
+    for name, values in ADDED.items():
         for key, neutral in values.items():
             record[f"{name}_{key}"] = effects.get(name, {}).get(key, neutral)
     for name, value in PUSH.items():

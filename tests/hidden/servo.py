@@ -8,7 +8,8 @@ step each either follows its input exactly or moves evenly. `drive` holds that m
 
 0-3 rate limit, 4-7 play of the tail, each: angle at the step's start, 1 when it moves evenly,
 its rate then, the step's start time; 8 place of the block behind its play; 9 side of the
-sticking fin; 10 row of the commands in force; 11 half stroke (+1 or -1) of the step.
+sticking fin; 10 row of the commands in force; 11 half stroke (+1 or -1) of the step; 12 moment of
+the water about the tail's hinge; 13 fastest that the servo turns during the step.
 """
 
 from __future__ import annotations
@@ -19,14 +20,24 @@ from tests.hidden.jit import helper
 
 TWO_PI = 2.0 * math.pi
 TIME, OFFSET, AMPLITUDE, FREQUENCY, SHIFT, TURN, PHASE = range(7)
-LIMIT, PLAY, BLOCK, FIN, ROW, SIDE = 0, 4, 8, 9, 10, 11
-DRIVE_SIZE = 12
+LIMIT, PLAY, BLOCK, FIN, ROW, SIDE, HINGE, FASTEST = 0, 4, 8, 9, 10, 11, 12, 13
+DRIVE_SIZE = 14
+FREE_SPEED, STALLED = 9.0, 0.05
+"""rad/s without load, and the share of it that a stalled servo still creeps at."""
+
+
+@helper
+def slowed(row, e, table):
+    """Share of the commanded frequency that is left under offset and stroke speed."""
+    stroke = TWO_PI * table[row, AMPLITUDE] * table[row, FREQUENCY]
+    by_offset = 1.0 - e.beat_slowing_offset * abs(table[row, OFFSET])
+    return by_offset * (1.0 - e.beat_slowing_load * stroke)
 
 
 @helper
 def tail_phase(t, row, e, table):
     """Phase and its two rates within a row of the commands."""
-    speed = TWO_PI * e.frequency_scale_scale * table[row, FREQUENCY]
+    speed = TWO_PI * e.frequency_scale_scale * table[row, FREQUENCY] * slowed(row, e, table)
     sag = e.battery_sag_rate
     since = table[row, TIME]
     run = (t - since) - 0.5 * sag * (t * t - since * since)
@@ -45,9 +56,12 @@ def sent(t, late, e, table, drive):
     phase, rate, bend = tail_phase(then, row, e, table)
     swing, slope = math.sin(phase), math.cos(phase)
     reach = table[row, AMPLITUDE] * e.tail_gain_gain * (1.0 + drive[SIDE] * e.tail_asymmetry_ratio)
-    angle = table[row, OFFSET] + e.tail_bias_offset + reach * swing
-    if late < 0:
-        return angle, 0.0, 0.0
+    offset = table[row, OFFSET] * e.offset_gain_gain
+    reach *= 1.0 - e.swing_loss_per_radian * abs(offset)
+    angle = offset + e.tail_bias_offset + reach * swing
+    stopped = min(max(angle, e.angle_limit_lower), e.angle_limit_upper)
+    if late < 0 or stopped != angle:
+        return stopped, 0.0, 0.0
     return angle, reach * rate * slope, reach * (bend * slope - rate * rate * swing)
 
 
@@ -76,14 +90,27 @@ def plan_side(middle, late, e, table, drive):
 
 
 @helper
+def is_limited(e):
+    """Whether the servo's speed has a limit."""
+    return not (math.isinf(e.servo_rate_limit_rate) and math.isinf(e.servo_torque_limit_torque))
+
+
+@helper
 def plan_limit(t, h, late, e, table, drive):
-    """Whether the servo keeps up during the step from t to t + h."""
-    if math.isinf(e.servo_rate_limit_rate):
+    """Whether the servo keeps up during the step from t to t + h.
+
+    Under load it slows down along a straight line from its free speed to its stall torque.
+    """
+    if not is_limited(e):
         return
+    drive[FASTEST] = e.servo_rate_limit_rate
+    if not math.isinf(e.servo_torque_limit_torque):
+        left = max(1.0 - abs(drive[HINGE]) / e.servo_torque_limit_torque, STALLED)
+        drive[FASTEST] = min(drive[FASTEST], FREE_SPEED * left)
     here, goal = sent(t, late, e, table, drive)[0], sent(t + h, late, e, table, drive)[0]
     now = drive[LIMIT]
     needed = (goal - now) / h
-    most = e.servo_rate_limit_rate
+    most = drive[FASTEST]
     keeps_up = abs(needed) <= most
     drive[LIMIT + 1] = 0.0 if keeps_up and abs(here - now) < 1e-9 else 1.0
     drive[LIMIT + 2] = min(max(needed, -most), most)
@@ -112,7 +139,7 @@ def plan_play(t, h, late, e, table, drive):
 @helper
 def close_step(t, late, e, table, drive):
     """Remembers where the angles are at the end of a step."""
-    if not math.isinf(e.servo_rate_limit_rate):
+    if is_limited(e):
         drive[LIMIT] = limited(t, late, e, table, drive)[0]
     if e.servo_backlash_gap != 0.0:
         drive[PLAY] = driven(t, late, e, table, drive)[0]

@@ -10,10 +10,13 @@ import numpy as np
 from tests.hidden.integrate import advance, begin
 from tests.hidden.motion import STATES
 from tests.hidden.records import extra_record, fish_record
-from tests.hidden.servo import DRIVE_SIZE, FREQUENCY, PHASE, TIME
+from tests.hidden.servo import AMPLITUDE, DRIVE_SIZE, FREQUENCY, OFFSET, PHASE, TIME
 
 LONGEST_STEP = 0.002
 """s. Fifth order: the error over a run is below a micrometre, far below any sensor."""
+
+DECIDED = {"servo_rate_limit", "servo_backlash", "servo_torque_limit", "angle_limit"}
+"""Effects that decide once a step whether the tail is held."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +74,7 @@ class Swim:
         self.extra["push_start"], self.extra["push_step"] = self.push.start, self.push.step
         self.extra["push_inertial"] = float(self.push.inertial)
         # Limits and plays decide once a step what they do, so their steps are shorter.
-        decides = self.effects.keys() & {"servo_rate_limit", "servo_backlash"}
+        decides = self.effects.keys() & DECIDED
         self.longest = 0.25 * longest if decides else longest
         start = start or Start()
         self.phase = start.phase
@@ -91,6 +94,15 @@ class Swim:
         if first:
             self.time = float(self.table[0, TIME])
             begin(self.state, self.fish, self.extra, self.table, self.drive)
+
+    def phase_at(self, time: float) -> float:
+        """Phase of the commanded tail, rad."""
+        row = self.table[max(int(np.searchsorted(self.table[:, TIME], time, "right")) - 1, 0)]
+        sag, begin = float(self.extra["battery_sag_rate"]), row[TIME]
+        speed = float(self.extra["frequency_scale_scale"]) * row[FREQUENCY]
+        speed *= float(self._slowed(row[None])[0])
+        run = (time - begin) - 0.5 * sag * (time**2 - begin**2)
+        return float(row[PHASE] + 2.0 * np.pi * speed * run)
 
     def run(self, until: float, sample_times: np.ndarray) -> np.ndarray:
         """States at the sample times, (T, STATES), all within the present time and `until`."""
@@ -141,8 +153,14 @@ class Swim:
         sag = float(self.extra["battery_sag_rate"])
         t = self.table[:, TIME]
         run = np.diff(t) - 0.5 * sag * np.diff(t**2)
-        beats = scale * self.table[:-1, FREQUENCY] * run
+        beats = scale * self.table[:-1, FREQUENCY] * self._slowed(self.table[:-1]) * run
         return self.phase + 2.0 * np.pi * np.concatenate([[0.0], np.cumsum(beats)])
+
+    def _slowed(self, rows: np.ndarray) -> np.ndarray:
+        """Share of the commanded frequency that is left in rows of the commands."""
+        stroke = 2.0 * np.pi * rows[:, AMPLITUDE] * rows[:, FREQUENCY]
+        by_offset = 1.0 - float(self.extra["beat_slowing_offset"]) * np.abs(rows[:, OFFSET])
+        return by_offset * (1.0 - float(self.extra["beat_slowing_load"]) * stroke)
 
 
 def simulate(

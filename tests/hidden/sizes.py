@@ -129,7 +129,17 @@ def draw_effect(
 ) -> dict[str, float]:
     """Parameters of an effect at a strength, each within `spread` of typical, any sign allowed."""
     size = {**SIZES, **FOREIGN_SIZES}[name]
-    neutral = {**LIBRARY, **FOREIGN}[name]
+    return draw_values(size, {**LIBRARY, **FOREIGN}[name], strength, rng, spread)
+
+
+def draw_values(
+    size: Size,
+    neutral: Mapping[str, float],
+    strength: float,
+    rng: np.random.Generator,
+    spread: float = 0.15,
+) -> dict[str, float]:
+    """As :func:`draw_effect`, of any effect with these neutral values."""
     values = {}
     for key, typical in size.typical.items():
         factor = strength * rng.uniform(1.0 - spread, 1.0 + spread)

@@ -1,4 +1,4 @@
-"""Which cases a suite holds, and how one of them is made, diagnosed and scored."""
+"""Which cases the suites hold, and how one of them is made, diagnosed and scored."""
 
 from __future__ import annotations
 
@@ -12,12 +12,18 @@ from pathlib import Path
 from typing import Any
 
 from scripts.results import kept
-from tests.hidden.cases import make_case
+from tests.hidden import cases, scoring, summary
 from tests.hidden.plans import PLANS
-from tests.hidden.scoring import Row, failed, score
+from tests.hidden.realistic import cases as realistic_cases
+from tests.hidden.realistic import scoring as realistic_scoring
+from tests.hidden.realistic import summary as realistic_summary
+from tests.hidden.realistic.plans import TIERS
+from tests.hidden.realistic.truth import RealTruth
+from tests.hidden.truth import Truth
 
 Diagnose = Callable[..., Mapping[str, Any]]
 PIPELINE = "fish_env.diagnosis.pipeline:diagnose"
+CATALOGUE = "fish_env.effects:catalogue"
 FULL = {
     "rich": len(PLANS["rich"].choices),
     "small": len(PLANS["small"].choices),
@@ -37,6 +43,33 @@ FULL = {
     "steady": len(PLANS["steady"].choices),
 }
 """Cases of each tier in a full suite: every effect at both sizes, and more than 30 without any."""
+REALISTIC = {name: tier.cases for name, tier in TIERS.items()}
+"""Cases of each tier of the realistic suite."""
+
+
+@dataclass(frozen=True)
+class Suite:
+    """One suite.
+
+    Attributes:
+        title: heading of its page.
+        result: first part of the name of its result.
+        counts: cases of each tier.
+        choices: how many kinds of cases a tier has, which consecutive numbers go through.
+        finish: makes a case in a folder, and diagnoses and scores it: the folder, the job.
+        row_of: the row of a finished case.
+        summarise: rates of the rows.
+        markdown: the rates as a page.
+    """
+
+    title: str
+    result: str
+    counts: Mapping[str, int]
+    choices: Callable[[str], int]
+    finish: Callable[[Path, Job], dict[str, Any]]
+    row_of: Callable[[Mapping[str, Any]], Any]
+    summarise: Callable[[Sequence[Any]], dict[str, Any]]
+    markdown: Callable[[dict[str, Any]], str]
 
 
 @dataclass(frozen=True)
@@ -56,7 +89,7 @@ class Job:
 
 def seeds(tier: str, count: int, first: int) -> list[int]:
     """Case numbers of a tier; spread over its choices where there are fewer cases than those."""
-    choices = len(PLANS[tier].choices)
+    choices = suite_of(tier).choices(tier)
     if not choices or count >= choices:
         return [first + i for i in range(count)]
     return [first + round(i * choices / count) for i in range(count)]
@@ -70,8 +103,8 @@ def jobs(
     diagnose: str = PIPELINE,
     quick: bool = False,
 ) -> list[Job]:
-    """The jobs of a suite, tiers taking turns so that an early stop has seen all of them."""
-    chosen = {tier: FULL[tier] for tier in (tiers or FULL)}
+    """The jobs of some tiers, which take turns so that an early stop has seen all of them."""
+    chosen = {tier: suite_of(tier).counts[tier] for tier in (tiers or FULL)}
     turns = [
         (number / count, Job(tier, seed, str(folder), diagnose, quick))
         for tier, count in chosen.items()
@@ -88,26 +121,85 @@ def find(name: str) -> Diagnose:
     return found
 
 
-def do(job: Job) -> Row:
+def do(job: Job) -> Any:
     """Makes, diagnoses and scores one case; a finished one is read back."""
-    return row_of(kept(job.file, partial(_done, job)))
+    suite = suite_of(job.tier)
+    return suite.row_of(kept(job.file, partial(_done, suite, job)))
 
 
-def _done(job: Job) -> dict[str, Any]:
+def _done(suite: Suite, job: Job) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as place:
-        folder = Path(place) / "data"
-        truth = make_case(job.tier, job.seed, folder)
-        try:
-            answer = find(job.diagnose)(folder, seed=job.seed, quick=job.quick)
-            row = score(truth, answer)
-        except Exception:
-            answer, row = {}, failed(truth, traceback.format_exc())
+        return suite.finish(Path(place) / "data", job)
+
+
+def _answer(folder: Path, job: Job) -> Mapping[str, Any]:
+    return find(job.diagnose)(folder, seed=job.seed, quick=job.quick)
+
+
+def _finish_plain(folder: Path, job: Job) -> dict[str, Any]:
+    truth: Truth = cases.make_case(job.tier, job.seed, folder)
+    answer: Mapping[str, Any] = {}
+    try:
+        answer = _answer(folder, job)
+        row = scoring.score(truth, answer)
+    except Exception:
+        answer, row = {}, scoring.failed(truth, traceback.format_exc())
     return {"row": asdict(row), "effects": {**truth.effects, **truth.foreign}, "answer": answer}
 
 
-def row_of(finished: Mapping[str, Any]) -> Row:
+def _finish_realistic(folder: Path, job: Job) -> dict[str, Any]:
+    truth: RealTruth = realistic_cases.make_case(job.tier, job.seed, folder)
+    answer: Mapping[str, Any] = {}
+    try:
+        answer = _answer(folder, job)
+        row = realistic_scoring.score(truth, answer, set(find(CATALOGUE)()))
+    except Exception as error:
+        row = realistic_scoring.failed(truth, error, traceback.format_exc())
+    return {"row": asdict(row), "truth": asdict(truth), "answer": answer}
+
+
+def row_of(finished: Mapping[str, Any], kind: type[Any] = scoring.Row) -> Any:
     """The row of a finished case."""
     content = dict(finished["row"])
-    content["named"] = tuple(content["named"])
+    for name in ("named", "claimed", "false_names"):
+        if name in content:
+            content[name] = tuple(content[name])
     content["alternatives"] = tuple(map(tuple, content["alternatives"]))
-    return Row(**content)
+    return kind(**content)
+
+
+SUITES = {
+    "catalogue": Suite(
+        "Hidden-effect suite",
+        "diagnosis",
+        FULL,
+        lambda tier: len(PLANS[tier].choices),
+        _finish_plain,
+        row_of,
+        summary.summarise,
+        summary.markdown,
+    ),
+    "realistic": Suite(
+        "Realistic suite",
+        "realistic",
+        REALISTIC,
+        lambda tier: len(TIERS[tier].choices),
+        _finish_realistic,
+        partial(row_of, kind=realistic_scoring.RealRow),
+        realistic_summary.summarise,
+        realistic_summary.markdown,
+    ),
+}
+"""The suites by name; no two have a tier of the same name."""
+
+
+def suite_of(tier: str) -> Suite:
+    """The suite that has a tier.
+
+    Raises:
+        KeyError: No such tier.
+    """
+    for suite in SUITES.values():
+        if tier in suite.counts:
+            return suite
+    raise KeyError(tier)

@@ -137,9 +137,9 @@ TITLES = {
 
 def markdown(summary: dict[str, Any]) -> str:
     """The summary as a page: all cases, then each tier with its rates and confusion matrix."""
-    lines = ["## All cases", "", *rates_table(summary["overall"])]
+    lines = ["## All cases", "", *rates_table(summary["overall"], TITLES)]
     for tier, rates in summary["tiers"].items():
-        lines += ["", f"## {tier}", "", TIERS[tier], "", *rates_table(rates)]
+        lines += ["", f"## {tier}", "", TIERS[tier], "", *rates_table(rates, TITLES)]
         lines += ["", "| hidden | answers |", "| --- | --- |"]
         for truth, answers in summary["confusion"][tier].items():
             said = ", ".join(f"{name} x {count}" for name, count in answers.items())
@@ -147,7 +147,7 @@ def markdown(summary: dict[str, Any]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def rates_table(rates: dict[str, Any]) -> list[str]:
+def rates_table(rates: dict[str, Any], titles: dict[str, str]) -> list[str]:
     """Two columns: what is counted, and the rate with its interval; nothing that has no cases."""
-    known = [(title, rates[key]) for key, title in TITLES.items() if rates[key] is not None]
+    known = [(title, rates[key]) for key, title in titles.items() if rates[key] is not None]
     return ["| | |", "| --- | --- |", *(f"| {title} | {shown(value)} |" for title, value in known)]

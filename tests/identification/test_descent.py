@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from fish_env.identification.descent import SLIGHT, Within, descend
+from fish_env.inference.estimate.bounds import LinearBounds
+from fish_env.inference.estimate.gauss_newton import SLIGHT, descend
 
 
 def box(low, high):
     low, high = np.asarray(low, float), np.asarray(high, float)
-    return Within(np.eye(len(low)), low, high, lambda x: np.clip(x, low, high))
+    return LinearBounds(np.eye(len(low)), low, high)
 
 
 class Counted:
@@ -38,9 +39,9 @@ VALLEY = (
 @pytest.mark.parametrize("high", [3.0, 0.7])
 def test_it_finds_the_minimum_within_bounds(high):
     problem = Counted(*VALLEY)
-    within = box([-2.0, -2.0], [high, 3.0])
+    bounds = box([-2.0, -2.0], [high, 3.0])
     found, value, _ = descend(
-        np.array([-1.2, 1.0]), problem.evaluate, problem.linearise, within, 60, 1e-4
+        np.array([-1.2, 1.0]), problem.evaluate, problem.linearise, bounds, 60, 1e-4
     )
     best = least_squares(VALLEY[0], [-1.2, 0.4], bounds=([-2.0, -2.0], [high, 3.0]), xtol=1e-12)
     assert value <= 2.0 * best.cost + 1e-6
@@ -85,18 +86,18 @@ def test_it_does_not_follow_roughness(promise, counted):
 
 
 @pytest.mark.parametrize(
-    ("hopeless", "iterations", "counted"), [(101.0, 1, 2), (99.0, 1, 1), (99.0, 2, 2)]
+    ("give_up_above", "iterations", "counted"), [(101.0, 1, 2), (99.0, 1, 1), (99.0, 2, 2)]
 )
-def test_it_stops_where_the_steps_left_do_not_promise_enough(hopeless, iterations, counted):
+def test_it_stops_where_the_steps_left_do_not_promise_enough(give_up_above, iterations, counted):
     """A step promises 25 of 125: enough for less than 101, or for less than 99 if two are left."""
     problem = Counted(lambda x: np.array([10.0, x[0] - 5.0]), lambda x: np.array([[0.0], [1.0]]))
-    within = box([-9.0], [9.0])
+    bounds = box([-9.0], [9.0])
     start = np.zeros(1)
-    descend(start, problem.evaluate, problem.linearise, within, iterations, 0.1, hopeless)
+    descend(start, problem.evaluate, problem.linearise, bounds, iterations, 0.1, give_up_above)
     assert problem.count == counted
 
 
 def test_a_start_without_an_objective_is_an_error():
-    within = box([-1.0], [1.0])
+    bounds = box([-1.0], [1.0])
     with pytest.raises(np.linalg.LinAlgError, match="diverges"):
-        descend(np.zeros(1), lambda x: (np.inf, None), lambda x, known: None, within, 3, 0.1)
+        descend(np.zeros(1), lambda x: (np.inf, None), lambda x, known: None, bounds, 3, 0.1)

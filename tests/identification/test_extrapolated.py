@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fish_env.data import load_dataset
-from fish_env.identification import Problem, fit
+from fish_env.identification import SeriesProblem, fit
 from tests.hidden.cases import make_case
 
 LIMIT = "servo_rate_limit"
@@ -20,7 +20,7 @@ def case(tmp_path_factory):
 @pytest.fixture(scope="module")
 def fitted(case):
     data = case[0]
-    return fit(Problem(data, run_ids=data.ids[:4]), (LIMIT,), rounds=2)
+    return fit(SeriesProblem(data, run_ids=data.ids[:4]), (LIMIT,), rounds=2)
 
 
 def distances(own, estimates):
@@ -30,8 +30,8 @@ def distances(own, estimates):
 
 def test_what_steps_get_wrong_goes_with_their_length(fitted):
     """As extrapolating needs: what is left of it is what does not."""
-    usual, finer = fitted.problem, fitted.problem.with_finer_steps()
-    finest = finer.with_finer_steps()
+    usual, finer = fitted.problem, fitted.problem.refined()[0]
+    finest = finer.refined()[0]
     effects = {path: np.array([value]) for path, value in fitted.point.effects.items()}
     at = fitted.point.z[:, None], effects, fitted.noise, fitted.filtered
     exact = finest.innovations(*at)
@@ -42,10 +42,10 @@ def test_what_steps_get_wrong_goes_with_their_length(fitted):
 
 def test_one_step_leads_to_where_fits_in_ever_finer_steps_end(fitted):
     held = {"refit_noise": False, "iterations": 2}
-    finer = fitted.problem.with_finer_steps()
+    finer = fitted.problem.refined()[0]
     fine, finest = (
         fit(problem, (LIMIT,), fitted.point, fitted.noise, **held).estimates
-        for problem in (finer, finer.with_finer_steps())
+        for problem in (finer, finer.refined()[0])
     )
     end = (4.0 * finest - fine) / 3.0
     assert distances(fitted.extrapolated, end).max() < 0.3
@@ -71,5 +71,5 @@ def test_everything_else_stays(fitted):
 
 def test_a_tail_without_jumps_needs_no_finer_steps(case):
     data = case[0]
-    plain = fit(Problem(data, run_ids=data.ids[:1]), (), rounds=1, iterations=1)
+    plain = fit(SeriesProblem(data, run_ids=data.ids[:1]), (), rounds=1, iterations=1)
     assert plain.extrapolated is plain

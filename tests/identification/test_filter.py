@@ -5,16 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fish_env.identification import Problem, products
-from fish_env.identification.free import Free, linearise
+from fish_env.identification import SeriesProblem
 from fish_env.identification.phases import settle_phases
-from fish_env.identification.problem import Point
+from fish_env.inference.estimate import products
+from fish_env.inference.estimate.free import Free, linearise
+from fish_env.inference.problem import Point
 from fish_env.sensing.channels import channels_from_states
 from tests.identification.synthetic import PATHS, Setup, simulate
 
 
-def problem_of(setup: Setup, **options) -> Problem:
-    return Problem(simulate(setup), paths=PATHS, **options)
+def problem_of(setup: Setup, **options) -> SeriesProblem:
+    return SeriesProblem(simulate(setup), paths=PATHS, **options)
 
 
 def moved(state, error):

@@ -9,11 +9,12 @@ from typer.testing import CliRunner
 from fish_env.cli import app
 from fish_env.data import write_dataset
 from fish_env.errors import EffectError
-from fish_env.identification import Problem, fit, identified_fish
-from fish_env.identification.estimator import default_noise, finished, sandwich
-from fish_env.identification.free import Linearised
-from fish_env.identification.problem import Point
-from fish_env.identification.products import inner
+from fish_env.identification import SeriesProblem, fit, identified_fish
+from fish_env.inference.estimate.covariance import sandwich
+from fish_env.inference.estimate.fit import finished
+from fish_env.inference.estimate.free import Linearised
+from fish_env.inference.estimate.products import inner
+from fish_env.inference.problem import Point
 from fish_env.params import load_fish, save_fish
 from fish_env.simulator import Simulator
 from tests.identification.synthetic import FISH, PATHS, Setup, simulate
@@ -34,7 +35,7 @@ def fits():
     for seed in range(DATA_SETS):
         changes = fish_drawn(np.random.default_rng(100 + seed))
         setup = Setup(seed=seed, changes=changes)
-        found.append((changes, fit(Problem(simulate(setup), paths=PATHS), rounds=3)))
+        found.append((changes, fit(SeriesProblem(simulate(setup), paths=PATHS), rounds=3)))
     return found
 
 
@@ -67,7 +68,7 @@ def test_the_noise_is_found(fits):
 
 def test_fits_repeat_bit_for_bit():
     setup = Setup(runs=1, duration=3.0)
-    results = [fit(Problem(simulate(setup), paths=PATHS), rounds=2) for _ in range(2)]
+    results = [fit(SeriesProblem(simulate(setup), paths=PATHS), rounds=2) for _ in range(2)]
     np.testing.assert_array_equal(results[0].estimates, results[1].estimates)
 
 
@@ -92,12 +93,12 @@ def test_products_in_blocks_are_the_products():
 
 def test_unknown_effects_are_refused():
     with pytest.raises(EffectError, match="known: "):
-        Problem(simulate(Setup(runs=1, duration=1.0)), effects=["tail_wobble"])
+        SeriesProblem(simulate(Setup(runs=1, duration=1.0)), effects=["tail_wobble"])
 
 
 def test_an_effect_that_is_off_at_infinity_begins_at_a_mild_size():
     """No rate limit at all has no slope to follow; a tail that it does not hold back has none."""
-    problem = Problem(
+    problem = SeriesProblem(
         simulate(Setup(runs=1, duration=4.0)), paths=PATHS, effects=["servo_rate_limit"]
     )
     assert problem.start.effects == {"effects.servo_rate_limit.rate": 8.0}
@@ -107,8 +108,8 @@ def test_an_effect_that_is_off_at_infinity_begins_at_a_mild_size():
 
 
 def test_default_noise_keeps_what_the_dataset_says():
-    problem = Problem(simulate(Setup(runs=1, duration=1.0)), paths=PATHS)
-    np.testing.assert_array_equal(default_noise(problem).sensor_sd, Setup().noise.sensor_sd)
+    problem = SeriesProblem(simulate(Setup(runs=1, duration=1.0)), paths=PATHS)
+    np.testing.assert_array_equal(problem.default_noise().sensor_sd, Setup().noise.sensor_sd)
 
 
 def test_a_fit_becomes_a_fish_that_loads(fits, tmp_path):
@@ -137,7 +138,7 @@ def test_the_command_fits_and_writes(tmp_path):
 
 
 def test_a_fit_that_was_cut_short_is_taken_on_until_it_rests():
-    problem = Problem(simulate(Setup(seed=3, runs=2, duration=6.0)), paths=PATHS)
+    problem = SeriesProblem(simulate(Setup(seed=3, runs=2, duration=6.0)), paths=PATHS)
     short = fit(problem, rounds=1, iterations=1, start=Point(np.full(len(PATHS), 1.5), {}))
     rested = finished(short)
     assert rested.objective < short.objective - 1.0

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from fish_env.data import CommandSteps, Dataset, Run
-from fish_env.identification import Problem
+from fish_env.identification import SeriesProblem
 from fish_env.identification.filtering import NoiseModel
 from fish_env.identification.phases import settle_phases
-from fish_env.identification.problem import Point
+from fish_env.inference.problem import Point
 from fish_env.simulator import Simulator
 
 FISH = "zheng-2021-a"
@@ -23,7 +23,7 @@ TRUTH = Point(
 
 
 @pytest.fixture(scope="module")
-def swum() -> tuple[Problem, tuple[float, float]]:
+def swum() -> tuple[SeriesProblem, tuple[float, float]]:
     """A fish with a soft tail, seen by a camera from the midst of its swim; its phase and angle."""
     values = np.array([[0.1, 0.3, 1.7, 0.0, 0.0], [-0.1, 0.35, 1.4, 0.0, 0.0]])
     commands = [
@@ -36,13 +36,13 @@ def swum() -> tuple[Problem, tuple[float, float]]:
     time_s = trajectory.time_s[seen] - BEFORE
     shown = {n: trajectory[n][seen] + SD[n] * rng.standard_normal(seen.sum()) for n in CHANNELS}
     run = Run("swim", time_s, shown, CommandSteps(np.array([0.0, 5.0]), values), "unknown", None)
-    problem = Problem(Dataset("soft", FISH, (run,), SD), paths=(), effects=SOFT)
+    problem = SeriesProblem(Dataset("soft", FISH, (run,), SD), paths=(), effects=SOFT)
     return problem, tuple(
         float(trajectory[name][seen][0]) for name in ("tail_phase", "tail_flexibility.angle")
     )
 
 
-def noise_of(problem: Problem) -> NoiseModel:
+def noise_of(problem: SeriesProblem) -> NoiseModel:
     return NoiseModel(problem.sensor_sd, 5e-4, 2e-5, 0.5)
 
 

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from fish_env.data import CommandSteps
-from fish_env.diagnosis.causes import causes_of, effect_values
-from fish_env.diagnosis.effort import QUICK
-from fish_env.diagnosis.open_loop import errors
-from fish_env.identification.free import Free, linearise
-from fish_env.identification.problem import Point, Problem
+from fish_env.identification.open_loop import errors
 from fish_env.identification.runs import FINER, SWITCH_S
+from fish_env.identification.series import SeriesProblem
+from fish_env.inference.effort import QUICK
+from fish_env.inference.estimate.free import Free, linearise
+from fish_env.inference.probes import causes_of, effect_values
+from fish_env.inference.problem import Point
 from tests.identification.synthetic import Setup, simulate
 
 LAG = {"effects.servo_lag.time_constant": 0.013}
@@ -34,19 +35,19 @@ def noise_of(problem):
 
 def off(dataset, effects, change=lambda problem: problem):
     """Largest error of the steps, in standard deviations of the sensors."""
-    problem = change(Problem(dataset))
-    exact = Problem(dataset, dt=2e-4)
+    problem = change(SeriesProblem(dataset))
+    exact = SeriesProblem(dataset, dt=2e-4)
     difference = predicted(problem, effects) - predicted(exact, effects)
     return np.nanmax(np.abs(difference / problem.sensor_sd))
 
 
 def without_fine_steps(problem):
     plain = [replace(run, substeps=np.full_like(run.substeps, 4)) for run in problem.runs]
-    return problem.with_runs(plain).with_plain_steps()
+    return problem.with_runs(plain).without_refinement()
 
 
 def test_steps_are_fine_after_a_switch_and_plain_elsewhere(dataset):
-    run = Problem(dataset).runs[0]
+    run = SeriesProblem(dataset).runs[0]
     span = np.diff(run.clock) / run.substeps[1:]
     since = run.clock[:-1, None] - run.command_times
     fresh = ((since > -0.04 + 1e-9) & (since < SWITCH_S - 1e-6)).any(axis=1)
@@ -66,8 +67,8 @@ def test_plain_steps_would_not_do(dataset, effects):
 
 
 def test_the_longer_steps_of_a_first_look_will_do(dataset):
-    exact, coarse = Problem(dataset, dt=2e-4), Problem(dataset, dt=QUICK.step_s)
-    assert coarse.longest_step > 1.3 * Problem(dataset).longest_step
+    exact, coarse = SeriesProblem(dataset, dt=2e-4), SeriesProblem(dataset, dt=QUICK.step_s)
+    assert coarse.longest_step > 1.3 * SeriesProblem(dataset).longest_step
     difference = predicted(coarse, {}) - predicted(exact, {})
     assert np.nanmax(np.abs(difference / exact.sensor_sd)) < 1.0
 
@@ -87,7 +88,7 @@ def told(problem, filtered, settings):
 
 def unlikeness_in_long_steps(dataset):
     """Effect -> largest error of what it changes, as a share, for steps to compare causes with."""
-    problem, exact = Problem(dataset), Problem(dataset, dt=1e-3)
+    problem, exact = SeriesProblem(dataset), SeriesProblem(dataset, dt=1e-3)
     filtered = problem.filtered(problem.start, noise_of(problem))
     settings = [
         (cause.name, setting)
@@ -121,7 +122,7 @@ def test_still_longer_steps_would_not_do(dataset, monkeypatch):
 
 
 def test_long_steps_are_those_of_the_usual_freedoms_and_never_finer(dataset):
-    usual, coarse = Problem(dataset), Problem(dataset, dt=0.04)
+    usual, coarse = SeriesProblem(dataset), SeriesProblem(dataset, dt=0.04)
     long = usual.with_long_steps()
     assert long.longest_step == pytest.approx(2.0 * usual.longest_step)
     assert long.freedoms(["servo_lag"]) == usual.freedoms(["servo_lag"])
@@ -145,22 +146,22 @@ def gliding(dataset):
 )
 def test_commands_that_glide_need_no_fine_steps(dataset, effects):
     data = gliding(dataset)
-    steps = Problem(data).runs[0].substeps
-    first = Problem(data).runs[0].clock <= 0.04
+    steps = SeriesProblem(data).runs[0].substeps
+    first = SeriesProblem(data).runs[0].clock <= 0.04
     assert steps[~first].max() == 4
     assert off(data, effects) < 0.2
 
 
 def test_only_corners_ask_for_fine_steps(dataset):
-    problem = Problem(dataset)
-    assert problem.has_corners(LIMIT)
-    assert not problem.has_corners(LAG)
-    assert not problem.with_plain_steps().has_corners(LIMIT)
+    problem = SeriesProblem(dataset)
+    assert problem.refines_steps(LIMIT)
+    assert not problem.refines_steps(LAG)
+    assert not problem.without_refinement().refines_steps(LIMIT)
 
 
 def likeness_where_it_is_off(dataset, effect):
     """Cosine between the slope by a lag that is off and what a lag does that steps follow."""
-    problem = Problem(dataset).with_plain_steps()
+    problem = SeriesProblem(dataset).without_refinement()
     free, noise = Free(problem, (effect,), ()), noise_of(problem)
     (path,) = free.names[free.count :]
     nothing = Point(np.zeros(free.count), {path: 0.0})
@@ -176,16 +177,16 @@ def likeness_where_it_is_off(dataset, effect):
 @pytest.mark.parametrize("effect", ["servo_lag", "wake_memory"])
 def test_a_lag_that_is_off_can_be_switched_on(dataset, effect, monkeypatch):
     assert likeness_where_it_is_off(dataset, effect) > 0.8
-    monkeypatch.setattr("fish_env.identification.parameters.least_followed", lambda *a: -np.inf)
+    monkeypatch.setattr("fish_env.inference.vehicle.least_followed", lambda *a: -np.inf)
     assert likeness_where_it_is_off(dataset, effect) < 0.2  # steps too long for it diverge
 
 
 def test_only_what_is_too_quick_takes_other_steps(dataset):
-    problem = Problem(dataset).with_plain_steps()
+    problem = SeriesProblem(dataset).without_refinement()
     free = Free(problem, problem.known, ())
     for side in (-1.0, 1.0):
         values = {f.path: 3.0 * side * f.step if f.lower < 0.0 else 2.0 for f in free.freedoms}
-        start = free.clip(free.pack(Point(np.zeros(free.count), values)))
+        start = free.bounds.clip(free.pack(Point(np.zeros(free.count), values)))
         steps = free.lanes(start)[1]
         np.testing.assert_array_equal(np.abs(steps), free.largest_steps)
     least = {f.path for f in free.freedoms if np.isfinite(f.least)}
@@ -197,7 +198,7 @@ def test_late_samples_show_the_time_before_the_run():
     """A record that is late by its delay is the prompt record, pushed back."""
     delay, setup = 0.08, Setup(runs=1, duration=3.0, uneven=False)
     data = simulate(setup)
-    late = Problem(data)
+    late = SeriesProblem(data)
     prompt = predicted(late, {})
     shown = predicted(late, {"effects.sensor_delay.delay": delay})
     measured = late.runs[0].measured
@@ -219,8 +220,8 @@ def test_a_distortion_of_the_samples_is_undone_at_the_start_too(dataset, effect,
     (run,) = dataset.runs
     moved = {name: v + 2.0 if name == "x" else v for name, v in run.channels.items()}
     shown = {name: distort(name, v) for name, v in moved.items()}
-    plain = Problem(replace(dataset, runs=(replace(run, channels=moved),)))
-    distorted = Problem(replace(dataset, runs=(replace(run, channels=shown),)))
+    plain = SeriesProblem(replace(dataset, runs=(replace(run, channels=moved),)))
+    distorted = SeriesProblem(replace(dataset, runs=(replace(run, channels=shown),)))
     start = Point(np.zeros(len(plain.baseline)), {})
     expected = plain.filtered(start, noise_of(plain))[0]
     found = distorted.filtered(replace(start, effects=effect), noise_of(distorted))[0]

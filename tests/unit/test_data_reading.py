@@ -92,6 +92,10 @@ def test_a_command_that_changes_after_a_gap_is_noted(tmp_path):
     lost = "\n".join([header, *rows[:6], *rows[8:]]) + "\n"
     (note,) = load_runs(good_folder(tmp_path, lost)).notes
     assert "1 of 1 changes of command follow a gap" in note
+    # A row with nothing but the command was added for it, and tells its very time.
+    alone = rows[7].replace("0.7,0.7,0.5,0.1", "0.68,,,")
+    added = "\n".join([header, *rows[:6], alone, *rows[8:]]) + "\n"
+    assert load_runs(good_folder(tmp_path, added)).notes == ()
 
 
 def test_runs_that_were_copied_cut_or_moved_in_time_are_found():

@@ -228,10 +228,10 @@ def test_missing_run_keys(tmp_path, key):
         ({"channels": {}}, ["key channels", "no channel"]),
         ({"channels": ["x"]}, ["key channels", "key: value"]),
         ({"channels": {"x": "m", "heading": "rad"}}, ["key channels.heading", "unknown channel"]),
-        ({"channels": {"x": "furlong"}}, ["key channels.x", "unknown unit 'furlong'"]),
+        ({"channels": {"x": "parsnip"}}, ["key channels.x", "unknown unit 'parsnip'"]),
         ({"channels": {"x": "rad"}}, ["key channels.x", "'rad'", "length"]),
         ({"channels": {"yaw": "rad/s"}}, ["key channels.yaw", "angle"]),
-        ({"channels": {"t": "ms", "x": "m"}}, ["key channels.t", "unknown unit"]),
+        ({"channels": {"t": "mm", "x": "m"}}, ["key channels.t", "'mm'", "time"]),
         ({"channels": {"qw": "1", "qx": "1"}}, ["only qw, qx"]),
         (
             {"channels": {"qw": "1", "qx": "1", "qy": "1", "qz": "1", "yaw": "rad"}},

@@ -76,7 +76,7 @@ def test_a_fish_file_can_name_an_effect_that_lies_beside_it(effect_file):
     fish_file.write_text(
         "name: mine\nbase: zheng-2021-a\neffects: {surge_drag: {coefficient: 3}}\n"
     )
-    from_file = Simulator(load_fish(fish_file), 0.01)
+    from_file = Simulator(fish_file, 0.01, trust_effects=True)
     in_python = Simulator(
         swimmer(), 0.01, {"surge_drag": {"coefficient": 3.0}}, [load_effect_file(effect_file)]
     )
@@ -128,7 +128,7 @@ def test_an_effect_file_must_define_the_effect_it_is_named_for(effect_file):
     fish_file.write_text("name: mine\nbase: zheng-2021-a\neffects: {other: {coefficient: 3}}\n")
     effect_file.rename(effect_file.with_name("other.py"))
     with pytest.raises(EffectError, match=r"other\.py defines 'surge_drag', its file says 'other'"):
-        Simulator(load_fish(fish_file))
+        Simulator(fish_file, trust_effects=True)
 
 
 def test_a_changed_effect_file_is_compiled_again(effect_file):

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import chi2, ncx2
 
 from fish_env.data import load_dataset
-from fish_env.identification import Problem
+from fish_env.identification import SeriesProblem
 from scripts.benchmark_power import AGAIN, SIZES, TARGETS, looks
 from scripts.power.curves import Curve, fit_curve, strength
 from scripts.power.limits import limits, noncentrality
@@ -113,7 +113,7 @@ def test_repeats_of_a_design_share_all_but_noise_and_effect(tmp_path):
 def test_information_of_runs_bounds_what_can_be_found(tmp_path):
     """Less than at the screen's level would do at 5 %, and less still with coefficients known."""
     truth = swim_design(3, 0, tmp_path / "runs", {}, Noise(), SHORT)
-    problem = Problem(load_dataset(tmp_path / "runs"))
+    problem = SeriesProblem(load_dataset(tmp_path / "runs"))
     found = limits(problem, truth, {"linear_drag.surge": 0.1, "servo_lag.time_constant": 0.02}, -7)
     (sizes,) = found.values()  # a lag's size is bounded by the step of the simulation
     assert 0.0 < sizes["known"] < sizes["same"]

@@ -5,16 +5,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fish_env.diagnosis.causes import Cause, causes_of
-from fish_env.diagnosis.search import _sketches
-from fish_env.diagnosis.starts import probed
 from fish_env.effects import catalogue
-from fish_env.identification import Problem
-from fish_env.identification.problem import Point
-from fish_env.identification.sketch import Sketch
+from fish_env.identification import SeriesProblem
+from fish_env.inference.estimate.coarse_fit import CoarseFit
+from fish_env.inference.probes import Cause, causes_of
+from fish_env.inference.problem import Point
+from fish_env.inference.search import _coarse_fits
+from fish_env.inference.starts import probed
 from tests.identification.synthetic import Setup, simulate
 
-PROBLEM = Problem(simulate(Setup(runs=1, duration=2.0)))
+PROBLEM = SeriesProblem(simulate(Setup(runs=1, duration=2.0)))
 CAUSES = {cause.name: cause for cause in causes_of(PROBLEM) if cause.is_effect}
 GAIN, DEPTH = "effects.surface_drag.gain", "effects.surface_drag.depth"
 
@@ -38,11 +38,11 @@ def test_a_clock_that_may_be_fast_or_slow_is_tried_both_ways():
 @pytest.mark.parametrize(("reached", "kept"), [(0.0, False), (0.1, True)])
 def test_a_sketch_that_ends_switched_off_gives_way_to_the_estimate_from_all_runs(reached, kept):
     estimate = Point(np.zeros(1), {GAIN: 2.0, DEPTH: 0.2})
-    ended = Sketch(("surface_drag",), (), Point(np.ones(1), {GAIN: reached, DEPTH: 0.005}), 10.0)
-    sketcher = SimpleNamespace(sketch=lambda *given: ended)
+    ended = CoarseFit(("surface_drag",), (), Point(np.ones(1), {GAIN: reached, DEPTH: 0.005}), 10.0)
+    fitter = SimpleNamespace(coarse_fit=lambda *given: ended)
     base = SimpleNamespace(problem=PROBLEM, effects=(), released=())
     signal = SimpleNamespace(cause=Cause("surface_drag", ()))
-    ((name, found),) = _sketches(sketcher, base, signal, [estimate])
+    ((name, found),) = _coarse_fits(fitter, base, signal, [estimate])
     assert name == "surface_drag"
     assert found.objective == 10.0
     assert found.point is (ended.point if kept else estimate)

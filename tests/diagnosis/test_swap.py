@@ -5,11 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fish_env.diagnosis import search
-from fish_env.diagnosis.causes import Cause, probes_of
-from fish_env.diagnosis.explanation import Explanation
-from fish_env.diagnosis.search import exchanged
 from fish_env.effects import catalogue
+from fish_env.inference import search
+from fish_env.inference.explanation import Explanation
+from fish_env.inference.probes import Cause, probes_of
+from fish_env.inference.search import swap_step
 
 KNOWN = catalogue()
 
@@ -37,7 +37,7 @@ class Judge:
     def base(self):
         return self.fit.objective
 
-    def sketch(self, effects, released, begin):
+    def coarse_fit(self, effects, released, begin):
         names = {p.split(".")[1] for point in begin for p in point.effects}
         assert names == set(effects)  # nothing of the effect that was taken out
         return SimpleNamespace(effects=effects, objective=OBJECTIVES[effects], point=begin[0])
@@ -46,7 +46,7 @@ class Judge:
 class Passing(Judge):
     """Sketches that run past the effect, to where it is off, unless they begin at a small size."""
 
-    def sketch(self, effects, released, begin):
+    def coarse_fit(self, effects, released, begin):
         last = begin[-1].effects
         near = len(begin) == 1 and min(last.values()) < 0.02
         nothing = {p: v if "current" in p else 0.0 for p, v in last.items()}
@@ -63,29 +63,29 @@ def signals(*names):
     ("reached", "kept"), [(0.0, ("servo_lag", "current")), (-90.0, ("tail_flexibility", "current"))]
 )
 def test_a_better_look_alike_takes_the_place(monkeypatch, reached, kept):
-    monkeypatch.setattr(search, "Sketcher", Judge)
+    monkeypatch.setattr(search, "CoarseFitter", Judge)
     monkeypatch.setattr(
         search, "_in_full", lambda problem, s, noise: fit_of(s.effects, s.objective)
     )
     effects = ("tail_flexibility", "current")
     now = Explanation(effects, fit_of(effects, reached))
     left = signals("servo_delay", "servo_lag", "gyro_bias")  # the last looks like neither
-    assert exchanged(now, left, lambda step: None)[0].causes == kept
+    assert swap_step(now, left, lambda step: None)[0].causes == kept
 
 
 def test_one_that_ends_switched_off_is_tried_from_each_size(monkeypatch):
-    monkeypatch.setattr(search, "Sketcher", Passing)
+    monkeypatch.setattr(search, "CoarseFitter", Passing)
     monkeypatch.setattr(
         search, "_in_full", lambda problem, s, noise: fit_of(s.effects, s.objective)
     )
     effects = ("tail_flexibility", "current")
     now = Explanation(effects, fit_of(effects, 0.0))
-    found = exchanged(now, signals("servo_lag"), lambda step: None)
+    found = swap_step(now, signals("servo_lag"), lambda step: None)
     assert found[0].causes == ("servo_lag", "current")
 
 
 def test_the_last_cause_is_not_exchanged(monkeypatch):
-    monkeypatch.setattr(search, "Sketcher", Judge)
+    monkeypatch.setattr(search, "CoarseFitter", Judge)
     effects = ("current", "tail_flexibility")
     now = Explanation(effects, fit_of(effects, 0.0))
-    assert exchanged(now, signals("servo_lag"), lambda step: None) == [now]
+    assert swap_step(now, signals("servo_lag"), lambda step: None) == [now]

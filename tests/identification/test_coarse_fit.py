@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from fish_env.data import load_dataset
-from fish_env.identification import Problem, fit
-from fish_env.identification.free import Free, objective, objectives_with_gains
-from fish_env.identification.problem import Point
-from fish_env.identification.sketch import Sketcher
+from fish_env.identification import SeriesProblem, fit
+from fish_env.inference.estimate.coarse_fit import CoarseFitter
+from fish_env.inference.estimate.free import Free, objective, objectives_with_gains
+from fish_env.inference.problem import Point
 from tests.diagnosis.small_cases import small_case
 
 LAG = "effects.servo_lag.time_constant"
@@ -17,7 +17,7 @@ LAG = "effects.servo_lag.time_constant"
 def baseline(tmp_path_factory):
     folder = tmp_path_factory.mktemp("late") / "data"
     small_case(folder, {"servo_lag": 1.0}, runs=2)
-    return fit(Problem(load_dataset(folder)), rounds=2)
+    return fit(SeriesProblem(load_dataset(folder)), rounds=2)
 
 
 def vectors(free, baseline):
@@ -53,11 +53,11 @@ def test_impossible_and_diverging_models_do_not_lead(baseline):
 
 
 def test_a_sketch_comes_near_what_a_fit_finds(baseline):
-    sketcher = Sketcher(baseline)
+    fitter = CoarseFitter(baseline)
     begin = [Point(baseline.point.z, {LAG: lag}) for lag in (0.01, 0.2)]
-    sketch = sketcher.sketch(["servo_lag"], (), begin)
+    sketch = fitter.coarse_fit(["servo_lag"], (), begin)
     found = fit(baseline.problem, ["servo_lag"], sketch.point, baseline.noise, refit_noise=False)
-    assert sketch.objective < sketcher.base - 100.0
+    assert sketch.objective < fitter.base - 100.0
     i = found.names.index(LAG)
     error = sketch.point.effects[LAG] - found.estimates[i]
     assert abs(error) < 2.0 * np.sqrt(found.covariance[i, i])
@@ -65,28 +65,28 @@ def test_a_sketch_comes_near_what_a_fit_finds(baseline):
 
 def test_the_objective_that_comes_with_the_slopes_is_that_of_the_same_gains(baseline):
     problem, free = baseline.problem, Free(baseline.problem, ["servo_lag"], ())
-    sketcher, tried = Sketcher(baseline), vectors(free, baseline)
+    fitter, tried = CoarseFitter(baseline), vectors(free, baseline)
     alone = objectives_with_gains(problem, free, tried, baseline.noise, baseline.filtered)
-    with_slopes = [sketcher._surveyed(problem, free, vector)[0] for vector in tried]
+    with_slopes = [fitter._surveyed(problem, free, vector)[0] for vector in tried]
     np.testing.assert_allclose(with_slopes, alone, rtol=1e-9)
     impossible = tried[0].copy()
     impossible[problem.baseline.paths.index("mass.total")] = -1e4
-    assert np.isinf(sketcher._surveyed(problem, free, impossible)[0])
+    assert np.isinf(fitter._surveyed(problem, free, impossible)[0])
 
 
 def test_a_sketch_that_will_not_get_there_ends_early(baseline, monkeypatch):
-    sketcher = Sketcher(baseline)
+    fitter = CoarseFitter(baseline)
     begin = [Point(baseline.point.z, {LAG: 0.01})]
-    counts, surveyed = [], Sketcher._surveyed
+    counts, surveyed = [], CoarseFitter._surveyed
 
     def counted(self, *given):
         counts[-1] += 1
         return surveyed(self, *given)
 
-    monkeypatch.setattr(Sketcher, "_surveyed", counted)
+    monkeypatch.setattr(CoarseFitter, "_surveyed", counted)
     objectives = []
-    for hopeless in (np.inf, sketcher.base, -1e9):
+    for give_up_above in (np.inf, fitter.base, -1e9):
         counts.append(0)
-        objectives.append(sketcher.sketch(["servo_lag"], (), begin, hopeless).objective)
+        objectives.append(fitter.coarse_fit(["servo_lag"], (), begin, give_up_above).objective)
     assert counts[0] == counts[1] > counts[2] == 1
-    assert objectives[0] == objectives[1] < sketcher.base < objectives[2]
+    assert objectives[0] == objectives[1] < fitter.base < objectives[2]

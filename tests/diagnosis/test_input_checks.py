@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from fish_env.data import CommandSteps, Dataset, Run, write_dataset
+from fish_env.diagnosis.input_checks import check_runs, load_runs
 from fish_env.diagnosis.pipeline import diagnose
-from fish_env.diagnosis.suitability import check_runs, load_runs
 from fish_env.errors import DatasetError
 from tests.fixtures.measured_data import steady_folder
 

@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fish_env.diagnosis import attribution
-from fish_env.diagnosis.attribution import may_not_act, pruned
 from fish_env.effects import catalogue
+from fish_env.inference import attribution
+from fish_env.inference.attribution import backward_elimination, may_not_act
 
 
 def fit_of(effect, values, sd, correlation=0.0):
@@ -58,4 +58,4 @@ def test_an_idle_cause_is_dropped_whatever_its_evidence(monkeypatch, value, kept
         attribution, "without", lambda e, name: smaller if name == "scale" else None
     )
     monkeypatch.setattr(attribution, "may_not_act", lambda fit, name: fit > 0.95)
-    assert pruned(both).causes == kept
+    assert backward_elimination(both).causes == kept

@@ -8,7 +8,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint docs bench benchmark-diagnosis benchmark-power benchmark-time benchmark-agents benchmark-loop clean
+.PHONY: help setup demo test lint docs bench benchmark-diagnosis benchmark-realistic benchmark-power benchmark-time benchmark-agents benchmark-loop clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 28
@@ -30,6 +30,7 @@ lint: setup  ## style, types and import direction
 
 docs: $(VENV)/.with-docs  ## write the generated pages, then the site into out/site
 	$(BIN)/python -m scripts.make_effects_page
+	$(BIN)/python -m scripts.make_policy_page
 	$(BIN)/python -m scripts.make_environment_page
 	$(BIN)/python -m scripts.make_benchmarks_page
 	$(BIN)/python -m scripts.update_readme
@@ -45,6 +46,9 @@ bench: $(VENV)/.with-bench  ## measure speed beside other environments, and put 
 
 benchmark-diagnosis: setup  ## hide effects in made-up measurements, and count what is found
 	$(BIN)/python scripts/benchmark_diagnosis.py
+
+benchmark-realistic: setup  ## hide many small errors, dirty sensors and wrong inputs, as robots have
+	$(BIN)/python scripts/benchmark_diagnosis.py --suite realistic
 
 benchmark-power: setup  ## hide effects of chosen sizes, and see from which size on they are found
 	$(BIN)/python scripts/benchmark_power.py

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -36,6 +36,7 @@ from fish_env.identification.open_loop import windows, without_feedback
 from fish_env.identification.parameters import ALIKE, Baseline, changes_of, neutral_values
 from fish_env.identification.phases import settle_phases
 from fish_env.identification.runs import FINER, RunData, prepare_run
+from fish_env.identification.sensors import largest_noise
 from fish_env.identification.variation import VARIATIONS
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.hypotheses import effects_of
@@ -230,7 +231,7 @@ class SeriesProblem(Problem):
                 small_disturbance(found.sensor_sd), phase_sd=found.phase_sd, spread=found.spread
             )
             start = max((found, small), key=replay)
-            found = fit_noise(replay, start, within, 45, self.sensor_sd if final else None)
+            found = fit_noise(replay, start, within, 45, self.largest_sensor_sd if final else None)
             if made_with.is_close(found, 0.4):
                 break
         return found
@@ -242,6 +243,11 @@ class SeriesProblem(Problem):
     def settled(self, point: Point, noise: NoiseModel) -> SeriesProblem:
         """The same problem with the likeliest starting phase of every run that has none."""
         return settle_phases(self, point, noise)
+
+    @cached_property
+    def largest_sensor_sd(self) -> FloatArray:
+        """(C,) largest white noise that a channel may have, whatever the model misses (SI)."""
+        return largest_noise(self.dataset, self.channels, self.sensor_sd)
 
     @property
     def starts_known(self) -> bool:

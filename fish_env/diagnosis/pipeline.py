@@ -28,6 +28,7 @@ from fish_env.diagnosis.tables.pipeline import diagnose_steady
 from fish_env.diagnosis.writing import outputs, write_answer
 from fish_env.errors import DatasetError
 from fish_env.files import check_outputs
+from fish_env.identification.copies import without_copies
 from fish_env.identification.recorded import recorded
 from fish_env.identification.sensors import without_outliers
 from fish_env.identification.series import SeriesProblem, series_of
@@ -174,7 +175,7 @@ def _diagnose_runs(
     effort = effort_of(quick)
     progress("checking the runs")
     check_runs(dataset)
-    dataset, outliers = without_outliers(dataset)
+    dataset, outliers = without_outliers(without_copies(dataset))
     progress("checking signs, units and clocks")
     inputs = check_inputs(dataset, fish, seed)
     dataset = inputs.dataset

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from statistics import pstdev
 from typing import TYPE_CHECKING
 
 from fish_env.data.schema import Dataset
@@ -24,6 +25,7 @@ from fish_env.diagnosis.input_checks import doubts
 from fish_env.diagnosis.regimes import as_plain
 from fish_env.diagnosis.result import Diagnosed
 from fish_env.identification.generic_forces import wrench_unit
+from fish_env.identification.own_beats import USUAL_BEAT
 from fish_env.identification.series import series_of
 from fish_env.inference.attribution import Ranked
 from fish_env.inference.effort import effort_of
@@ -123,7 +125,19 @@ def run_variation_entry(fit: Fit) -> list[Plain]:
                 {"name": known.name, "unit": known.unit, "sd": sd, "usual_sd": known.usual,
                  "beyond_usual": sd > POLICY.beyond_usual * known.usual, "values": values}
             )  # fmt: skip
-    return entries
+    return [*_own_beats(fit), *entries]
+
+
+def _own_beats(fit: Fit) -> list[Plain]:
+    """Spread of the tail's frequency over runs, where they differ in it."""
+    beats = [run.own_beat for run in getattr(fit.problem, "runs", ())]
+    if all(beat == 1.0 for beat in beats):
+        return []
+    sd = pstdev(beats)
+    return [
+        {"name": "beat", "unit": "1", "sd": sd, "usual_sd": USUAL_BEAT,
+         "beyond_usual": sd > POLICY.beyond_usual * USUAL_BEAT, "values": beats}
+    ]  # fmt: skip
 
 
 def _unexplained(diagnosis: Diagnosed) -> list[Plain]:

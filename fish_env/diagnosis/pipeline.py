@@ -29,6 +29,7 @@ from fish_env.diagnosis.writing import outputs, write_answer
 from fish_env.errors import DatasetError
 from fish_env.files import check_outputs
 from fish_env.identification.copies import without_copies
+from fish_env.identification.own_beats import own_beats, with_own_beats
 from fish_env.identification.recorded import recorded
 from fish_env.identification.sensors import without_outliers
 from fish_env.identification.series import SeriesProblem, series_of
@@ -180,9 +181,12 @@ def _diagnose_runs(
     inputs = check_inputs(dataset, fish, seed)
     dataset = inputs.dataset
     fitted, final = fitted_and_final(dataset, seed)
-    problem = SeriesProblem(dataset, fish, fitted, dt=effort.step_s)
-    problem = problem.subset(effort.runs).until(effort.seconds)
-    judging = SeriesProblem(dataset, fish, final, dt=effort.step_s) if final else None
+    progress("comparing the beats of the runs")
+    every = SeriesProblem(dataset, fish, dt=effort.step_s)
+    if effort.retries:
+        every = with_own_beats(every, own_beats(every))
+    problem = every.named(fitted).subset(effort.runs).until(effort.seconds)
+    judging = every.named(final) if final else None
     progress("comparing the channels with each other")
     progress("refitting the baseline")
     compare = partial(_compared, dataset, seed)

@@ -72,6 +72,7 @@ class RunData:
             with whatever distorts those; otherwise they are true.
         wrench: (T, 6) known force (N) and moment (N m) on the hull, body frame, from each sample to
             the next; None for none.
+        own_beat: its tail's frequency over that of the other runs, which the commands have.
         variation: (K,) what this run differs in from the others, see ``variation.VARIATIONS``.
     """
 
@@ -89,6 +90,7 @@ class RunData:
     swimming: bool = False
     as_measured: bool = True
     wrench: FloatArray | None = None
+    own_beat: float = 1.0
     variation: FloatArray = field(default_factory=lambda: np.zeros(COUNT))
 
     @property

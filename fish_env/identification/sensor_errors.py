@@ -120,7 +120,8 @@ def _predicted(
     for names, block in (("uvw", "velocity"), ("pqr", "rate")):
         rows = _ROWS[block]
         before = np.vstack([states[:1, rows], filtered.states[:-1, rows]])
-        change |= dict(zip(names, ((states[:, rows] - before) / step[:, None]).T, strict=True))
+        speeds: FloatArray = ((states[:, rows] - before) / step[:, None]).T
+        change |= dict(zip(names, speeds, strict=True))
     drift = np.einsum("tij,tj->ti", rotations(euler), states[:, _ROWS["velocity"]])
     turn = np.einsum("tij,tj->ti", kinematics, states[:, _ROWS["rate"]])
     change |= dict(zip(_PLACE, drift.T, strict=True)) | dict(zip(_ATTITUDE, turn.T, strict=True))

@@ -208,6 +208,10 @@ class SeriesProblem(Problem):
         """The same problem on some of its runs."""
         return self.with_runs([self.runs[i] for i in runs])
 
+    def named(self, ids: Sequence[str]) -> SeriesProblem:
+        """The same problem on the runs with these ids, in their order."""
+        return self.some([self.run_ids.index(id) for id in ids])
+
     def default_noise(self) -> NoiseModel:
         """Sensor noise from differences of the data, and a disturbance of a few millinewton."""
         return small_disturbance(self.sensor_sd)

@@ -1,0 +1,113 @@
+"""Beat of each run's own tail, where runs differ in it.
+
+A tail that beats half a per cent quicker than in the other runs is a radian off after thirty
+seconds, and then nothing fits. So every run is filtered with a comb of frequencies at once, its
+starting phase being free within what servos differ by. The frequency that leaves least is taken for
+a run's own where it leaves clearly less than the one which suits all runs together. What the runs
+share is a cause, to be found and named.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fish_env.arrays import FloatArray
+from fish_env.identification.runs import FREQUENCY, PHASE, RunData
+
+if TYPE_CHECKING:
+    from fish_env.identification.series import SeriesProblem
+
+COARSE: FloatArray = np.asarray(1.0 + np.arange(-24, 25) * 5e-3)
+"""Frequencies over the commanded one of all runs together, tried on their beginnings."""
+BEGINNING_S = 8.0
+COMB: FloatArray = np.asarray(np.arange(-25, 26) * 1e-3)
+"""Differences from that: servos differ by one per cent or so from run to run."""
+PHASE_SD = 0.2
+"""How far the phase at the start of a run may be from the declared one (rad)."""
+USUAL_BEAT = 4e-3
+"""Ordinary spread of servos' frequencies over runs."""
+LEAST = 1.5e-3
+"""Difference of two beats below which the comb cannot tell them apart."""
+CLEARLY = 0.2
+"""Share of what the common beat leaves that a run's own has to take away. Chance takes one per
+cent, for a hundred independent residuals a run."""
+FEWEST = 3
+
+
+def own_beats(problem: SeriesProblem) -> Mapping[str, float]:
+    """Tail frequency of runs over that of all of them, by id; runs that do not differ are left out.
+
+    Args:
+        problem: all runs, those that are kept for judging too.
+    """
+    free = problem.with_runs([_with_free_phase(run) for run in problem.runs])
+    if len(free.runs) < FEWEST or "frequency_scale" in free.model.effects:
+        return {}
+    coarse = _left(free.until(BEGINNING_S), COARSE)
+    if coarse is None:
+        return {}
+    comb = COARSE[int(np.argmin(coarse.sum(axis=1)))] + COMB
+    left = _left(free, comb)
+    if left is None:
+        return {}
+    common = int(np.argmin(left.sum(axis=1)))
+    own = np.argmin(left, axis=0)
+    found = {}
+    for r, run in enumerate(free.runs):
+        clearly = left[own[r], r] < (1.0 - CLEARLY) * left[common, r]
+        inside = min(own[r], common) > 0 and max(own[r], common) < len(comb) - 1
+        if clearly and inside and abs(comb[own[r]] - comb[common]) >= LEAST:
+            found[run.id] = _minimum(left[:, r], comb, int(own[r])) / float(comb[common])
+    return found
+
+
+def with_own_beats(problem: SeriesProblem, own: Mapping[str, float]) -> SeriesProblem:
+    """The problem with commands as each run's own tail follows them, and its starting phase free.
+
+    Args:
+        problem: some of the runs.
+        own: tail frequency over that of all runs, by run id.
+    """
+    if not own:
+        return problem
+    return problem.with_runs([_beating(run, own.get(run.id, 1.0)) for run in problem.runs])
+
+
+def _beating(run: RunData, beat: float) -> RunData:
+    values = run.command_values.copy()
+    values[:, FREQUENCY] *= beat
+    return replace(_with_free_phase(run), command_values=values, own_beat=beat)
+
+
+def _with_free_phase(run: RunData) -> RunData:
+    covariance = run.covariance0.copy()
+    covariance[PHASE, PHASE] = max(covariance[PHASE, PHASE], PHASE_SD**2)
+    return replace(run, covariance0=covariance)
+
+
+def _left(problem: SeriesProblem, comb: FloatArray) -> FloatArray | None:
+    """Squared innovations (n, R) that each frequency leaves in each run; None if none can be."""
+    noise = problem.default_noise()
+    settled = problem.settled(problem.start, noise)
+    try:
+        filtered = settled.filtered(problem.start, noise)
+    except np.linalg.LinAlgError:
+        return None
+    z = np.repeat(settled.start.z[:, None], len(comb), axis=1)
+    rows = settled.innovations(z, {"effects.frequency_scale.scale": comb}, noise, filtered)
+    ends = np.cumsum([run.measured.size for run in settled.runs])[:-1]
+    parts = [np.sum(own * own, axis=1) for own in np.split(rows, ends, axis=1)]
+    found = np.column_stack(parts)
+    return np.where(np.isfinite(found), found, np.inf)
+
+
+def _minimum(left: FloatArray, comb: FloatArray, at: int) -> float:
+    """Frequency at which a parabola through three teeth of the comb is least."""
+    before, here, after = left[at - 1 : at + 2]
+    curve = before - 2.0 * here + after
+    shift = 0.5 * (before - after) / curve if curve > 0.0 else 0.0
+    return float(comb[at] + shift * (comb[1] - comb[0]))

@@ -54,14 +54,18 @@ def own_beats(problem: SeriesProblem) -> Mapping[str, float]:
     left = _left(free, comb)
     if left is None:
         return {}
-    common = int(np.argmin(left.sum(axis=1)))
-    own = np.argmin(left, axis=0)
-    found = {}
-    for r, run in enumerate(free.runs):
-        clearly = left[own[r], r] < (1.0 - CLEARLY) * left[common, r]
-        inside = min(own[r], common) > 0 and max(own[r], common) < len(comb) - 1
-        if clearly and inside and abs(comb[own[r]] - comb[common]) >= LEAST:
-            found[run.id] = _minimum(left[:, r], comb, int(own[r])) / float(comb[common])
+    total = left.sum(axis=1)
+    common = int(np.argmin(total))
+    if not 0 < common < len(comb) - 1:
+        return {}
+    together, found = _minimum(total, comb, common), {}
+    for run, mine in zip(free.runs, left.T, strict=True):
+        own = int(np.argmin(mine))
+        if not 0 < own < len(comb) - 1 or mine[own] > (1.0 - CLEARLY) * mine[common]:
+            continue
+        beat = _minimum(mine, comb, own) / together
+        if abs(beat - 1.0) >= LEAST:
+            found[run.id] = beat
     return found
 
 

@@ -226,6 +226,13 @@ def fit(
     results: Annotated[
         Path | None, typer.Option(help="JSON file for estimates and errors.")
     ] = None,
+    trust_inputs: Annotated[
+        bool,
+        typer.Option(
+            "--trust-inputs",
+            help="Take signs, units and clocks as declared, although a check finds them wrong.",
+        ),
+    ] = False,
     trust_effects: TrustEffects = False,
 ) -> None:
     """Fit a fish's coefficients to measured data and write them with their uncertainty.
@@ -236,7 +243,7 @@ def fit(
 
     fit_and_write(
         Console(), dataset, fish, effects_from(effects), out, trust_effects, objective, leave_out,
-        results,
+        results, trust_inputs,
     )  # fmt: skip
 
 

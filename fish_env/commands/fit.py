@@ -20,6 +20,7 @@ from fish_env.identification.dataset_fit import AUTO, DatasetFit, Estimate, fit_
 from fish_env.identification.left_out import mean_errors
 from fish_env.identification.series import SeriesProblem
 from fish_env.params import fish_files, fish_outputs, load_fish
+from fish_env.params.schema import FishParams
 
 SHOWN = {"m": ("mm", 1e3), "m/s": ("mm/s", 1e3), "rad/s": ("mrad/s", 1e3), "rad": ("mrad", 1e3)}
 """Unit in which an error is printed, and its size."""
@@ -35,6 +36,7 @@ def fit_and_write(
     objective: str | None = None,
     leave_out: str | None = None,
     results: Path | None = None,
+    trust_inputs: bool = False,
 ) -> DatasetFit:
     """Fits a fish to measured data, prints what was found and writes the fish.
 
@@ -48,6 +50,7 @@ def fit_and_write(
         objective: `one-step`, `whole-run` or `means`; None for that of the kind of data.
         leave_out: Column whose values are left out one by one; None for none.
         results: JSON file for estimates and errors; None for none.
+        trust_inputs: Take signs, units and clocks as they are declared.
 
     Raises:
         RoboticFishError: The data, the fish or an option cannot be used.
@@ -56,7 +59,8 @@ def fit_and_write(
     chosen = load_fish(fish or measured.fish, trust_effects)
     if isinstance(measured, Dataset):
         check_runs(measured)
-        refuse_wrong_inputs(measured, chosen)
+        if not trust_inputs:
+            _check_inputs(measured, chosen)
     written = [*fish_outputs(chosen, out).values(), *([results] if results else [])]
     check_outputs(written, [*dataset_files(dataset), *fish_files(chosen)])
     with console.status("reading data") as status:
@@ -74,6 +78,14 @@ def fit_and_write(
     print_fit(console, found)
     console.print(f"written: {out}", soft_wrap=True)
     return found
+
+
+def _check_inputs(measured: Dataset, fish: FishParams) -> None:
+    """Refuse wrong signs, units and clocks, and say how to fit nevertheless."""
+    try:
+        refuse_wrong_inputs(measured, fish)
+    except DatasetError as error:
+        raise DatasetError(f"{error} To fit the data as they are, add --trust-inputs.") from None
 
 
 def print_fit(console: Console, result: DatasetFit) -> None:

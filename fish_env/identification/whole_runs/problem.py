@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,6 +22,7 @@ from fish_env.identification.filtering import Pushes
 from fish_env.identification.parameters import ALIKE, PLANAR_PATHS, VERTICAL
 from fish_env.identification.runs import RunData
 from fish_env.identification.series import SeriesProblem
+from fish_env.identification.whole_runs.evaluation import RunEvaluation
 from fish_env.identification.whole_runs.forces import forces_of
 from fish_env.identification.whole_runs.noise import SimulationNoise, independent_samples
 from fish_env.identification.whole_runs.own_numbers import PACE, own_numbers
@@ -50,25 +50,6 @@ FIRST_SAMPLES, FEWEST_SAMPLES = 15.0, 10.0
 LEAST_FREEDOM = 0.2
 EFFECT_STEP = 0.05
 """Share of the usual step for differences by effects: runs bend more than one-step errors do."""
-
-
-@dataclass(frozen=True, eq=False)
-class RunEvaluation:
-    """Evaluation of one run at a point.
-
-    Attributes:
-        own: (K,) the run's own numbers, fitted.
-        errors: (T, C) measured less simulated, SI, NaN where nothing was measured.
-        residuals: (D_r,) the same whitened, then the prior of the run's own numbers.
-        basis: (D_r, k) orthonormal directions that the run's own numbers follow.
-        log_likelihood: without the constant.
-    """
-
-    own: FloatArray
-    errors: FloatArray
-    residuals: FloatArray
-    basis: FloatArray
-    log_likelihood: float
 
 
 class WholeRunProblem(Problem):

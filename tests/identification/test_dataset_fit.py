@@ -136,17 +136,6 @@ def test_the_command_leaves_conditions_out_and_writes(tmp_path):
     assert 0.0 < content["held_out_errors"]["path"] < 0.1
 
 
-def test_wrong_inputs_are_refused_unless_they_are_trusted(tmp_path):
-    data = swum(seconds=6.0, conditions=[*CONDITIONS, *CONDITIONS])
-    mirrored = [replace(r, channels={**r.channels, "yaw": -r.channels["yaw"]}) for r in data.runs]
-    write_dataset(replace(data, runs=tuple(mirrored)), tmp_path / "trials")
-    words = ["fit", str(tmp_path / "trials"), "--out", str(tmp_path / "swum.yaml")]
-    refused = CliRunner().invoke(app, words)
-    assert "add --trust-inputs" in str(refused.exception)
-    words += ["--trust-inputs", "--effects", "tail_wobble"]
-    assert "tail_wobble" in str(CliRunner().invoke(app, words).exception)
-
-
 def test_steady_means_leave_conditions_out():
     data = load_dataset("msu-steady")
     few = [list(data.conditions).index(c) for c in sorted({*data.conditions})[:3]]

@@ -32,7 +32,7 @@ from fish_env.inference.hypotheses import PARAMETER
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import coefficient_sizes
 from fish_env.inference.screening import smallest_detectable
-from fish_env.rigidbody import consistency, noise_floor
+from fish_env.rigidbody import consistency, noise_floor, outliers
 
 if TYPE_CHECKING:
     from fish_env.diagnosis.pipeline import Diagnosis
@@ -50,6 +50,7 @@ def as_dict(diagnosis: Diagnosis) -> Plain:
         "left_out": list(effort_of(diagnosis.quick).left_out),
         "noise": _noise(diagnosis.accepted),
         "noise_floor": [noise_floor.as_dict(floor) for floor in diagnosis.floors],
+        "outliers": outliers.as_dict(diagnosis.outliers),
         "consistency": consistency.as_dict(diagnosis.consistency),
         "beats": _beats(diagnosis.inputs.logged),
         "gain": gain_entry(diagnosis.gain),

@@ -11,9 +11,9 @@ import numpy as np
 from fish_env.data import load_dataset
 from fish_env.data.clock import check_seconds
 from fish_env.data.schema import Dataset, Run, identical_runs
-from fish_env.diagnosis.recorded import recorded_run
 from fish_env.errors import DatasetError
 from fish_env.identification.channels import body_channels, usable_channels
+from fish_env.identification.recorded import recorded_run
 from fish_env.identification.series import SeriesProblem
 from fish_env.inference.policy import POLICY
 from fish_env.rigidbody.recording_faults import check_clock_jumps, check_stuck

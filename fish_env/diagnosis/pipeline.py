@@ -19,7 +19,6 @@ from fish_env.diagnosis.gain import measure_gain, misfit_of, one_step
 from fish_env.diagnosis.input_checks import check_runs, divergence
 from fish_env.diagnosis.inputs.check import Inputs, check_inputs
 from fish_env.diagnosis.next_experiment import propose
-from fish_env.diagnosis.recorded import recorded
 from fish_env.diagnosis.regimes import Localisation, localise_fits
 from fish_env.diagnosis.report import ReportSeries, series_from, write_report
 from fish_env.diagnosis.residual_model import ResidualModel, residual_model
@@ -29,6 +28,9 @@ from fish_env.diagnosis.writing import outputs, write_answer
 from fish_env.errors import DatasetError
 from fish_env.files import check_outputs
 from fish_env.identification.beats import with_measured_beats
+from fish_env.identification.copies import without_copies
+from fish_env.identification.recorded import recorded
+from fish_env.identification.sensors import without_outliers
 from fish_env.identification.series import SeriesProblem, series_of
 from fish_env.inference.effort import effort_of
 from fish_env.inference.estimate.fit import Fit
@@ -40,6 +42,7 @@ from fish_env.params.io import as_fish, fish_files
 from fish_env.params.schema import FishParams
 from fish_env.rigidbody.consistency import Consistency, check_consistency
 from fish_env.rigidbody.noise_floor import Floor, noise_floors
+from fish_env.rigidbody.outliers import Outliers
 
 Progress = Callable[[str], None]
 
@@ -49,6 +52,7 @@ class Diagnosis(Diagnosed):
     """Everything a diagnosis of runs found.
 
     Attributes:
+        outliers: samples of each channel that were left out.
         inputs: what is wrong with the data or their description, and the data put right, which
             everything else is about.
         final_runs: ids of the runs kept for judging.
@@ -60,6 +64,7 @@ class Diagnosis(Diagnosed):
     """
 
     dataset: Dataset
+    outliers: tuple[Outliers, ...]
     inputs: Inputs
     final_runs: tuple[str, ...]
     floors: tuple[Floor, ...]
@@ -170,6 +175,7 @@ def _diagnose_runs(
     effort = effort_of(quick)
     progress("checking the runs")
     check_runs(dataset)
+    dataset, outliers = without_outliers(without_copies(dataset))
     progress("checking signs, units and clocks")
     inputs = check_inputs(dataset, fish, seed)
     dataset = inputs.dataset
@@ -196,8 +202,8 @@ def _diagnose_runs(
     proposal = propose(found.attribution, found.verdict, found.preconditions)
     residual = found.residual if isinstance(found.residual, ResidualModel) else None
     return Diagnosis(
-        dataset=dataset, inputs=inputs, final_runs=final, floors=floors, consistency=agreed,
-        problem=problem, attribution=found.attribution, adequacy=found.adequacy,
+        dataset=dataset, outliers=outliers, inputs=inputs, final_runs=final, floors=floors,
+        consistency=agreed, problem=problem, attribution=found.attribution, adequacy=found.adequacy,
         preconditions=found.preconditions, verdict=found.verdict, localisation=place,
         misfit=misfit_of(problem, judged), gain=gain, residual=residual, next_experiment=proposal,
         budget=found.budget, seed=seed, quick=quick, runtime_s=time.perf_counter() - begin,

@@ -218,6 +218,16 @@ def _jumped(commands: FloatArray) -> BoolArray:
     return np.concatenate([[True], large.any(axis=1)])
 
 
+def jump_times(times_s: FloatArray, values: FloatArray) -> FloatArray:
+    """Times (k,) at which commands jump, s.
+
+    Args:
+        times_s: (m,) times from which each row of commands holds, s.
+        values: (m, 5) commands, SI.
+    """
+    return times_s[_jumped(values)]
+
+
 def _after(switches: FloatArray, clock: FloatArray) -> BoolArray:
     """Whether the interval before each sample lies, in part, in the moment after a jump."""
     last = np.searchsorted(switches, clock - SAME_INSTANT_S) - 1

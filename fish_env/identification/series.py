@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -36,6 +36,12 @@ from fish_env.identification.open_loop import windows, without_feedback
 from fish_env.identification.parameters import ALIKE, Baseline, changes_of, neutral_values
 from fish_env.identification.phases import settle_phases
 from fish_env.identification.runs import FINER, RunData, prepare_run
+from fish_env.identification.sensor_errors import (
+    SENSOR_ERRORS,
+    innovation_slopes,
+    sensor_slopes,
+)
+from fish_env.identification.sensors import largest_noise
 from fish_env.identification.variation import VARIATIONS
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.hypotheses import effects_of
@@ -68,7 +74,7 @@ class SeriesProblem(Problem):
     known: dict[str, Effect]
     out_of_step = ("frequency_scale", "battery_sag", "clock_scale")
     interchangeable = ALIKE
-    variations = VARIATIONS
+    variations = (*VARIATIONS, *SENSOR_ERRORS)
 
     def __init__(
         self,
@@ -230,7 +236,7 @@ class SeriesProblem(Problem):
                 small_disturbance(found.sensor_sd), phase_sd=found.phase_sd, spread=found.spread
             )
             start = max((found, small), key=replay)
-            found = fit_noise(replay, start, within, 45, self.sensor_sd if final else None)
+            found = fit_noise(replay, start, within, 45, self.largest_sensor_sd if final else None)
             if made_with.is_close(found, 0.4):
                 break
         return found
@@ -242,6 +248,11 @@ class SeriesProblem(Problem):
     def settled(self, point: Point, noise: NoiseModel) -> SeriesProblem:
         """The same problem with the likeliest starting phase of every run that has none."""
         return settle_phases(self, point, noise)
+
+    @cached_property
+    def largest_sensor_sd(self) -> FloatArray:
+        """(C,) largest white noise that a channel may have, whatever the model misses (SI)."""
+        return largest_noise(self.dataset, self.channels, self.sensor_sd)
 
     @property
     def starts_known(self) -> bool:
@@ -266,18 +277,23 @@ class SeriesProblem(Problem):
 
     @property
     def variation(self) -> FloatArray:
-        """(R, K) what each run differs in."""
-        return np.array([run.variation for run in self.runs])
+        """(R, K) what each run differs in; sensor errors are integrated out and never set."""
+        own = np.array([run.variation for run in self.runs])
+        return np.hstack([own, np.zeros((len(own), len(SENSOR_ERRORS)))])
 
     def with_variation(self, values: FloatArray) -> SeriesProblem:
         """The same problem with other numbers (R, K) of the runs."""
-        pairs = zip(self.runs, values, strict=True)
+        pairs = zip(self.runs, values[:, : len(VARIATIONS)], strict=True)
         return self.with_runs([replace(run, variation=own) for run, own in pairs])
 
     def variation_slopes(
         self, point: Point, noise: NoiseModel, filtered: Sequence[Filtered], steps: FloatArray
     ) -> FloatArray:
-        """(D, K) change of each innovation with its own run's numbers, by differences (K,)."""
+        """(D, K) change of each innovation with its own run's numbers.
+
+        By differences (K,) where the fish has to swim again, else through the filter's slopes.
+        """
+        steps = steps[: len(VARIATIONS)]
         count = 1 + len(steps)
         more = np.column_stack([np.zeros(len(steps)), np.diag(steps)])
         effects = {path: np.full(count, value) for path, value in point.effects.items()}
@@ -286,7 +302,16 @@ class SeriesProblem(Problem):
         rows = self.filter_for(effects).innovations(
             records, measurement, noise, filtered, variation=more
         )
-        return np.asarray((rows[1:] - rows[0]).T / steps)
+        own = (rows[1:] - rows[0]).T / steps
+        again = self.filtered(point, noise, keep_slopes=True)
+        sensors = [
+            innovation_slopes(
+                run.clock, run.measured, f, noise.correlation_s,
+                sensor_slopes(run.clock, f, self.channels),
+            )
+            for run, f in zip(self.runs, again, strict=True)
+        ]  # fmt: skip
+        return np.hstack([own, np.concatenate(sensors)])
 
     def generic_terms(self, fit: Any) -> BoundForces:
         """Forces and moments that depend on motion, attitude, depth, time, beat or commands."""

@@ -298,13 +298,16 @@ def backward_elimination(current: Explanation) -> Explanation:
     """The explanation without causes that later ones made unnecessary.
 
     Also without any cause whose interval, beside the others, contains its neutral value: the
-    evidence takes the residuals for white, the interval does not.
+    evidence takes the residuals for white, the interval does not. Of a single cause that is the
+    only question, for its evidence has just been found enough.
     """
-    for name in current.causes if len(current.causes) > 1 else ():
+    alone = len(current.causes) == 1
+    for name in current.causes:
+        doubtful = may_not_act(current.fit, name)
+        if alone and not doubtful:
+            return current
         smaller = without(current, name)
-        if smaller and (
-            smaller.score < current.score + POLICY.evidence_doubt or may_not_act(current.fit, name)
-        ):
+        if smaller and (doubtful or smaller.score < current.score + POLICY.evidence_doubt):
             return backward_elimination(smaller)
     return current
 

@@ -125,14 +125,19 @@ def of_visible(
 
 
 def causes_of(problem: Problem) -> tuple[Cause, ...]:
-    """Every cause that can be considered for a problem."""
+    """Every cause that can be considered for a problem.
+
+    One physical cause has one name: a coefficient that an effect equals goes by the effect's.
+    """
     step = problem.longest_step
     length = problem.longest_run
     effects = [
         Cause(effect.name, each_alone(probes_of(effect, step, length)))
         for effect in problem.known.values()
     ]
-    coefficients = [Cause(f"{PARAMETER}{p}", path=p) for p in problem.baseline.paths]
+    named = {path for effect in problem.known.values() for path in effect.equals}
+    paths = [path for path in problem.baseline.paths if path not in named]
+    coefficients = [Cause(f"{PARAMETER}{p}", path=p) for p in paths]
     return (*effects, *coefficients)
 
 

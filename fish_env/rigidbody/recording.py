@@ -24,6 +24,7 @@ class RecordedRun:
         channels: values by channel, each (n,), NaN where a sample is missing.
         switches_s: (m,) times at which commands change, s; rates may have a kink there.
         jerks_s: (k,) those at which a part that moves makes rates leap between samples, s.
+        jumps_s: (l,) those at which a command jumps, so that rates may leap, s.
         still_s: (j, 2) begin and end of stretches in which nothing drives the vehicle, s.
         from_rest: whether the run is declared to begin level and at rest.
         repeats: equal for runs that repeat each other from rest; None for a run that repeats none.
@@ -35,6 +36,7 @@ class RecordedRun:
     switches_s: FloatArray
     jerks_s: FloatArray = field(default_factory=lambda: np.zeros(0))
     still_s: FloatArray = field(default_factory=lambda: np.zeros((0, 2)))
+    jumps_s: FloatArray = field(default_factory=lambda: np.zeros(0))
     from_rest: bool = False
     repeats: Hashable | None = None
 

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from fish_env.diagnosis.recorded import recorded
 from fish_env.effects import catalogue
+from fish_env.identification.recorded import recorded
 from fish_env.rigidbody import kinematic_fit
 from fish_env.rigidbody.consistency import (
     NEEDS,

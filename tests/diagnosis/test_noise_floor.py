@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fish_env.data import CommandSteps, Dataset, Run
-from fish_env.diagnosis.recorded import recorded
+from fish_env.identification.recorded import recorded
 from fish_env.rigidbody.noise_floor import (
     _contrasts,
     _correlation,

@@ -3,43 +3,70 @@
 import numpy as np
 import pytest
 
-from fish_env.inference.estimate.run_variation import Likelihood, Marginal, fit_spread
+from fish_env.inference.estimate.run_variation import (
+    Likelihood,
+    Marginal,
+    RunVariation,
+    fit_spread,
+)
 
 RUNS, PER_RUN = 8, 200
 
 
-def record(seed, spreads=(0.0, 0.0)):
+def variations(shared):
+    return [RunVariation(name, "1", 1.0, shared) for name in ("first", "second")]
+
+
+def record(seed, spreads=(0.0, 0.0), mean=0.0):
     """Residuals of a linear model whose runs differ in two numbers."""
     rng = np.random.default_rng(seed)
     run_of = np.repeat(np.arange(RUNS), PER_RUN)
     own = rng.standard_normal((RUNS * PER_RUN, 2))
     shared = rng.standard_normal((RUNS * PER_RUN, 3))
     values = rng.standard_normal((RUNS, 2)) * np.asarray(spreads)
+    values[:, 1] += mean
     noise = rng.standard_normal(RUNS * PER_RUN)
     residuals = noise + np.einsum("dk,dk->d", own, values[run_of])
     residuals = residuals - shared @ np.linalg.lstsq(shared, residuals, rcond=None)[0]
     return residuals, shared, own, run_of, values
 
 
-def likelihood(seed, spreads=(0.0, 0.0)):
-    residuals, shared, own, run_of, values = record(seed, spreads)
+def likelihood(seed, spreads=(0.0, 0.0), mean=0.0, may_share=True):
+    residuals, shared, own, run_of, values = record(seed, spreads, mean)
     information = shared.T @ shared + np.eye(3)
     at = np.zeros((RUNS, 2))
-    return Likelihood(residuals, shared, own, at, run_of, information, np.zeros(3)), values
+    common = np.full(2, not may_share)
+    found = Likelihood(residuals, shared, own, at, run_of, information, np.zeros(3), common)
+    return found, values
 
 
 def test_runs_that_do_not_differ_have_no_spread():
-    found = [fit_spread(likelihood(seed)[0], np.ones(2)).sd for seed in range(40)]
+    found = [fit_spread(likelihood(seed)[0], variations(True)).sd for seed in range(40)]
     assert np.mean([sd.any() for sd in found]) <= 0.05
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_what_differs_is_found_and_what_does_not_is_not(seed):
     own, values = likelihood(seed, (0.0, 1.5))
-    found = fit_spread(own, np.ones(2))
+    found = fit_spread(own, variations(True))
     assert found.sd[0] == 0.0
     assert found.sd[1] == pytest.approx(np.std(values[:, 1]), rel=0.35)
     assert np.all(np.abs(found.values[:, 1] + values[:, 1]) < 4.0 * found.errors[:, 1] + 1e-9)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_all_runs_have_in_common_is_no_variation_unless_it_may_be_shared(seed):
+    apart, values = likelihood(seed, (0.0, 0.3), mean=2.0, may_share=False)
+    found = fit_spread(apart, variations(False))
+    assert found.sd[1] == pytest.approx(np.std(values[:, 1], ddof=1), rel=0.4)
+    together, values = likelihood(seed, (0.0, 0.3), mean=2.0)
+    found = fit_spread(together, variations(True))
+    assert found.sd[1] == pytest.approx(np.sqrt(np.mean(values[:, 1] ** 2)), rel=0.2)
+
+
+def test_nothing_shared_is_far_beyond_the_usual():
+    far, _ = likelihood(0, (0.0, 0.0), mean=20.0)
+    assert fit_spread(far, variations(True)).sd[1] == pytest.approx(variations(True)[1].largest)
 
 
 def test_the_restricted_likelihood_is_that_of_the_whole_covariance():

@@ -17,9 +17,9 @@ from fish_env.diagnosis.inputs.fine import BIAS, Fine, fine_clock
 from fish_env.diagnosis.inputs.ratios import ratio_near
 from fish_env.diagnosis.inputs.search import Found, search
 from fish_env.diagnosis.inputs.weighing import BEAT, Scales
-from fish_env.diagnosis.recorded import recorded
 from fish_env.errors import DatasetError
 from fish_env.identification.beats import own_ratio
+from fish_env.identification.recorded import recorded
 from fish_env.inference.input_faults import InputFault
 from fish_env.params.io import load_fish
 from fish_env.params.schema import FishParams

@@ -18,7 +18,7 @@ from fish_env.diagnosis.inputs.orders import Stroke, stroke_of
 from fish_env.diagnosis.inputs.ratios import CLEAR, beat_ratio, clock_ratio
 from fish_env.diagnosis.inputs.skews import Aligner, near_skew, skews
 from fish_env.diagnosis.inputs.weighing import Scales, Weighed
-from fish_env.diagnosis.recorded import recorded
+from fish_env.identification.recorded import recorded
 from fish_env.rigidbody.gridded import gridded
 
 GROSS = 0.1

@@ -14,7 +14,7 @@ from fish_env.diagnosis.inputs.clock_changes import skew
 from fish_env.diagnosis.inputs.orders import Stroke, explained, stroke_of, windows_of
 from fish_env.diagnosis.inputs.responses import BEAT_S, Simulated, simulate
 from fish_env.diagnosis.inputs.weighing import LEAST
-from fish_env.diagnosis.recorded import recorded
+from fish_env.identification.recorded import recorded
 from fish_env.rigidbody.gridded import GridRun, averaged, gridded, grown
 from fish_env.simulator import Simulator
 

@@ -10,7 +10,7 @@ import numpy as np
 from fish_env.data.schema import CommandSteps, Dataset, Run
 from fish_env.diagnosis.inputs.orders import Stroke, explained, stroke_of, windows_of
 from fish_env.diagnosis.inputs.responses import STEP_S, Simulated, responses, simulate
-from fish_env.diagnosis.recorded import recorded
+from fish_env.identification.recorded import recorded
 from fish_env.params.schema import FishParams
 from fish_env.rigidbody.comparisons import Comparison
 from fish_env.rigidbody.gridded import GridRun, gridded

@@ -236,7 +236,7 @@ def predicted_variation(
     residuals = np.concatenate([f.residuals for f in filtered])
     values[:, active] = marginal.predicted(residuals) * spreads[active]
     problem = problem.with_variation(values)
-    return problem, replace(marginal, at=values[:, active] / spreads[active])
+    return problem, replace(marginal, at=problem.variation[:, active] / spreads[active])
 
 
 def evaluated(problem: P, point: Point, noise: Any) -> tuple[P, Sequence[Any]]:

@@ -18,7 +18,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import minimize
 
-from fish_env.arrays import FloatArray, IntArray
+from fish_env.arrays import BoolArray, FloatArray, IntArray
 from fish_env.inference.estimate.products import inner
 from fish_env.inference.policy import POLICY
 
@@ -26,8 +26,10 @@ SMALLEST = 1e-3
 """Spread, in units of the usual one, that counts as none."""
 LARGEST = 30.0
 """Largest spread that is looked for, in units of the usual one."""
-SIZES = np.geomspace(0.1, 10.0, 9)
+SIZES = np.geomspace(0.1, 10.0, 7)
 """Spreads that are tried before one is looked for exactly, in units of the usual one."""
+WIDE = 0.01
+"""Precision of what all runs have in common, in usual spreads: hardly any."""
 
 
 @dataclass(frozen=True)
@@ -38,11 +40,20 @@ class RunVariation:
         name: what it is.
         unit: SI.
         usual: standard deviation over runs that is ordinary; what is estimated is judged by it.
+        shared: whether runs may as well have it in common. If not, only differences between runs
+            count as variation: what all runs have in common is a cause, to be found and named.
+            What they may share is not taken to be far beyond the usual, which again is a cause.
     """
 
     name: str
     unit: str
     usual: float
+    shared: bool = False
+
+    @property
+    def largest(self) -> float:
+        """Largest spread, in usual ones, that is taken for variation."""
+        return POLICY.beyond_usual if self.shared else LARGEST
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,6 +157,8 @@ class Likelihood:
         run_of: (D,) run of each residual.
         information: (n, n) of the shared parameters with their prior.
         pull: (n,) gradient of the shared parameters' prior at the estimates.
+        common: (K,) whether what all runs have in common is a parameter of its own, which no
+            spread has to explain.
     """
 
     def __init__(
@@ -157,15 +170,20 @@ class Likelihood:
         run_of: IntArray,
         information: FloatArray,
         pull: FloatArray,
+        common: BoolArray,
     ) -> None:
         shifted = residuals - np.einsum("dk,dk->d", own, at[run_of])
         edges = np.searchsorted(run_of, np.arange(len(at) + 1))
         slices = [slice(a, b) for a, b in pairwise(edges.tolist())]
         self.grams = [own[s].T @ own[s] for s in slices]
-        self.cross = [own[s].T @ slopes[s] for s in slices]
+        cross = [own[s].T @ slopes[s] for s in slices]
+        self.cross = [np.hstack([c, g[:, common]]) for c, g in zip(cross, self.grams, strict=True)]
         self.scores = [own[s].T @ shifted[s] for s in slices]
-        self.information = information
-        self.gradient = inner(slopes, shifted[:, None])[:, 0] + pull
+        mixed = np.sum(cross, axis=0)[common]
+        both = np.sum(self.grams, axis=0)[np.ix_(common, common)] + WIDE * np.eye(common.sum())
+        self.information = np.block([[information, mixed.T], [mixed, both]])
+        pulls = inner(slopes, shifted[:, None])[:, 0] + pull
+        self.gradient = np.r_[pulls, np.sum(self.scores, axis=0)[common]]
 
     def __call__(self, sd: FloatArray) -> float:
         """-2 log likelihood of spreads (K,), but for a constant."""
@@ -203,35 +221,40 @@ def _kept(gram: FloatArray, sd: FloatArray) -> tuple[FloatArray, FloatArray]:
     return np.eye(len(sd)) + factor @ gram @ factor, factor
 
 
-def fit_spread(likelihood: Likelihood, usual: FloatArray) -> Spread:
+def fit_spread(likelihood: Likelihood, variations: Sequence[RunVariation]) -> Spread:
     """Spreads of largest restricted likelihood; none that is not strongly indicated.
 
-    Spreads are added one at a time, the most indicated first, while one gains :data:`GAIN`.
+    Spreads are added one at a time, the most indicated first, while one gains enough.
 
     Args:
         likelihood: of spreads in units of the usual ones.
-        usual: (K,) usual spreads in SI units.
+        variations: what the runs may differ in, K of them.
     """
-    count = len(usual)
+    count = len(variations)
+    usual = np.array([variation.usual for variation in variations])
+    largest = np.array([variation.largest for variation in variations])
     sd, none = np.zeros(count), likelihood(np.zeros(count))
     active: list[int] = []
     best = none
     while len(active) < count:
-        added = [_alone(likelihood, sd, i) for i in range(count) if i not in active]
+        left = [i for i in range(count) if i not in active]
+        added = [_alone(likelihood, sd, i, float(largest[i])) for i in left]
         value, i, size = min(added)
         if best - value < POLICY.run_variation_gain:
             break
         active.append(i)
         sd[i] = size
-        sd, best = _largest(likelihood, count, active, sd)
+        sd, best = _largest(likelihood, largest, active, sd)
     values, errors = likelihood.predicted(sd)
     return Spread(sd * usual, none - best, values * usual, errors * usual)
 
 
-def _alone(likelihood: Likelihood, sd: FloatArray, i: int) -> tuple[float, int, float]:
+def _alone(
+    likelihood: Likelihood, sd: FloatArray, i: int, largest: float
+) -> tuple[float, int, float]:
     """-2 log likelihood of one more spread at its best size, which one, and that size."""
     trials = []
-    for size in SIZES:
+    for size in SIZES[largest > SIZES]:
         trial = sd.copy()
         trial[i] = size
         trials.append((likelihood(trial), i, float(size)))
@@ -239,17 +262,17 @@ def _alone(likelihood: Likelihood, sd: FloatArray, i: int) -> tuple[float, int, 
 
 
 def _largest(
-    likelihood: Likelihood, count: int, active: Sequence[int], begin: FloatArray
+    likelihood: Likelihood, largest: FloatArray, active: Sequence[int], begin: FloatArray
 ) -> tuple[FloatArray, float]:
     """Spreads (K,) of largest likelihood with only some of them active, and -2 log of it."""
-    sd, own = np.zeros(count), list(active)
+    sd, own = np.zeros(len(largest)), list(active)
 
     def value(logs: FloatArray) -> float:
-        trial = np.zeros(count)
+        trial = np.zeros(len(largest))
         trial[own] = np.exp(logs)
         return likelihood(trial)
 
-    limits = [(float(np.log(SMALLEST)), float(np.log(LARGEST)))] * len(own)
+    limits = [(float(np.log(SMALLEST)), float(np.log(largest[i]))) for i in own]
     found = minimize(value, np.log(begin[own]), method="L-BFGS-B", bounds=limits)
     sd[own] = np.exp(found.x)
     sd[sd <= 2.0 * SMALLEST] = 0.0

@@ -8,6 +8,7 @@ from fish_env.arrays import FloatArray
 from fish_env.data.schema import Dataset, Run
 from fish_env.data.units import SI_UNIT
 from fish_env.data.vocabulary import CHANNELS, COMMANDS
+from fish_env.identification.runs import jump_times
 from fish_env.rigidbody.recording import RecordedRun, Recording
 
 _BLOCK = [i for i, name in enumerate(COMMANDS) if name.startswith("block_")]
@@ -36,6 +37,7 @@ def recorded_run(run: Run) -> RecordedRun:
         steps.times_s,
         steps.times_s[1:][moves],
         _still_stretches(run),
+        jump_times(steps.times_s, steps.values),
         from_rest,
         repeats,
     )

@@ -1,0 +1,147 @@
+"""What mounting and calibration of sensors leave, as small errors that every record may have.
+
+A marker sits beside the origin, an inertial unit is screwed on a little askew, a compass bends with
+the heading, a camera looks down at an angle and into water, devices are late by some hundredths of
+a second. Each is linear in one number as long as it is small, with regressors that follow from the
+filtered motion. So no fish has to swim again to see what it does: the filter's own slopes carry a
+change of the measurements through to its innovations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fish_env.arrays import FloatArray
+from fish_env.identification.channels import BY_NAME, Kind
+from fish_env.identification.filtering import Filtered
+from fish_env.identification.state_blocks import N_ERROR, N_MOVING
+from fish_env.inference.estimate.run_variation import RunVariation
+from fish_env.model.frames import euler_from_quaternion
+from fish_env.rigidbody.kinematics import euler_rates, rotations
+
+DEGREE = float(np.deg2rad(1.0))
+SENSOR_ERRORS = (
+    RunVariation("marker_x", "m", 0.01, shared=True),
+    RunVariation("marker_y", "m", 0.01, shared=True),
+    RunVariation("marker_z", "m", 0.01, shared=True),
+    RunVariation("mounting_roll", "rad", DEGREE, shared=True),
+    RunVariation("mounting_pitch", "rad", DEGREE, shared=True),
+    RunVariation("mounting_yaw", "rad", DEGREE, shared=True),
+    RunVariation("gyro_gain_p", "1", 0.01, shared=True),
+    RunVariation("gyro_gain_q", "1", 0.01, shared=True),
+    RunVariation("gyro_gain_r", "1", 0.01, shared=True),
+    RunVariation("compass_sin_yaw", "rad", DEGREE, shared=True),
+    RunVariation("compass_cos_yaw", "rad", DEGREE, shared=True),
+    RunVariation("compass_sin_2_yaw", "rad", DEGREE, shared=True),
+    RunVariation("compass_cos_2_yaw", "rad", DEGREE, shared=True),
+    RunVariation("camera_roll", "rad", DEGREE, shared=True),
+    RunVariation("camera_pitch", "rad", DEGREE, shared=True),
+    RunVariation("camera_scale_per_depth", "1/m", 0.15, shared=True),
+    RunVariation("camera_delay", "s", 0.02, shared=True),
+    RunVariation("inertial_delay", "s", 0.02, shared=True),
+    RunVariation("depth_delay", "s", 0.02, shared=True),
+)
+"""Usual sizes: a centimetre, a degree, one per cent, a frame of a camera; the picture of a camera
+some metres above the water shrinks with depth, by the refractive index and its height."""
+_INDEX = {error.name: i for i, error in enumerate(SENSOR_ERRORS)}
+_DEVICE = {
+    **dict.fromkeys(("x", "y", "u", "v", "w"), "camera_delay"),
+    **dict.fromkeys(("roll", "pitch", "yaw", "p", "q", "r"), "inertial_delay"),
+    "z": "depth_delay",
+}
+_ATTITUDE, _RATES, _PLACE = ("roll", "pitch", "yaw"), ("p", "q", "r"), ("x", "y", "z")
+
+
+def sensor_slopes(clock: FloatArray, filtered: Filtered, channels: Sequence[str]) -> FloatArray:
+    """Change of every sample by every sensor error, at the filtered motion, shape (T, C, K).
+
+    Args:
+        clock: (T,) times of the samples (s).
+        filtered: the run filtered.
+        channels: names of its C channels.
+    """
+    states = filtered.states
+    euler = np.unwrap(euler_from_quaternion(states[:, 3:7]), axis=0)
+    rates = states[:, [BY_NAME[name].index for name in _RATES]]
+    place = states[:, :3] - states[0, :3]
+    found = np.zeros((len(clock), len(channels), len(SENSOR_ERRORS)))
+    at = {name: i for i, name in enumerate(channels)}
+    for name, i in at.items():
+        if name in _DEVICE:
+            found[:, i, _INDEX[_DEVICE[name]]] = -np.gradient(_value(name, states, euler), clock)
+    turns, kinematics = rotations(euler), euler_rates(euler)
+    for k, axis in enumerate(_PLACE):
+        for j, name in enumerate(_PLACE):
+            _put(found, at, name, f"marker_{axis}", turns[:, j, k])
+    for k, angle in enumerate(_ATTITUDE):
+        for j, name in enumerate(_ATTITUDE):
+            _put(found, at, name, f"mounting_{angle}", kinematics[:, j, k])
+        swung = np.cross(rates, np.eye(3)[k])
+        for j, name in enumerate(_RATES):
+            _put(found, at, name, f"mounting_{angle}", swung[:, j])
+    for j, name in enumerate(_RATES):
+        _put(found, at, name, f"gyro_gain_{name}", rates[:, j])
+    yaw = euler[:, 2]
+    for turn, label in ((1.0, ""), (2.0, "2_")):
+        _put(found, at, "yaw", f"compass_sin_{label}yaw", np.sin(turn * yaw))
+        _put(found, at, "yaw", f"compass_cos_{label}yaw", np.cos(turn * yaw))
+    depth = place[:, 2]
+    _put(found, at, "x", "camera_pitch", depth)
+    _put(found, at, "y", "camera_roll", -depth)
+    for j, name in enumerate(("x", "y")):
+        _put(found, at, name, "camera_scale_per_depth", -place[:, j] * depth)
+    return found
+
+
+def _value(name: str, states: FloatArray, euler: FloatArray) -> FloatArray:
+    channel = BY_NAME[name]
+    return euler[:, channel.index] if channel.kind == Kind.EULER else states[:, channel.index]
+
+
+def _put(
+    found: FloatArray, at: dict[str, int], channel: str, error: str, values: FloatArray
+) -> None:
+    if channel in at:
+        found[:, at[channel], _INDEX[error]] += values
+
+
+def innovation_slopes(
+    clock: FloatArray,
+    measured: FloatArray,
+    filtered: Filtered,
+    correlation_s: float,
+    changes: FloatArray,
+) -> FloatArray:
+    """Change of whitened innovations by changes of the measurements, shape (T C, K).
+
+    The filter's gains are held, as everywhere where parameters are compared.
+
+    Args:
+        clock: (T,) times of the samples (s).
+        measured: (T, C), NaN where missing.
+        filtered: the run filtered, with its slopes.
+        correlation_s: of the disturbance that it was filtered with (s).
+        changes: (T, C, K) of the measurements.
+
+    Raises:
+        ValueError: the filter kept no slopes.
+    """
+    slopes = filtered.slopes
+    if slopes is None:
+        raise ValueError("filter the run with keep_slopes=True")
+    changes = np.where(np.isfinite(measured)[:, :, None], changes, 0.0)
+    keep = np.exp(-np.diff(clock, prepend=clock[0]) / correlation_s)
+    stray = np.zeros((N_ERROR, changes.shape[2]))
+    found = np.empty_like(changes)
+    for t in range(len(clock)):
+        if t:
+            moved = stray.copy()
+            moved[:N_MOVING] = slopes.motion[t] @ stray
+            moved[N_MOVING:-1] *= keep[t]
+            stray = moved
+        raw = changes[t] - slopes.channels[t] @ stray
+        found[t] = filtered.whitening[t] @ raw
+        stray = stray + filtered.gains[t] @ raw
+    return found.reshape(-1, changes.shape[2])

@@ -1,0 +1,63 @@
+"""What the sensors of a fish do to its record: outliers, and how noisy they may be at most."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from fish_env.arrays import FloatArray
+from fish_env.data.schema import Dataset
+from fish_env.identification.recorded import recorded
+from fish_env.rigidbody.outliers import Outliers, outliers_of
+
+TELLING = 1e-4
+"""Share of the samples of a channel from which outliers are told in words."""
+
+
+def without_outliers(dataset: Dataset) -> tuple[Dataset, tuple[Outliers, ...]]:
+    """A dataset whose outliers are missing samples, and what was left out by channel.
+
+    Args:
+        dataset: measured runs.
+    """
+    found = outliers_of(recorded(dataset))
+    if not any(one.count for one in found):
+        return dataset, found
+    runs = tuple(
+        replace(
+            run,
+            channels={
+                one.channel: np.where(one.flagged[i], np.nan, run.channels[one.channel])
+                for one in found
+            },
+        )
+        for i, run in enumerate(dataset.runs)
+    )
+    return replace(dataset, runs=runs, notes=(*dataset.notes, *sentences(found))), found
+
+
+def largest_noise(dataset: Dataset, channels: tuple[str, ...], least: FloatArray) -> FloatArray:
+    """(C,) what neighbours do not predict of each channel: its white noise is at most this, SI.
+
+    A sensor may be noisier while the fish moves than in quiet stretches, or its clock may jitter.
+
+    Args:
+        dataset: measured runs.
+        channels: channels (C,).
+        least: (C,) what quiet stretches show, SI.
+    """
+    found = {one.channel: one.noise_sd for one in outliers_of(recorded(dataset))}
+    return np.maximum(least, [found[name] or 0.0 for name in channels])
+
+
+def sentences(found: tuple[Outliers, ...]) -> list[str]:
+    """What a reader should know about outliers."""
+    many = [one for one in found if one.share > TELLING]
+    if not many:
+        return []
+    said = ", ".join(f"{one.channel} {one.count} ({100.0 * one.share:.2g} %)" for one in many)
+    return [
+        f"Samples far off those beside them were left out as outliers: {said}. They enter no "
+        "fit and no score."
+    ]

@@ -1,0 +1,60 @@
+"""Sensor errors: their way through the filter is that of spoilt data; marginal data name nothing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fish_env.identification.sensor_errors import SENSOR_ERRORS, innovation_slopes, sensor_slopes
+from fish_env.identification.series import SeriesProblem
+from fish_env.inference.problem import Point
+from tests.identification.synthetic import PATHS, Setup, simulate
+
+NAMES = [error.name for error in SENSOR_ERRORS]
+
+
+@pytest.fixture(scope="module")
+def filtered():
+    setup = Setup(runs=1, missing=0.05)
+    problem = SeriesProblem(simulate(setup), paths=PATHS)
+    point = Point(np.zeros(len(PATHS)), {})
+    return problem, point, setup.noise, problem.filtered(point, setup.noise, keep_slopes=True)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_filter_takes_a_change_of_its_data_as_the_slopes_say(filtered, name):
+    problem, point, noise, results = filtered
+    (run,), (result,) = problem.runs, results
+    changes = sensor_slopes(run.clock, result, problem.channels)
+    slopes = innovation_slopes(run.clock, run.measured, result, noise.correlation_s, changes)
+    k = NAMES.index(name)
+    size = 0.1 * SENSOR_ERRORS[k].usual
+    # The first sample also says where the run starts, which is another matter.
+    measured = run.measured + size * changes[:, :, k]
+    spoilt = problem.with_runs([replace(run, measured=measured)])
+    z = point.z[:, None]
+    before, after = (p.innovations(z, {}, noise, results)[0] for p in (problem, spoilt))
+    expected = size * slopes[:, k]
+    assert np.linalg.norm(expected) > 0.0
+    assert np.linalg.norm(after - before - expected) < 0.05 * np.linalg.norm(expected)
+
+
+def test_a_late_camera_is_what_its_regressor_says(filtered):
+    problem, _, _, (result,) = filtered
+    (run,) = problem.runs
+    changes = sensor_slopes(run.clock, result, problem.channels)
+    x = result.states[:, 0]
+    delay = 0.01
+    late = np.interp(run.clock - delay, run.clock, x) - x
+    own = delay * changes[:, problem.channels.index("x"), NAMES.index("camera_delay")]
+    assert np.linalg.norm((late - own)[1:]) < 0.15 * np.linalg.norm(late[1:])
+
+
+def test_slopes_need_a_filter_that_kept_them(filtered):
+    problem, point, noise, _ = filtered
+    (run,), (result,) = problem.runs, problem.filtered(point, noise)
+    changes = sensor_slopes(run.clock, result, problem.channels)
+    with pytest.raises(ValueError, match="keep_slopes"):
+        innovation_slopes(run.clock, run.measured, result, noise.correlation_s, changes)

@@ -32,7 +32,7 @@ from fish_env.params.schema import FishParams
 Report = Callable[[str], None]
 Errors = dict[str, float]
 """Quantity -> mean absolute error of a run, SI."""
-STEPS = 8
+STEPS = 4
 """Most Gauss-Newton steps of a fit that begins at one close by."""
 
 

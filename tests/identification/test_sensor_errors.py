@@ -1,4 +1,4 @@
-"""Sensor errors: their way through the filter is that of spoilt data; marginal data name nothing."""
+"""Sensor errors: they go through the filter as spoilt data do; marginal data name nothing."""
 
 from __future__ import annotations
 

@@ -8,7 +8,6 @@ from fish_env.identification import WholeRunProblem
 from fish_env.identification.whole_runs.fitting import (
     fit_whole_runs,
     identified_fish,
-    shown_parameters,
 )
 from fish_env.identification.whole_runs.noise import (
     SimulationNoise,
@@ -131,11 +130,11 @@ def test_the_fish_carries_what_was_found(found):
     assert fish.posterior.validity["tail_offset"] == [-0.35, 0.35]
 
 
-def test_parameters_that_no_channel_shows_are_known():
-    problem = WholeRunProblem(swum(seconds=3.0), paths=PATHS, effects=["linear_drag"])
-    values = {f"effects.linear_drag.{name}": 0.2 for name in ("surge", "sway", "heave")}
-    shown = shown_parameters(problem, values)
-    assert shown == {"effects.linear_drag.surge", "effects.linear_drag.sway"}
+def test_parameters_that_no_channel_shows_are_not_free():
+    """A camera overhead sees no heave: drag there would be anything."""
+    problem = WholeRunProblem(swum(seconds=5.0), paths=PATHS, effects=["linear_drag"])
+    free = {freedom.path for freedom in problem.freedoms(["linear_drag"])}
+    assert free == {"effects.linear_drag.surge", "effects.linear_drag.sway"}
 
 
 def test_forces_can_be_looked_for_in_whole_runs(found):

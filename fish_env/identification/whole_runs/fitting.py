@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -27,7 +27,6 @@ FIRST_STEPS, STEPS = 15, 40
 """Most Gauss-Newton steps under forgiving weights, and under those that count."""
 KEPT = 0.5
 """Coefficients fitted without the effects have gone far to make up for them: half is kept."""
-FEW_RUNS, SILENT = 3, 0.01
 SHARE = 0.15
 """Share of an effect's plausible range to begin from: at neutral many an effect is flat."""
 
@@ -82,12 +81,8 @@ def _near(problem: WholeRunProblem, report: Callable[[str], None]) -> tuple[Whol
 
 
 def _effects_on(problem: WholeRunProblem, names: Sequence[str]) -> dict[str, float]:
-    """Effects a little on, by parameter; those of the fish's file stay as they are.
-
-    A parameter that the runs do not show stays neutral: no slope would bring it back.
-    """
-    neutral = problem.beginning(names)
-    values = dict(neutral)
+    """Effects a little on, by parameter; those of the fish's file stay as they are."""
+    values = problem.beginning(names)
     for name in names:
         if name in problem.fish.effects or name == FREQUENCY_SCALE:
             continue
@@ -95,30 +90,7 @@ def _effects_on(problem: WholeRunProblem, names: Sequence[str]) -> dict[str, flo
             path, (low, high) = parameter_path(name, p.name), p.plausible
             far = high if abs(high - values[path]) >= abs(low - values[path]) else low
             values[path] += SHARE * (far - values[path])
-    shown = shown_parameters(problem, values)
-    return {path: value if path in shown else neutral[path] for path, value in values.items()}
-
-
-def shown_parameters(problem: WholeRunProblem, values: Mapping[str, float]) -> set[str]:
-    """Effect parameters whose change by a tenth changes what is measured, in units of the noise.
-
-    Args:
-        problem: the runs.
-        values: effect parameter -> value, beside nominal coefficients.
-    """
-    few = problem.some(problem.spread(FEW_RUNS))
-    count = 1 + len(values)
-    effects = {path: np.full(count, value) for path, value in values.items()}
-    for i, path in enumerate(values, start=1):
-        effects[path][i] *= 0.9
-    z = np.zeros((len(problem.baseline), count))
-    own = [np.repeat(kind.guess[:, None], count, axis=1) for kind in few.own]
-    moved = np.zeros(count)
-    for errors in few.errors(z, effects, own):
-        away = np.abs(np.nan_to_num(errors - errors[:1]) / np.array(few.default_noise().sd))
-        away = away.reshape(count, -1)
-        moved = np.maximum(moved, away.max(axis=1))
-    return {path for path, change in zip(values, moved[1:], strict=True) if change > SILENT}
+    return values
 
 
 def _begun(found: Fit) -> WholeRunProblem:
@@ -134,24 +106,12 @@ def identified_fish(found: Fit, name: str) -> FishParams:
         name: name of the new fish.
     """
     problem = whole_runs_of(found)
-    count = len(problem.baseline)
-    seen = [i for i in range(len(found.names)) if i < count or _shows(found, i)]
-    posterior = posterior_of(
-        tuple(found.names[i] for i in seen),
-        found.estimates[seen],
-        found.covariance[np.ix_(seen, seen)],
-        validity(found),
-    )
+    posterior = posterior_of(found.names, found.estimates, found.covariance, validity(found))
     source = (
         f"identified from {problem.run_count} runs of {problem.dataset.name} over their whole "
         "length"
     )
     return with_posterior(problem.fish, posterior, name, source)
-
-
-def _shows(found: Fit, i: int) -> bool:
-    """Whether the runs show a parameter at all."""
-    return bool(np.abs(found.linearised.slopes[:, i]).max() > 0.0)
 
 
 def validity(found: Fit) -> dict[str, Any]:

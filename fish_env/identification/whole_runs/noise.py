@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fish_env.arrays import FloatArray
+from fish_env.identification.channels import BY_NAME
 from fish_env.identification.runs import RunData
 
 SPEED_CHANNELS = {"x": 0, "y": 0, "z": 0, "roll": 1, "pitch": 1, "yaw": 1}
@@ -15,6 +16,13 @@ SPEED_CHANNELS = {"x": 0, "y": 0, "z": 0, "roll": 1, "pitch": 1, "yaw": 1}
 DRIFTS = ((0.003, 0.02, 3.0), (0.0015, 0.008, 5.0))
 """Errors of speed (m/s) and rate (rad/s), and how long they last (s), that the first and the second
 fit of a series allow for: a start far off then still finds its way."""
+
+FIRST_SD = {"m": 0.01, "rad": 0.05, "m/s": 0.02, "rad/s": 0.1}
+"""Errors of a simulation by the unit of the channel, to begin from."""
+FIRST_SAMPLES, FEWEST_SAMPLES = 15.0, 10.0
+"""Independent samples of a run: to begin from, and at least (a start has eight numbers)."""
+LEAST_FREEDOM = 0.2
+"""Share of the samples that is counted as free, however many numbers follow them."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +79,43 @@ class SimulationNoise:
                 white[np.ix_(good, good)] = np.linalg.inv(np.linalg.cholesky(own))
             found.append(white)
         return found
+
+
+def first_noise(channels: Sequence[str]) -> SimulationNoise:
+    """A centimetre and 0.05 rad, with fifteen independent samples a run."""
+    sd = tuple(FIRST_SD[BY_NAME[name].unit] for name in channels)
+    return SimulationNoise(sd, (FIRST_SAMPLES,) * len(sd))
+
+
+def fitted_errors(
+    noise: SimulationNoise,
+    runs: Sequence[RunData],
+    errors: Sequence[FloatArray],
+    lost: FloatArray,
+    floors: FloatArray,
+    final: bool,
+) -> SimulationNoise:
+    """Errors of each channel of largest likelihood, by the freedom that a fit left them.
+
+    Args:
+        noise: present noise model.
+        runs: R runs.
+        errors: of each run, (T, C) measured less simulated, NaN where nothing was measured.
+        lost: (C or more,) how many residuals of each channel the fit follows.
+        floors: (C,) noise of the sensors; a simulation errs by half of it at least.
+        final: whether the errors are those of a fit, so that their correlation in time is theirs.
+    """
+    sd, samples = [], []
+    for i, floor in enumerate(floors.tolist()):
+        counted = np.array([noise.counted(run)[i] for run in runs])
+        own = [each[:, i] for each in errors]
+        squares = np.array([np.mean(each[np.isfinite(each)] ** 2) for each in own])
+        total = float(counted.sum())
+        freedom = max(total - float(lost[i]), LEAST_FREEDOM * total)
+        sd.append(max(float(np.sqrt(counted @ squares / freedom)), 0.5 * floor))
+        found = independent_samples(own) if final else noise.samples[i]
+        samples.append(max(found, FEWEST_SAMPLES))
+    return SimulationNoise(tuple(sd), tuple(samples))
 
 
 def integrated_ou(time_s: FloatArray, memory_s: float) -> FloatArray:

@@ -17,15 +17,15 @@ import numpy as np
 from fish_env.arrays import BoolArray, FloatArray, IntArray
 from fish_env.data.schema import Dataset
 from fish_env.identification.beats import beats_of, by_run
-from fish_env.identification.channels import BY_NAME
 from fish_env.identification.filtering import Pushes
 from fish_env.identification.parameters import ALIKE, PLANAR_PATHS, VERTICAL
 from fish_env.identification.runs import RunData
 from fish_env.identification.series import SeriesProblem
 from fish_env.identification.whole_runs.evaluation import RunEvaluation
 from fish_env.identification.whole_runs.forces import forces_of
-from fish_env.identification.whole_runs.noise import SimulationNoise, independent_samples
+from fish_env.identification.whole_runs.noise import SimulationNoise, first_noise, fitted_errors
 from fish_env.identification.whole_runs.own_numbers import PACE, own_numbers
+from fish_env.identification.whole_runs.shown import shown_parameters
 from fish_env.identification.whole_runs.simulation import simulation_errors
 from fish_env.identification.whole_runs.starts import (
     MORE_STEPS,
@@ -33,7 +33,7 @@ from fish_env.identification.whole_runs.starts import (
     fit_own_numbers,
     likeliest,
 )
-from fish_env.inference.hypotheses import parameter_path
+from fish_env.inference.hypotheses import effect_of, parameter_path
 from fish_env.inference.problem import GenericTerms, Point, Problem
 from fish_env.inference.vehicle import EffectFreedom
 from fish_env.model.effect import Effect
@@ -43,11 +43,6 @@ DT_S = 0.02
 FREQUENCY_SCALE = "frequency_scale"
 """Effect that is always free: every run's tail beats a little faster or slower than it says."""
 SCALE = parameter_path(FREQUENCY_SCALE, "scale")
-FIRST_SD = {"m": 0.01, "rad": 0.05, "m/s": 0.02, "rad/s": 0.1}
-"""Errors of a simulation by the unit of the channel, to begin from."""
-FIRST_SAMPLES, FEWEST_SAMPLES = 15.0, 10.0
-"""Independent samples of a run: to begin from, and at least (a start has eight numbers)."""
-LEAST_FREEDOM = 0.2
 EFFECT_STEP = 0.05
 """Share of the usual step for differences by effects: runs bend more than one-step errors do."""
 
@@ -96,6 +91,7 @@ class WholeRunProblem(Problem):
         )
         self.starts: tuple[FloatArray, ...] | None = None
         self.pace: float | None = None
+        self._shown: dict[str, bool] = {SCALE: True}
         self._white: dict[SimulationNoise, list[list[FloatArray]]] = {}
 
     @property
@@ -213,11 +209,24 @@ class WholeRunProblem(Problem):
         return float(point.effects.get(SCALE, self.neutral([FREQUENCY_SCALE])[SCALE]))
 
     def freedoms(self, names: Iterable[str]) -> tuple[EffectFreedom, ...]:
-        """Free parameters of effects."""
+        """Free parameters of effects; those that the runs do not show stay as they are."""
         return tuple(
             EffectFreedom(f.path, f.lower, f.upper, EFFECT_STEP * f.step, f.least)
             for f in self.series.freedoms(names)
+            if self._is_shown(f.path)
         )
+
+    def _is_shown(self, path: str) -> bool:
+        """Whether the runs show an effect parameter, tried in the middle of its range."""
+        if path not in self._shown:
+            name = effect_of(path)
+            values = {
+                parameter_path(name, p.name): 0.5 * sum(p.plausible)
+                for p in self.known[name].parameters
+            }
+            shown = shown_parameters(self, values)
+            self._shown |= {one: one in shown for one in values}
+        return self._shown[path]
 
     def refines_steps(self, effects: Iterable[str]) -> bool:
         """Whether one of these effect parameters makes the tail's rate jump."""
@@ -242,8 +251,7 @@ class WholeRunProblem(Problem):
 
     def default_noise(self) -> SimulationNoise:
         """A centimetre and 0.05 rad, with fifteen independent samples a run."""
-        sd = tuple(FIRST_SD[BY_NAME[name].unit] for name in self.channels)
-        return SimulationNoise(sd, (FIRST_SAMPLES,) * len(sd))
+        return first_noise(self.channels)
 
     @property
     def starts_known(self) -> bool:
@@ -370,17 +378,9 @@ class WholeRunProblem(Problem):
         """Errors of each channel of largest likelihood, by the freedom that the fit left them."""
         channel = self.residual_channels()[1]
         followed = leverage() + np.concatenate([np.sum(e.basis**2, axis=1) for e in filtered])
-        sd, samples = [], []
-        for i, floor in enumerate(self.series.sensor_sd.tolist()):
-            counted = np.array([noise.counted(run)[i] for run in self.runs])
-            errors = [e.errors[:, i] for e in filtered]
-            squares = np.array([np.mean(own[np.isfinite(own)] ** 2) for own in errors])
-            total = float(counted.sum())
-            freedom = max(total - float(followed[channel == i].sum()), LEAST_FREEDOM * total)
-            sd.append(max(float(np.sqrt(counted @ squares / freedom)), 0.5 * floor))
-            found = independent_samples(errors) if final else noise.samples[i]
-            samples.append(max(found, FEWEST_SAMPLES))
-        return SimulationNoise(tuple(sd), tuple(samples))
+        lost = np.bincount(channel, followed, len(self.channels) + 1)
+        errors = [e.errors for e in filtered]
+        return fitted_errors(noise, self.runs, errors, lost, self.series.sensor_sd, final)
 
     def noise_freedom(self, fit: Any) -> float:
         """Independent samples, less what the fit and the runs' own numbers follow."""

@@ -14,9 +14,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from fish_env.arrays import FloatArray
-from fish_env.identification.channels import BY_NAME, Kind
-from fish_env.identification.filtering import Filtered
-from fish_env.identification.state_blocks import N_ERROR, N_MOVING
+from fish_env.identification.channels import BY_NAME
+from fish_env.identification.filtering import Filtered, Slopes
+from fish_env.identification.state_blocks import N_ERROR, N_MOVING, columns
 from fish_env.inference.estimate.run_variation import RunVariation
 from fish_env.model.frames import euler_from_quaternion
 from fish_env.rigidbody.kinematics import euler_rates, rotations
@@ -51,6 +51,7 @@ _DEVICE = {
     **dict.fromkeys(("roll", "pitch", "yaw", "p", "q", "r"), "inertial_delay"),
     "z": "depth_delay",
 }
+_ROWS = {"velocity": [BY_NAME[n].index for n in "uvw"], "rate": [BY_NAME[n].index for n in "pqr"]}
 _ATTITUDE, _RATES, _PLACE = ("roll", "pitch", "yaw"), ("p", "q", "r"), ("x", "y", "z")
 
 
@@ -59,18 +60,20 @@ def sensor_slopes(clock: FloatArray, filtered: Filtered, channels: Sequence[str]
 
     Args:
         clock: (T,) times of the samples (s).
-        filtered: the run filtered.
+        filtered: the run filtered, with its slopes.
         channels: names of its C channels.
+
+    Raises:
+        ValueError: the filter kept no slopes.
     """
-    states = filtered.states
-    euler = np.unwrap(euler_from_quaternion(states[:, 3:7]), axis=0)
+    states, euler, change = _predicted(clock, filtered)
     rates = states[:, [BY_NAME[name].index for name in _RATES]]
     place = states[:, :3] - states[0, :3]
     found = np.zeros((len(clock), len(channels), len(SENSOR_ERRORS)))
     at = {name: i for i, name in enumerate(channels)}
     for name, i in at.items():
         if name in _DEVICE:
-            found[:, i, _INDEX[_DEVICE[name]]] = -np.gradient(_value(name, states, euler), clock)
+            found[:, i, _INDEX[_DEVICE[name]]] = -change[name]
     turns, kinematics = rotations(euler), euler_rates(euler)
     for k, axis in enumerate(_PLACE):
         for j, name in enumerate(_PLACE):
@@ -95,9 +98,39 @@ def sensor_slopes(clock: FloatArray, filtered: Filtered, channels: Sequence[str]
     return found
 
 
-def _value(name: str, states: FloatArray, euler: FloatArray) -> FloatArray:
-    channel = BY_NAME[name]
-    return euler[:, channel.index] if channel.kind == Kind.EULER else states[:, channel.index]
+def _predicted(
+    clock: FloatArray, filtered: Filtered
+) -> tuple[FloatArray, FloatArray, dict[str, FloatArray]]:
+    """States (T, states) and Euler angles (T, 3) as predicted, and each channel's rate of change.
+
+    A sample's own noise is in the filtered state, and would make its regressor follow its
+    innovation. The prediction from the samples before is free of it.
+    """
+    slopes = _slopes(filtered)
+    moved = np.einsum("tec,tc->te", filtered.gains, np.nan_to_num(slopes.raw))
+    states = filtered.states.copy()
+    for name in ("velocity", "rate"):
+        states[:, _ROWS[name]] -= moved[:, columns(name)]
+    states[:, :3] -= moved[:, columns("position")]
+    euler = np.unwrap(euler_from_quaternion(states[:, 3:7]), axis=0)
+    kinematics = euler_rates(euler)
+    euler -= np.einsum("tij,tj->ti", kinematics, moved[:, columns("rotation")])
+    step = np.maximum(np.diff(clock, prepend=clock[0] - 1.0), 1e-9)
+    change: dict[str, FloatArray] = {}
+    for names, block in (("uvw", "velocity"), ("pqr", "rate")):
+        rows = _ROWS[block]
+        before = np.vstack([states[:1, rows], filtered.states[:-1, rows]])
+        change |= dict(zip(names, ((states[:, rows] - before) / step[:, None]).T, strict=True))
+    drift = np.einsum("tij,tj->ti", rotations(euler), states[:, _ROWS["velocity"]])
+    turn = np.einsum("tij,tj->ti", kinematics, states[:, _ROWS["rate"]])
+    change |= dict(zip(_PLACE, drift.T, strict=True)) | dict(zip(_ATTITUDE, turn.T, strict=True))
+    return states, euler, change
+
+
+def _slopes(filtered: Filtered) -> Slopes:
+    if filtered.slopes is None:
+        raise ValueError("filter the run with keep_slopes=True")
+    return filtered.slopes
 
 
 def _put(
@@ -128,9 +161,7 @@ def innovation_slopes(
     Raises:
         ValueError: the filter kept no slopes.
     """
-    slopes = filtered.slopes
-    if slopes is None:
-        raise ValueError("filter the run with keep_slopes=True")
+    slopes = _slopes(filtered)
     changes = np.where(np.isfinite(measured)[:, :, None], changes, 0.0)
     keep = np.exp(-np.diff(clock, prepend=clock[0]) / correlation_s)
     stray = np.zeros((N_ERROR, changes.shape[2]))

@@ -52,6 +52,7 @@ class Attribution:
         rivals: explanations that fit as well as the accepted one.
         ranking: causes fitted in the first step, best first.
         gain: of all accepted causes together, in the same unit.
+        failed: causes that were fitted beside the accepted ones and explained too little more.
     """
 
     baseline: Explanation
@@ -60,6 +61,7 @@ class Attribution:
     rivals: tuple[Explanation, ...]
     ranking: tuple[Ranked, ...]
     gain: float
+    failed: frozenset[str] = frozenset()
 
     @property
     def tolerated(self) -> float:
@@ -123,7 +125,7 @@ def extended(
     current, screens = begun.accepted, [*begun.screens]
     rivals, ranking = begun.rivals, begun.ranking
     total, rough = begun.gain, roughness(current)
-    whole_effort = effort
+    whole_effort, failed = effort, begun.failed
     while len(current.causes) < POLICY.most_causes and not any(tied(current, e) for e in rivals):
         effort = (
             whole_effort if len(current.causes) < POLICY.thorough_causes else whole_effort.reduced
@@ -132,6 +134,7 @@ def extended(
         chosen = shortlisted(
             problem, screens[-1], effort.shortlist, rough * total, relaxed_log_p, found
         )
+        chosen = [signal for signal in chosen if signal.cause.name not in failed]
         relatives: list[Signal] = []
         for name in current.causes if chosen and effort.retries else ():
             # A cause that resembles an accepted one may be absorbed by its estimates.
@@ -145,13 +148,15 @@ def extended(
         if current.causes and not implausible_estimates(current.fit):
             tried = [e for e in tried if not implausible_estimates(e.fit)]
             if not tried:
+                failed |= {signal.cause.name for signal in chosen}
                 break
         if not ranking:
             ranking = ranking_of(tried, base)
         gain = base.score - tried[0].score
         if gain < max(POLICY.evidence_doubt, rough * total):
+            failed |= {signal.cause.name for signal in chosen}
             break
-        total += gain
+        total, failed = total + gain, frozenset()
         after = screen(tried[0].fit, causes, rng)
         rough = roughness(tried[0])
         if effort.retries and shortlisted(problem, after, 1, rough * total):
@@ -175,13 +180,15 @@ def extended(
         screens.append(after)
         others_like = [e for e in tried[1:] if explained_away(e.causes[-1], screens[-2], after)]
         rivals = rivals_of(current, [*others_like, *swapped[1:]])
+    found_causes = current.causes
     current = backward_elimination(current)
+    failed = failed if current.causes == found_causes else frozenset()
     if current.causes and whole_effort.retries:
         final = reached(partial(finished, current.fit))
         current = Explanation(current.causes, final) if final else current
     # A rival that contains the accepted causes is no rival once a cause is dropped.
     rivals = tuple(e for e in rivals if not set(current.causes) <= set(e.causes))
-    return Attribution(begun.baseline, tuple(screens), current, rivals, ranking, total)
+    return Attribution(begun.baseline, tuple(screens), current, rivals, ranking, total, failed)
 
 
 def _varied(explanation: Explanation) -> Explanation:

@@ -1,4 +1,4 @@
-"""Sensor errors: they go through the filter as spoilt data do; marginal data name nothing."""
+"""Sensor errors: their way through the filter is that of spoilt data."""
 
 from __future__ import annotations
 
@@ -55,6 +55,5 @@ def test_a_late_camera_is_what_its_regressor_says(filtered):
 def test_slopes_need_a_filter_that_kept_them(filtered):
     problem, point, noise, _ = filtered
     (run,), (result,) = problem.runs, problem.filtered(point, noise)
-    changes = sensor_slopes(run.clock, result, problem.channels)
     with pytest.raises(ValueError, match="keep_slopes"):
-        innovation_slopes(run.clock, run.measured, result, noise.correlation_s, changes)
+        sensor_slopes(run.clock, result, problem.channels)

@@ -378,7 +378,7 @@ class WholeRunProblem(Problem):
         """Errors of each channel of largest likelihood, by the freedom that the fit left them."""
         channel = self.residual_channels()[1]
         followed = leverage() + np.concatenate([np.sum(e.basis**2, axis=1) for e in filtered])
-        lost = np.bincount(channel, followed, len(self.channels) + 1)
+        lost = np.asarray(np.bincount(channel, followed, len(self.channels) + 1), float)
         errors = [e.errors for e in filtered]
         return fitted_errors(noise, self.runs, errors, lost, self.series.sensor_sd, final)
 

@@ -1,0 +1,38 @@
+"""Which parameters of effects a set of runs shows at all."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from fish_env.identification.whole_runs.problem import WholeRunProblem
+
+FEW_RUNS = 3
+SILENT = 0.003
+"""Change of every sample by a tenth of a parameter, in standard deviations of a simulation's first
+noise, below which nothing shows the parameter."""
+
+
+def shown_parameters(problem: WholeRunProblem, values: Mapping[str, float]) -> set[str]:
+    """Effect parameters whose change by a tenth changes what is measured.
+
+    Args:
+        problem: the runs.
+        values: effect parameter -> value, beside nominal coefficients.
+    """
+    few = problem.some(problem.spread(FEW_RUNS))
+    count = 1 + len(values)
+    effects = {path: np.full(count, value) for path, value in values.items()}
+    for i, path in enumerate(values, start=1):
+        effects[path][i] *= 0.9
+    z = np.zeros((len(problem.baseline), count))
+    own = [np.repeat(kind.guess[:, None], count, axis=1) for kind in few.own]
+    moved = np.zeros(count)
+    for errors in few.errors(z, effects, own):
+        away = np.abs(np.nan_to_num(errors - errors[:1]) / np.array(few.default_noise().sd))
+        away = away.reshape(count, -1)
+        moved = np.maximum(moved, away.max(axis=1))
+    return {path for path, change in zip(values, moved[1:], strict=True) if change > SILENT}

@@ -25,9 +25,13 @@ from fish_env.envs.robotic_fish_3d import RoboticFish3DEnv
 from fish_env.envs.tasks import TASKS
 from fish_env.errors import ConfigError
 from fish_env.files import check_outputs
+from fish_env.reading import Unreadable, plain_number, read_text
 from fish_env.rendering import check_installed
 
 COLUMNS = ("north", "east", "depth")
+FARTHEST = 1000.0
+"""m. A path as long as this takes three hours."""
+MOST_WAYPOINTS = 1000
 SLOWNESS = 1.5
 """A path may take this many times as long as its length at cruise speed, and ten seconds."""
 
@@ -90,14 +94,30 @@ def read_waypoints(file: Path) -> FloatArray:
     Raises:
         ConfigError: no such file, or not these columns.
     """
-    if not file.is_file():
-        raise ConfigError(f"{file}: no such file; give a CSV file with {', '.join(COLUMNS)}")
-    table = np.genfromtxt(file, delimiter=",", names=True, dtype=float)
-    if table.dtype.names != COLUMNS or not all(np.isfinite(table[c]).all() for c in COLUMNS):
+    try:
+        lines = [line.split(",") for line in read_text(file).splitlines() if line.strip()]
+    except FileNotFoundError:
         raise ConfigError(
-            f"{file}: a first line '{','.join(COLUMNS)}' and numbers (m) below it are needed"
+            f"{file}: no such file; give a CSV file with {', '.join(COLUMNS)}"
+        ) from None
+    except Unreadable as error:
+        raise ConfigError(f"{file}: {error}") from None
+    header = tuple(cell.strip() for cell in lines[0]) if lines else ()
+    if header != COLUMNS:
+        raise ConfigError(f"{file}: the first line must be '{','.join(COLUMNS)}'")
+    rows = [[plain_number(cell) for cell in line] for line in lines[1:]]
+    for number, row in enumerate(rows, 2):
+        if len(row) != len(COLUMNS) or not all(abs(value) <= FARTHEST for value in row):
+            raise ConfigError(
+                f"{file}: waypoint {number - 1}: give three numbers (m) of at most {FARTHEST:g}"
+            )
+    points = np.array(rows).reshape(-1, len(COLUMNS))
+    if not 2 <= len(points) <= MOST_WAYPOINTS or not np.diff(points, axis=0).any(axis=1).all():
+        raise ConfigError(
+            f"{file}: give 2 to {MOST_WAYPOINTS} waypoints, each at another place than the one "
+            "before"
         )
-    return np.column_stack([table[column] for column in COLUMNS])
+    return points
 
 
 def _environment(

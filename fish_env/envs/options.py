@@ -12,7 +12,7 @@ import numpy as np
 from fish_env.arrays import FloatArray
 from fish_env.effects.extended import PREFIX, EffectValues, ExtendedModel, build_model
 from fish_env.envs.config import EnvConfig, load_env_config
-from fish_env.envs.config_checks import is_number, speed_range
+from fish_env.envs.config_checks import speed_range
 from fish_env.envs.layout import SENSORS
 from fish_env.envs.randomization import Randomization, build_randomization
 from fish_env.envs.tasks import TASKS
@@ -21,6 +21,7 @@ from fish_env.model.crank_slider import CrankSlider
 from fish_env.model.state import INPUTS
 from fish_env.params.io import as_fish
 from fish_env.params.schema import FishParams
+from fish_env.reading import is_number
 
 NOISE_GROUPS = {
     "depth": ("depth",),

@@ -12,9 +12,9 @@ from scipy.special import ndtr, ndtri
 
 from fish_env.arrays import BoolArray, FloatArray
 from fish_env.effects.extended import PREFIX, ExtendedModel
-from fish_env.envs.config_checks import is_number
 from fish_env.errors import ConfigError, EffectError
 from fish_env.params.schema import FishParams
+from fish_env.reading import is_number
 
 TRUNCATE = 2.5
 """Normal draws stay within this many standard deviations."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,14 +12,17 @@ from scipy.spatial.transform import Rotation
 
 from fish_env.arrays import FloatArray
 from fish_env.data import CHANNELS
+from fish_env.data.clock import LONGEST_S
 from fish_env.data.description import FILE_NAME, read_description
 from fish_env.data.run_file import read_run
 from fish_env.data.schema import CommandSteps, Run
 from fish_env.errors import DatasetError, missing_extra
 from fish_env.model.state import INPUTS
+from fish_env.reading import MOST_TABLE_BYTES, Unreadable, printable, read_bytes, short
 from fish_env.replay.motion import Motion, Role, motion_from_channels, motion_from_run
 from fish_env.trajectory import POSE_COLUMNS
 
+MOST_ROWS = 2_000_000
 ROLES: tuple[Role, ...] = ("measured", "baseline", "extended")
 QUATERNION = ("qw", "qx", "qy", "qz")
 
@@ -58,7 +62,8 @@ def read_replay_file(
             f"`robofish compare {file} --replay page.html`"
         )
     if not file.is_file():
-        raise DatasetError(f"{file}: there is no such file; name a .csv or .parquet file")
+        what = "no file but a pipe or a device" if file.exists() else "there is no such file"
+        raise DatasetError(f"{file}: {what}; name a .csv or .parquet file")
     found = _dataset_run(file)
     if found is not None:
         run, fish = found
@@ -89,11 +94,14 @@ def _read_table(file: Path) -> pd.DataFrame:
         if file.suffix == ".parquet":
             return pd.read_parquet(file)
         if file.suffix == ".csv":
-            return pd.read_csv(file)
+            return pd.read_csv(io.BytesIO(read_bytes(file, MOST_TABLE_BYTES)), low_memory=False)
     except ImportError:
         raise missing_extra("Reading Parquet", "pyarrow", "parquet") from None
-    except (ValueError, OSError) as error:
-        raise DatasetError(f"{file}: cannot be read as a table: {error}") from None
+    except Unreadable as error:
+        raise DatasetError(f"{file}: {error}") from None
+    except (ValueError, OSError, OverflowError, RecursionError) as error:
+        reason = short(printable(str(error)), 120)
+        raise DatasetError(f"{file}: cannot be read as a table ({reason}); check it") from None
     raise DatasetError(f"{file}: a replay reads .csv and .parquet files, not '{file.suffix}'")
 
 
@@ -101,6 +109,8 @@ def _trajectory(
     file: Path, table: pd.DataFrame, commands: CommandSteps | None, tail_phase: float | None
 ) -> Motion:
     known = {"t", *CHANNELS, *QUATERNION, *INPUTS, "tail_phase"}
+    if len(table) > MOST_ROWS:
+        raise DatasetError(f"{file}: {len(table):,} rows; a replay takes up to {MOST_ROWS:,}")
     columns = {str(name): _numbers(file, table, name) for name in table if str(name) in known}
     _check(file, columns)
     time_s = columns.pop("t")
@@ -115,11 +125,16 @@ def _trajectory(
 
 
 def _numbers(file: Path, table: pd.DataFrame, name: object) -> FloatArray:
-    values = pd.to_numeric(table[name], errors="coerce").to_numpy(float)
-    bad = np.flatnonzero(np.isnan(values) & table[name].notna().to_numpy())
+    cells = table[name]
+    try:
+        values = pd.to_numeric(cells, errors="coerce").to_numpy(float)
+    except (TypeError, ValueError, OverflowError):
+        raise DatasetError(f"{file}: column {name} holds no numbers; correct it") from None
+    bad = np.flatnonzero((np.isnan(values) & cells.notna().to_numpy()) | np.isinf(values))
     if bad.size:
+        cell = short(str(cells.iloc[bad[0]]))
         raise DatasetError(
-            f"{file}: row {bad[0] + 2}, column {name}: '{table[name].iloc[bad[0]]}' is no number"
+            f"{file}: row {bad[0] + 2}, column {name}: '{cell}' is no finite number; correct it"
         )
     return np.asarray(values)
 
@@ -135,6 +150,10 @@ def _check(file: Path, columns: dict[str, FloatArray]) -> None:
     if len(time_s) < 2 or wrong.size:
         row = int(wrong[0]) + 3 if wrong.size else 2
         raise DatasetError(f"{file}: row {row}: t must increase, over two rows at least")
+    if time_s[-1] - time_s[0] > LONGEST_S:
+        raise DatasetError(
+            f"{file}: t spans {time_s[-1] - time_s[0]:.4g} s; correct it or its unit"
+        )
     empty = [name for name, values in columns.items() if not np.isfinite(values).any()]
     if empty:
         raise DatasetError(f"{file}: no value at all in {', '.join(empty)}; leave out the column")

@@ -27,7 +27,7 @@ MOST_TABLE_BYTES = 300_000_000
 """Of a table: some three million rows."""
 DEEPEST = 40
 """Levels of nesting; the deepest file of this package has six."""
-MOST_VALUES = 200_000
+MOST_VALUES = 60_000
 """Values in a file, those behind an alias counted as often as they stand in it."""
 LONGEST_SHOWN = 60
 LARGEST = sys.float_info.max

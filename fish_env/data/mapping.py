@@ -83,7 +83,7 @@ class Section:
             raise self.at(key).refuse("this must be a text", "Write one after the colon")
         if not printable_lines(value):
             raise self.at(key).refuse(
-                f"{shown(value)!a} has a control character", "Write it without"
+                f"{shown(value)} has a control character", "Write it without"
             )
         return value.strip()
 

@@ -42,7 +42,7 @@ def check_fish(fish: "FishParams") -> None:
     """
     if not isinstance(fish.name, str) or not fish.name.isprintable() or not fish.name.strip():
         raise fault(
-            fish, "name", f"is {shown(fish.name)!a}", "give the fish a name, as printable text"
+            fish, "name", f"is {shown(fish.name)}", "give the fish a name, as printable text"
         )
     for leaf in (*leaves(fish), *leaves(fish.prior, "prior")):
         check_number(fish, leaf.path, leaf.value)

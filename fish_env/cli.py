@@ -336,7 +336,9 @@ def _run() -> None:
 
 
 def _complain(colour: str, text: str) -> None:
-    line = " ".join(text.split())
+    from fish_env.reading import printable
+
+    line = printable(text)
     Console(stderr=True, soft_wrap=True).print(f"[{colour}]{escape(line)}[/{colour}]")
 
 

@@ -82,9 +82,7 @@ class Section:
         if not isinstance(value, str) or not value.strip():
             raise self.at(key).refuse("this must be a text", "Write one after the colon")
         if not printable_lines(value):
-            raise self.at(key).refuse(
-                f"{shown(value)} has a control character", "Write it without"
-            )
+            raise self.at(key).refuse(f"{shown(value)} has a control character", "Write it without")
         return value.strip()
 
     def choice(self, key: str, choices: Iterable[str]) -> str:

@@ -98,7 +98,7 @@ class Table:
     def _refuse_cell(self, name: str, index: int) -> None:
         cell = self.cells[self.label(name)][index]
         raise self.at(name, self.rows[index]).refuse(
-            f"'{cell}' is not a finite number",
+            f"'{reading.short(str(cell))}' is not a finite number",
             "Write a plain number with a decimal point, or leave the cell empty "
             "where a sample is missing",
         )
@@ -113,6 +113,10 @@ class Table:
         for row, cell in zip(self.rows, cells, strict=True):
             if not cell:
                 raise self.place.at(row, column).refuse("the cell is empty", "Fill it in")
+            if not cell.isprintable():
+                raise self.place.at(row, column).refuse(
+                    f"{reading.shown(cell)} has a control character", "Write it without"
+                )
         return cells
 
 

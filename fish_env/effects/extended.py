@@ -17,6 +17,7 @@ from fish_env.model.effect import Effect
 from fish_env.model.runtime import Kernels, kernels
 from fish_env.params.packing import PATHS, pack_tables, pack_values
 from fish_env.params.schema import FishParams
+from fish_env.reading import shown
 
 EffectValues = Mapping[str, Mapping[str, float]]
 PREFIX = "effects."
@@ -149,6 +150,8 @@ def build_model(
         raise EffectError(f"effect {name}: the name is taken by a shipped effect, choose another")
     wanted: dict[str, dict[str, float]] = {name: dict(v) for name, v in fish.effects.items()}
     for name, values in (effects or {}).items():
+        if not isinstance(name, str) or not isinstance(values, Mapping):
+            raise EffectError(f"effect {shown(name)}: give a name and a mapping of parameters")
         wanted[name] = {**wanted.get(name, {}), **values}
     for name in wanted:
         if name not in own and name not in catalogue():

@@ -12,6 +12,7 @@ from fish_env.model.state import INPUTS
 from fish_env.reading import is_number, shown
 
 SLOWEST_PHYSICS_HZ = 10.0
+FASTEST_PHYSICS_HZ, SLOWEST_CONTROL_HZ = 1e5, 0.01
 Tree = dict[str, Any]
 Rule = Iterator[tuple[bool, str]]
 """Pairs of a condition and what to say when it does not hold."""
@@ -64,6 +65,11 @@ def rates(tree: Tree) -> Rule:
     yield (
         physics >= SLOWEST_PHYSICS_HZ,
         f"rates: physics at {physics:g} Hz is too slow, use {SLOWEST_PHYSICS_HZ:g} Hz or more",
+    )
+    yield (
+        physics <= FASTEST_PHYSICS_HZ and control >= SLOWEST_CONTROL_HZ,
+        f"rates: at most {FASTEST_PHYSICS_HZ:g} Hz of physics, at least {SLOWEST_CONTROL_HZ:g} Hz "
+        "of control",
     )
     substeps = round(physics / control)
     yield (

@@ -28,7 +28,7 @@ from fish_env.params import trees
 from fish_env.params.balance import central_inertia
 from fish_env.params.fields import Leaf, leaves, tables
 from fish_env.params.provenance import STATUSES, Origin, Posterior
-from fish_env.reading import shown
+from fish_env.reading import printable_lines, shown
 
 if TYPE_CHECKING:
     from fish_env.params.schema import FishParams
@@ -190,7 +190,7 @@ def check_origin(fish: "FishParams", path: str, origin: Origin) -> None:
     if origin.status not in STATUSES:
         remedy = f"use one of {', '.join(STATUSES)}"
         raise fault(fish, f"provenance.{path}.status", f"is {shown(origin.status)}", remedy)
-    if not isinstance(origin.source, str) or not origin.source:
+    if not isinstance(origin.source, str) or not printable_lines(origin.source.strip() or "\0"):
         remedy = "say in words where the value comes from"
         raise fault(fish, f"provenance.{path}.source", f"is {shown(origin.source)}", remedy)
 

@@ -16,9 +16,10 @@ from fish_env.data.clock import LONGEST_S
 from fish_env.data.description import FILE_NAME, read_description
 from fish_env.data.run_file import read_run
 from fish_env.data.schema import CommandSteps, Run
+from fish_env.data.table import MOST_COLUMNS
 from fish_env.errors import DatasetError, missing_extra
 from fish_env.model.state import INPUTS
-from fish_env.reading import MOST_TABLE_BYTES, Unreadable, printable, read_bytes, short
+from fish_env.reading import MOST_TABLE_BYTES, Unreadable, located, printable, read_bytes, short
 from fish_env.replay.motion import Motion, Role, motion_from_channels, motion_from_run
 from fish_env.trajectory import POSE_COLUMNS
 
@@ -56,6 +57,10 @@ def read_replay_file(
         DatasetError: It is no such file; names what is wrong and where.
         MissingExtraError: A Parquet file, but pyarrow is not installed.
     """
+    try:
+        located(file)
+    except Unreadable as error:
+        raise DatasetError(f"{error}") from None
     if file.is_dir():
         raise DatasetError(
             f"{file}: a folder; name one of its files, or see all of a dataset with "
@@ -94,7 +99,10 @@ def _read_table(file: Path) -> pd.DataFrame:
         if file.suffix == ".parquet":
             return pd.read_parquet(file)
         if file.suffix == ".csv":
-            return pd.read_csv(io.BytesIO(read_bytes(file, MOST_TABLE_BYTES)), low_memory=False)
+            content = read_bytes(file, MOST_TABLE_BYTES)
+            if content[: content.find(b"\n")].count(b",") > MOST_COLUMNS:
+                raise DatasetError(f"{file}: more than {MOST_COLUMNS} columns; leave some out")
+            return pd.read_csv(io.BytesIO(content), low_memory=False)
     except ImportError:
         raise missing_extra("Reading Parquet", "pyarrow", "parquet") from None
     except Unreadable as error:

@@ -28,7 +28,7 @@ from fish_env.envs.layout import OBSERVATION
 from fish_env.envs.registration import ENV_ID
 from fish_env.errors import ConfigError
 from fish_env.files import write_bytes
-from fish_env.reading import Unreadable, parse_json, read_bytes, short, shown
+from fish_env.reading import Unreadable, located, parse_json, read_bytes, short, shown
 
 FORMAT = "robofish-policy-1"
 ACTIONS = 5
@@ -116,9 +116,9 @@ def read_policy(path: str | Path) -> PolicyFile:
 
 
 def _unpack(file: Path) -> dict[str, npt.NDArray[Any]]:
-    if not file.is_file():
-        raise ConfigError(f"{file}: no such policy file")
     try:
+        if not located(file).is_file():
+            raise ConfigError(f"{file}: no such policy file")
         content = read_bytes(file, MOST_BYTES)
         return read_arrays(content, MOST_BYTES)
     except Unreadable as error:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from rich import box
 from rich.console import Console
+from rich.markup import escape
 from rich.padding import Padding
 from rich.progress import Progress
 from rich.table import Table
@@ -104,8 +105,9 @@ def print_comparison(console: Console, comparison: Comparison, every_run: bool =
     """Prints tables, findings in words, and the notes of the dataset."""
     effects = ", ".join(comparison.effects) or "none"
     console.print(
-        f"[bold]{comparison.dataset}[/bold] against fish [bold]{comparison.fish}[/bold] "
-        f"(effects: {effects}); errors are simulated minus measured",
+        f"[bold]{escape(comparison.dataset)}[/bold] against fish "
+        f"[bold]{escape(comparison.fish)}[/bold] (effects: {escape(effects)}); "
+        "errors are simulated minus measured",
         highlight=False,
         soft_wrap=True,
     )
@@ -114,9 +116,9 @@ def print_comparison(console: Console, comparison: Comparison, every_run: bool =
     else:
         _print_runs(console, comparison, every_run)
     for sentence in in_words(comparison):
-        console.print(f"• {sentence}", highlight=False)
+        console.print(f"• {sentence}", highlight=False, markup=False)
     for note in comparison.notes:
-        console.print(f"note: {note}", style="dim", highlight=False)
+        console.print(f"note: {note}", style="dim", highlight=False, markup=False)
 
 
 def _table(title: str, *columns: str) -> Table:
@@ -158,7 +160,8 @@ def _print_steady(console: Console, comparison: SteadyComparison) -> None:
     console.print(table)
     console.print(Padding("\n".join(left_out), (0, 0, 1, 0)), style="dim", highlight=False)
     if comparison.unsteady:
-        console.print(f"not steady after the longest wait: {', '.join(comparison.unsteady)}")
+        names = ", ".join(comparison.unsteady)
+        console.print(f"not steady after the longest wait: {names}", markup=False)
     console.print(_worst_table(comparison))
 
 
@@ -170,7 +173,7 @@ def _worst_table(comparison: SteadyComparison) -> Table:
         unit, factor = shown_unit(name)
         for condition, error, measured, simulated in comparison.worst(name):
             numbers = (factor * value for value in (measured, simulated, error))
-            table.add_row(condition, name, unit, *map(_shown, numbers))
+            table.add_row(escape(condition), name, unit, *map(_shown, numbers))
         table.add_section()
     return table
 
@@ -184,7 +187,7 @@ def _print_runs(console: Console, comparison: RunsComparison, every_run: bool) -
     else:
         console.print("every run: --runs, or --json for all numbers", style="dim")
     starts = dict.fromkeys(run.start_from for run in comparison.runs)
-    console.print(f"simulations start from: {'; or '.join(starts)}", highlight=False)
+    console.print(f"simulations start from: {'; or '.join(starts)}", highlight=False, markup=False)
 
 
 def _error_table(title: str, first: str, groups: Groups) -> Table:
@@ -193,7 +196,7 @@ def _error_table(title: str, first: str, groups: Groups) -> Table:
     for name, runs in groups.items():
         for row, channel in enumerate(runs[0].errors):
             path = [float(np.nanmax(run.path_error_m)) for run in runs if run.path_error_m.size]
-            heading = (name, str(len(runs))) if row == 0 else ("", "")
+            heading = (escape(name), str(len(runs))) if row == 0 else ("", "")
             farthest = f"{max(path):.3f}" if path and row == 0 else ""
             table.add_row(*heading, *_errors(channel, runs), farthest)
         table.add_section()

@@ -96,7 +96,7 @@ def print_answer(console: Console, answer: dict[str, Any]) -> None:
     for doubt in answer.get("doubts", ()):
         console.print(f"doubt: {escape(doubt)}", highlight=False)
     for note in answer["notes"]:
-        console.print(f"note: {note}", style="dim", highlight=False)
+        console.print(f"note: {note}", style="dim", highlight=False, markup=False)
 
 
 def _table(title: str, *columns: str) -> Table:

@@ -43,11 +43,11 @@ def _heading(fish: FishParams) -> Panel:
     surplus = 1000.0 * (fish.get("mass.buoyancy") - fish.get("mass.total"))
     floats = "neutral" if abs(surplus) < 1e-6 else ("floats" if surplus > 0 else "sinks")
     lines = [
-        f"file      {fish.source_file}",
+        f"file      {escape(str(fish.source_file))}",
         f"mass      {fish.get('mass.total'):g} kg, buoyancy {surplus:+.2f} g ({floats})",
         f"presets   {', '.join(list_fish())}",
     ]
-    return Panel(Group(*lines), title=f"[bold]{fish.name}[/bold]", title_align="left")
+    return Panel(Group(*lines), title=f"[bold]{escape(fish.name)}[/bold]", title_align="left")
 
 
 def _sources(fish: FishParams) -> dict[str, int]:
@@ -150,4 +150,6 @@ def _print_effects(console: Console, fish: FishParams) -> None:
     for name in fish.effects:
         values = model.effects.get(name)
         text = ", ".join(f"{key} {value:g}" for key, value in (values or {}).items())
-        console.print(f"{name}: {text or 'at its neutral values, so off'}", highlight=False)
+        console.print(
+            f"{name}: {text or 'at its neutral values, so off'}", highlight=False, markup=False
+        )

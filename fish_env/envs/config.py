@@ -114,7 +114,7 @@ def load_env_config(
         label = str(source)
         source = _read(Path(source))
     if source is not None and not isinstance(source, Mapping):
-        raise ConfigError(f"config {source!r}: give the path of a YAML file or a mapping")
+        raise ConfigError(f"config {shown(source)}: give the path of a YAML file or a mapping")
     _merge(tree, source or {}, label, "")
     rates = {"control": control_hz, "physics": physics_hz}
     given = {key: value for key, value in rates.items() if value is not None}

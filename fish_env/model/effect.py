@@ -44,6 +44,7 @@ from typing import Any
 from fish_env.errors import EffectError
 from fish_env.inference.effects import EffectParameter as EffectParameter
 from fish_env.inference.effects import Switched
+from fish_env.reading import shown
 
 STAGES = (
     "inputs",
@@ -177,7 +178,7 @@ class Effect(Switched):
         names = [p.name for p in self.parameters]
         if not isinstance(values, Mapping):
             raise EffectError(
-                f"effect {self.name}: {values!r:.60}; give parameters, it has {names}"
+                f"effect {self.name}: {shown(values)}; give parameters, it has {names}"
             )
         for name in values:
             if name not in names:
@@ -190,9 +191,7 @@ class Effect(Switched):
         except (TypeError, ValueError, OverflowError):
             number = float("nan")
         if isnan(number) or not (isfinite(number) or number == parameter.neutral):
-            raise EffectError(
-                f"effect {self.name}.{parameter.name}: {value!r:.60} is no finite number"
-            )
+            raise EffectError(f"effect {self.name}.{parameter.name}: {shown(value)} is not finite")
         if not parameter.lower <= number <= parameter.upper:
             raise EffectError(
                 f"effect {self.name}.{parameter.name} = {value} {parameter.unit}: "

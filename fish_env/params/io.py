@@ -89,7 +89,7 @@ def fish_files(fish: FishParams | str | Path) -> list[Path]:
     while file is not None and file not in found:
         found.append(file)
         data = read_yaml(file)
-        resolve_tables(data, file.parent)
+        resolve_tables(data, file)
         found += tables_in(data)
         effects = data.get("effects")
         if isinstance(effects, Mapping):
@@ -145,7 +145,7 @@ def read_merged(file: Path, above: tuple[Path, ...]) -> dict[str, Any]:
         raise ParameterError(f"{file}: base: the bases form a circle, {chain}; remove one")
     data = read_yaml(file)
     base = data.pop("base", None)
-    resolve_tables(data, file.parent)
+    resolve_tables(data, file)
     if base is None:
         return data
     if not isinstance(base, str):
@@ -163,17 +163,17 @@ def find_base(base: str, file: Path) -> Path:
         raise ParameterError(f"{file}: base: {error}") from error
 
 
-def resolve_tables(data: Any, folder: Path) -> None:
-    """Makes the table paths in nested data absolute, in place."""
+def resolve_tables(data: Any, file: Path) -> None:
+    """Makes the table paths in nested data of a file absolute, in place."""
     if not isinstance(data, dict):
         return
     if isinstance(data.get("table"), str):
         try:
-            data["table"] = str(located(data["table"], folder).resolve())
+            data["table"] = str(located(data["table"], file.parent).resolve())
         except Unreadable as error:
-            raise ParameterError(f"{folder}: table: {error}") from None
+            raise ParameterError(f"{file}: table: {error}") from None
     for value in data.values():
-        resolve_tables(value, folder)
+        resolve_tables(value, file)
 
 
 def merged(base: Mapping[str, Any], change: Mapping[str, Any]) -> dict[str, Any]:

@@ -162,6 +162,28 @@ def _in_words(episode: Episode, follower: PathFollower | None) -> str:
     )
 
 
+def numbers_of(wish: Wish, episode: Episode) -> dict[str, Any]:
+    """What an episode came to, as numbers.
+
+    Args:
+        wish: what was asked for.
+        episode: what was swum.
+    """
+    end = episode.last(10.0)
+    return {
+        "agent": wish.agent,
+        "task": wish.task,
+        "suite": wish.suite,
+        "seed": wish.seed,
+        "duration_s": episode["time_s"][-1],
+        "succeeded": episode.succeeded,
+        "failure": episode["failure"][-1],
+        "worst_depth_error_m_last_10_s": end.worst("depth_error"),
+        "worst_heading_error_rad_last_10_s": end.worst("heading_error"),
+        "worst_speed_error_m_s_last_10_s": end.worst("speed_error"),
+    }
+
+
 def _files(
     wish: Wish,
     episode: Episode,

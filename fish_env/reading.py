@@ -183,6 +183,25 @@ def read_bytes(path: Path, most: int = MOST_TEXT_BYTES) -> bytes:
     return content
 
 
+def read_standard_input(most: int = MOST_TEXT_BYTES) -> str:
+    """Reads all of standard input as UTF-8 text.
+
+    Args:
+        most: Bytes from which it is refused.
+
+    Raises:
+        Unreadable: It is larger, or no such text.
+    """
+    stream: Any = getattr(sys.stdin, "buffer", sys.stdin)
+    content = stream.read(most + 1)
+    if len(content) > most:
+        raise Unreadable(f"larger than {most / 1e6:g} MB", "send less")
+    try:
+        return content if isinstance(content, str) else content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise Unreadable("is not UTF-8 text", "send plain UTF-8 text") from None
+
+
 def read_text(path: Path, most: int = MOST_TEXT_BYTES) -> str:
     """Reads a whole file of UTF-8 text; a byte-order mark is left out.
 

@@ -15,8 +15,16 @@ from typing import Any
 
 from fish_env.data.schema import CommandSteps
 from fish_env.errors import ScheduleError
+from fish_env.files import STANDARD
 from fish_env.params import FishParams, list_fish, load_fish
-from fish_env.reading import Unreadable, is_number, located, read_json
+from fish_env.reading import (
+    Unreadable,
+    is_number,
+    located,
+    parse_json,
+    read_json,
+    read_standard_input,
+)
 from fish_env.simulator import InitialState, schedule
 
 REQUIRED = ("fish", "duration_s", "schedule")
@@ -53,7 +61,7 @@ def read_case(file: Path, trust_effects: bool = False) -> Case:
     """Reads a case.
 
     Args:
-        file: The case.
+        file: The case; `-` is standard input, paths in it are then relative to this folder.
         trust_effects: Let its simulation run the effect files that the fish's file names.
 
     Raises:
@@ -74,7 +82,8 @@ def read_case(file: Path, trust_effects: bool = False) -> Case:
 
 def _read_json(file: Path) -> Mapping[str, Any]:
     try:
-        data = read_json(file)
+        standard = str(file) == STANDARD
+        data = parse_json(read_standard_input()) if standard else read_json(file)
     except FileNotFoundError:
         raise ScheduleError(f"{file}: no such file; check the path") from None
     except Unreadable as error:

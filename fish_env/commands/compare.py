@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -14,13 +13,14 @@ from rich.padding import Padding
 from rich.progress import Progress
 from rich.table import Table
 
+from fish_env.commands.numbers import write_json
 from fish_env.comparison import RunComparison, RunsComparison, SteadyComparison
 from fish_env.comparison.runs import compare_runs
 from fish_env.comparison.tables import compare_steady
 from fish_env.comparison.words import in_words, shown_unit
 from fish_env.data import Dataset, SteadyDataset, dataset_files, load_dataset
 from fish_env.errors import DatasetError
-from fish_env.files import check_outputs, write_text
+from fish_env.files import check_outputs
 from fish_env.params import FishParams, fish_files, load_fish
 
 Comparison = RunsComparison | SteadyComparison
@@ -62,10 +62,10 @@ def compare_dataset(
     comparison = _compare(console, measured, model, dt)
     print_comparison(console, comparison, every_run)
     if json_file is not None:
-        write_text(json_file, json.dumps(comparison.as_dict(), indent=1, allow_nan=False) + "\n")
-        console.print(f"numbers: {json_file}", soft_wrap=True)
+        write_json(console, json_file, comparison.as_dict())
     if out is not None:
         draw(console, comparison, out)
+    suggest_diagnosis(console, dataset)
     if replay is not None and isinstance(measured, Dataset):
         from fish_env.commands.replay import replay_comparison
 
@@ -85,6 +85,17 @@ def _compare(
         return compare_runs(measured, fish, dt, lambda _: progress.advance(task))
 
 
+def suggest_diagnosis(console: Console, dataset: str) -> None:
+    """Names the command that finds the cause of what a comparison shows."""
+    name = Path(dataset).resolve().name if Path(dataset).exists() else dataset
+    console.print(
+        f"next: to find what causes these errors: robofish diagnose {dataset} --out out/{name}",
+        soft_wrap=True,
+        highlight=False,
+        markup=False,
+    )
+
+
 def draw(console: Console, comparison: Comparison, folder: Path) -> None:
     """Draws the pictures of a comparison and names them."""
     from fish_env.plotting.comparison import draw_runs, draw_steady
@@ -102,7 +113,7 @@ def draw(console: Console, comparison: Comparison, folder: Path) -> None:
 
 
 def print_comparison(console: Console, comparison: Comparison, every_run: bool = False) -> None:
-    """Prints tables, findings in words, and the notes of the dataset."""
+    """Prints the findings in words, tables, and the notes of the dataset."""
     effects = ", ".join(comparison.effects) or "none"
     console.print(
         f"[bold]{escape(comparison.dataset)}[/bold] against fish "
@@ -111,12 +122,12 @@ def print_comparison(console: Console, comparison: Comparison, every_run: bool =
         highlight=False,
         soft_wrap=True,
     )
+    for sentence in in_words(comparison):
+        console.print(f"• {sentence}", highlight=False, markup=False)
     if isinstance(comparison, SteadyComparison):
         _print_steady(console, comparison)
     else:
         _print_runs(console, comparison, every_run)
-    for sentence in in_words(comparison):
-        console.print(f"• {sentence}", highlight=False, markup=False)
     for note in comparison.notes:
         console.print(f"note: {note}", style="dim", highlight=False, markup=False)
 

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 from rich import box
 from rich.console import Console, Group
@@ -10,23 +14,33 @@ from rich.panel import Panel
 from rich.rule import Rule
 from rich.table import Table
 
+from fish_env.commands.numbers import write_json
 from fish_env.effects.extended import build_model
-from fish_env.params import FishParams, list_fish, load_fish
+from fish_env.files import check_outputs
+from fish_env.params import FishParams, fish_files, list_fish, load_fish
 from fish_env.simulator import Simulator
 from fish_env.studies import portrait
 
+PARAMETER_FIELDS = ("value", "unit", "prior_sd", "status", "source")
 DEG = 180.0 / np.pi
 
 
-def print_info(console: Console, fish_name: str, trust_effects: bool = False) -> None:
+def print_info(
+    console: Console,
+    fish_name: str,
+    trust_effects: bool = False,
+    json_file: Path | None = None,
+) -> None:
     """Prints parameters, trim, stability, reach, speeds and effects of a fish.
 
     Args:
         console: Where they go.
         fish_name: A preset's name, or a parameter file.
         trust_effects: Run the effect files that the fish's file names.
+        json_file: File for all numbers.
     """
     fish = load_fish(fish_name, trust_effects)
+    check_outputs([json_file], fish_files(fish))
     simulator = Simulator(fish)
     console.print(_heading(fish))
     console.print(_parameters(fish))
@@ -37,6 +51,27 @@ def print_info(console: Console, fish_name: str, trust_effects: bool = False) ->
         speeds = portrait.cruise_speeds(fish)
     console.print(_speeds(speeds))
     _print_effects(console, fish)
+    if json_file is not None:
+        write_json(console, json_file, _numbers(fish, simulator, speeds))
+
+
+def _numbers(fish: FishParams, simulator: Simulator, speeds: np.ndarray) -> dict[str, Any]:
+    parameters = {
+        path: {name: getattr(fish.info(path), name) for name in PARAMETER_FIELDS}
+        for path in fish.values()
+    }
+    return {
+        "fish": fish.name,
+        "parameters": parameters,
+        "block_displacement_reach_m": simulator.crank.reach,
+        "static_margins": dataclasses.asdict(portrait.static_margins(simulator)),
+        "speeds_m_s": {
+            "amplitudes_deg": portrait.AMPLITUDES_DEG,
+            "frequencies_hz": portrait.FREQUENCIES_HZ,
+            "speeds": speeds,
+        },
+        "effects": fish.effects,
+    }
 
 
 def _heading(fish: FishParams) -> Panel:

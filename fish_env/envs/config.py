@@ -17,7 +17,7 @@ from fish_env.envs.layout import Setup, empty_setup
 from fish_env.errors import ConfigError
 from fish_env.model.state import INPUTS
 from fish_env.params.io import config_root
-from fish_env.reading import Unreadable, is_number, located, read_yaml, shown
+from fish_env.reading import Unreadable, is_number, located, printable, read_yaml, short, shown
 
 DEFAULT_NAME = "robotic-fish-3d.yaml"
 
@@ -126,7 +126,9 @@ def _merge(into: dict[str, Any], changes: Mapping[str, Any], label: str, prefix:
     for key, value in changes.items():
         path = f"{prefix}{key}"
         if key not in into:
-            raise ConfigError(f"{label}: unknown key '{path}'; known here: {', '.join(into)}")
+            raise ConfigError(
+                f"{label}: unknown key '{short(printable(path))}'; known here: {', '.join(into)}"
+            )
         if isinstance(into[key], dict):
             if not isinstance(value, Mapping):
                 raise ConfigError(

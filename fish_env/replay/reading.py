@@ -18,8 +18,17 @@ from fish_env.data.run_file import read_run
 from fish_env.data.schema import CommandSteps, Run
 from fish_env.data.table import MOST_COLUMNS
 from fish_env.errors import DatasetError, missing_extra
+from fish_env.files import STANDARD
 from fish_env.model.state import INPUTS
-from fish_env.reading import MOST_TABLE_BYTES, Unreadable, located, printable, read_bytes, short
+from fish_env.reading import (
+    MOST_TABLE_BYTES,
+    Unreadable,
+    located,
+    printable,
+    read_bytes,
+    read_standard_input,
+    short,
+)
 from fish_env.replay.motion import Motion, Role, motion_from_channels, motion_from_run
 from fish_env.trajectory import POSE_COLUMNS
 
@@ -49,7 +58,7 @@ def read_replay_file(
     A file whose name is or ends in ``measured``, ``baseline`` or ``extended`` gets that colour.
 
     Args:
-        file: CSV or Parquet.
+        file: CSV or Parquet; `-` is CSV from standard input.
         commands: What the actuators were asked, where a trajectory does not hold it.
         tail_phase: Tail phase at the start that goes with them, rad.
 
@@ -57,6 +66,8 @@ def read_replay_file(
         DatasetError: It is no such file; names what is wrong and where.
         MissingExtraError: A Parquet file, but pyarrow is not installed.
     """
+    if str(file) == STANDARD:
+        return ReplayFile(_trajectory(Path("stdin"), _standard_table(), commands, tail_phase))
     try:
         located(file)
     except Unreadable as error:
@@ -92,6 +103,16 @@ def _dataset_run(file: Path) -> tuple[Run, str] | None:
         if entry.file.resolve() == file.resolve():
             return read_run(description, entry)[0], description.fish
     return None
+
+
+def _standard_table() -> pd.DataFrame:
+    try:
+        return pd.read_csv(io.StringIO(read_standard_input(MOST_TABLE_BYTES)), low_memory=False)
+    except Unreadable as error:
+        raise DatasetError(f"standard input {error}") from None
+    except (ValueError, OverflowError, RecursionError) as error:
+        reason = short(printable(str(error)), 120)
+        raise DatasetError(f"standard input: no CSV table ({reason}); check it") from None
 
 
 def _read_table(file: Path) -> pd.DataFrame:

@@ -139,7 +139,7 @@ def replay(
     files: Annotated[
         list[Path],
         typer.Argument(
-            help="Trajectories (.csv, .parquet; - is CSV from standard input), or runs of a dataset.",
+            help="Trajectories (.csv, .parquet, or - for CSV from standard input) or runs.",
             metavar="FILE",
         ),
     ],

@@ -213,21 +213,44 @@ def fit(
         str | None, typer.Option(help="Another fish than the dataset names: preset or file.")
     ] = None,
     effects: Annotated[
-        str, typer.Option(help="Effects to fit beside the coefficients, a comma between.")
+        str,
+        typer.Option(
+            help="Effects to fit beside the coefficients, a comma between; or auto: those that "
+            "lower the held-out error."
+        ),
     ] = "",
+    objective: Annotated[
+        str | None,
+        typer.Option(
+            help="What is minimised: errors one-step ahead, of a whole-run, or of means.",
+            show_default="one-step; means of a steady table",
+        ),
+    ] = None,
+    leave_out: Annotated[
+        str | None,
+        typer.Option(
+            help="Leave out each condition, run or value of a command in turn, and report the "
+            "errors there."
+        ),
+    ] = None,
     out: Annotated[Path, typer.Option(help="The parameter file to write.")] = Path(
         "identified.yaml"
     ),
+    results: Annotated[
+        Path | None, typer.Option(help="JSON file for estimates and errors.")
+    ] = None,
     trust_effects: TrustEffects = False,
 ) -> None:
-    """Fit a fish's coefficients to measured runs and write them with their uncertainty.
+    """Fit a fish's coefficients to measured data and write them with their uncertainty.
 
-    **Example:** `robofish fit trials --effects servo_lag --out identified.yaml`
+    **Example:** `robofish fit trials --objective whole-run --effects servo_lag --leave-out run`
     """
-    from fish_env.commands.fit import fit_dataset
+    from fish_env.commands.fit import effects_from, fit_and_write
 
-    names = tuple(name.strip() for name in effects.split(",") if name.strip())
-    fit_dataset(Console(), dataset, fish, names, out, trust_effects)
+    fit_and_write(
+        Console(), dataset, fish, effects_from(effects), out, trust_effects, objective, leave_out,
+        results,
+    )  # fmt: skip
 
 
 @app.command()

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from fish_env.data.schema import Dataset
-from fish_env.diagnosis.beats import beats_of, by_run, uneven
 from fish_env.diagnosis.entries import (
     FORMAT,
     Plain,
@@ -23,6 +22,7 @@ from fish_env.diagnosis.entries import (
 from fish_env.diagnosis.input_checks import doubts
 from fish_env.diagnosis.regimes import as_plain
 from fish_env.diagnosis.result import Diagnosed
+from fish_env.identification.beats import beats_of, by_run, uneven
 from fish_env.identification.generic_forces import wrench_unit
 from fish_env.identification.series import series_of
 from fish_env.inference.attribution import Ranked

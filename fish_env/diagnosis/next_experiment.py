@@ -20,7 +20,6 @@ from fish_env.identification.runs import RunData
 from fish_env.identification.series import SeriesProblem, series_of
 from fish_env.inference.attribution import Attribution
 from fish_env.inference.estimate.fit import Fit
-from fish_env.inference.estimate.free import Z_STEP
 from fish_env.inference.preconditions import Precondition
 from fish_env.inference.probes import effect_values
 from fish_env.inference.problem import Point, Problem
@@ -129,11 +128,11 @@ def changes_on(
         rivals: points, m of them.
     """
     filtered = problem.filtered(fit.point, noise)
-    count = len(problem.baseline)
-    nudged = [replace(fit.point, z=fit.point.z + Z_STEP * np.eye(count)[i]) for i in range(count)]
+    count, step = len(problem.baseline), problem.coefficient_step
+    nudged = [replace(fit.point, z=fit.point.z + step * np.eye(count)[i]) for i in range(count)]
     z, effects = _lanes(problem, [fit.point, *nudged, *rivals])
     changes = problem.changes(z, effects, noise, filtered)
-    return changes[:count].T / Z_STEP, changes[count:].T
+    return changes[:count].T / step, changes[count:].T
 
 
 def unfollowed(slopes: FloatArray, differences: FloatArray, information: FloatArray) -> FloatArray:

@@ -14,7 +14,6 @@ from threadpoolctl import threadpool_limits
 
 from fish_env.data import Dataset, SteadyDataset, dataset_files, load_dataset, split_runs
 from fish_env.diagnosis.answer import as_dict
-from fish_env.diagnosis.beats import with_measured_beats
 from fish_env.diagnosis.extended_file import extended_fish
 from fish_env.diagnosis.gain import measure_gain, misfit_of, one_step
 from fish_env.diagnosis.input_checks import check_runs, divergence
@@ -29,6 +28,7 @@ from fish_env.diagnosis.tables.pipeline import diagnose_steady
 from fish_env.diagnosis.writing import outputs, write_answer
 from fish_env.errors import DatasetError
 from fish_env.files import check_outputs
+from fish_env.identification.beats import with_measured_beats
 from fish_env.identification.series import SeriesProblem, series_of
 from fish_env.inference.effort import effort_of
 from fish_env.inference.estimate.fit import Fit

@@ -269,20 +269,30 @@ class RunFilter:
 
     def innovations(
         self,
-        records: FloatArray,
+        records: FloatArray | Sequence[FloatArray],
         measurement: Measurement,
         noise: NoiseModel,
         filtered: Sequence[Filtered],
         pushes: Pushes | None = None,
         variation: FloatArray | None = None,
+        starts: Sequence[FloatArray] | None = None,
     ) -> FloatArray:
         """Whitened innovations of many parameter sets with given gains (N, residuals).
 
-        Run after run, sample after sample. ``pushes`` adds a prescribed wrench to each lane,
-        ``variation`` (K, N) adds to every run's own numbers.
+        Run after run, sample after sample.
+
+        Args:
+            records: (parameters, N), or one such array for each run.
+            measurement: what the sensors do, for N lanes.
+            noise: noise model.
+            filtered: gains of each run.
+            pushes: a prescribed wrench for each lane.
+            variation: (K, N) added to every run's own numbers.
+            starts: of each run, (18, N) base states to begin from; default: those of the run.
         """
         entry, lanes = self.kernels.entry("filter_lanes"), self.kernels.module.FILTER_LANES
-        count = records.shape[1]
+        own = [records] * len(self.runs) if isinstance(records, np.ndarray) else records
+        count = own[0].shape[1]
         ends = np.cumsum([data.measured.size for data in self.runs]).tolist()
         out = np.empty((count, ends[-1]))
         column = np.zeros(count, np.int64) if pushes is None else pushes.column
@@ -291,9 +301,12 @@ class RunFilter:
         bases = none if pushes is None else pushes.bases
         jobs = []
         places = [0, *ends[:-1]]
-        for data, gains, place, basis in zip(self.runs, filtered, places, bases, strict=True):
-            record, sensors = self._of_run(data, records, measurement, variation)
+        runs = zip(self.runs, filtered, places, bases, own, strict=True)
+        for i, (data, gains, place, basis, lane) in enumerate(runs):
+            record, sensors = self._of_run(data, lane, measurement, variation)
             state0 = self._starts(data, sensors)
+            if starts is not None:
+                state0[: len(BASE_STATES)] = starts[i]
             step = lanes * max(1, -(-count // (4 * lanes)))
             for first in range(0, count, step):
                 last = min(count, first + step)

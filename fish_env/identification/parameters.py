@@ -19,6 +19,30 @@ from fish_env.params.schema import FishParams
 ALIKE = (frozenset({"body.plane_xz.drag.c0", "body.plane_xy.drag.c0"}),)
 """Coefficients that act alike: both planes' drags at zero incidence brake along the fish."""
 
+PLANAR_PATHS = (
+    "mass.static_moment_rest[0]",
+    "inertia.rest[2]",
+    "tail.root[0]",
+    "tail.center_of_pressure",
+    "tail.area",
+    "tail.drag.c0",
+    "tail.drag.c2",
+    "tail.lift.c1",
+    "body.area[0]",
+    "body.area[1]",
+    "body.plane_xz.drag.c0",
+    "body.plane_xy.drag.c0",
+    "body.plane_xy.drag.c2",
+    "body.plane_xy.lift.c1",
+    "body.plane_xy.impact_moment",
+    "body.rotational_damping[2]",
+)
+"""Coefficients that a fish swimming level shows to a camera overhead; the others keep their values.
+Its mass is among those: forces over mass is all that a path shows, and a mass that leaves the
+buoyancy behind would let the fish sink, unseen, and so find another drag."""
+VERTICAL = frozenset({"z", "roll", "pitch", "w", "p", "q"})
+"""Channels that show more than motion in a horizontal plane."""
+
 
 class Baseline(Coefficients):
     """Baseline coefficients of a fish with a prior.

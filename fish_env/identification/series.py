@@ -282,7 +282,7 @@ class SeriesProblem(Problem):
         more = np.column_stack([np.zeros(len(steps)), np.diag(steps)])
         effects = {path: np.full(count, value) for path, value in point.effects.items()}
         z = np.repeat(point.z[:, None], count, axis=1)
-        records, measurement = self._lanes(z, effects)
+        records, measurement = self.lanes(z, effects)
         rows = self.filter_for(effects).innovations(
             records, measurement, noise, filtered, variation=more
         )
@@ -314,7 +314,7 @@ class SeriesProblem(Problem):
             filtered: gains to use.
             pushes: a prescribed wrench for each point.
         """
-        records, measurement = self._lanes(z, effects)
+        records, measurement = self.lanes(z, effects)
         return self.filter_for(effects).innovations(records, measurement, noise, filtered, pushes)
 
     def changes(
@@ -375,9 +375,9 @@ class SeriesProblem(Problem):
     def lane(self, point: Point) -> tuple[FloatArray, Measurement]:
         """Parameter record (parameters, 1) of a point, and what its sensors do."""
         effects = {path: np.array([value]) for path, value in point.effects.items()}
-        return self._lanes(point.z[:, None], effects)
+        return self.lanes(point.z[:, None], effects)
 
-    def _lanes(
+    def lanes(
         self, z: FloatArray, effects: Mapping[str, FloatArray]
     ) -> tuple[FloatArray, Measurement]:
         """Parameter records (parameters, N) and what the sensors do, for N points."""

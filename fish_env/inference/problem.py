@@ -14,6 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from fish_env.arrays import BoolArray, FloatArray, IntArray
+from fish_env.inference.estimate.information import block_index
 from fish_env.inference.estimate.run_variation import RunVariation
 from fish_env.inference.hypotheses import parameter_path
 from fish_env.inference.vehicle import (
@@ -115,6 +116,7 @@ class Problem(Protocol):
             periods no small change tells which way to go.
         interchangeable: sets of coefficients that act alike.
         variations: what runs may differ in, K of them.
+        coefficient_step: change of a coefficient (in units of its prior) that slopes are taken by.
     """
 
     known: Mapping[str, Effect]
@@ -123,6 +125,7 @@ class Problem(Protocol):
     out_of_step: tuple[str, ...] = ()
     interchangeable: tuple[frozenset[str], ...] = ()
     variations: tuple[RunVariation, ...] = ()
+    coefficient_step: float = 0.05
 
     @property
     def longest_step(self) -> float:
@@ -142,6 +145,13 @@ class Problem(Protocol):
     def groups(self) -> tuple[IntArray, FloatArray]:
         """(D,) run of each residual, and (D,) its time in the run (s)."""
         ...
+
+    def clusters(self) -> IntArray:
+        """(D,) number of the cluster of each residual: those of different ones err independently.
+
+        By default blocks of time, each longer than a disturbance lasts.
+        """
+        return block_index(*self.groups())
 
     @property
     def measured(self) -> BoolArray:

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import LinearConstraint, minimize
 
 from fish_env.data import load_dataset
-from fish_env.identification import SeriesProblem
+from fish_env.identification import SeriesProblem, WholeRunProblem
 from fish_env.identification.parameters import Baseline
 from fish_env.identification.tables.problem import TableProblem
 from fish_env.identification.tables.table import table_of
@@ -19,7 +19,6 @@ from fish_env.inference.estimate.fit import fit, gauss_newton
 from fish_env.inference.estimate.free import Free, objective
 from fish_env.inference.policy import POLICY
 from fish_env.params import load_fish
-from fish_env.studies.rollouts import WholeRuns
 from tests.identification.synthetic import Setup, simulate
 
 FISH = "msu-tail-fish"
@@ -96,8 +95,9 @@ def test_a_lifted_prior_leaves_the_physical_bounds():
 def test_runs_tables_and_whole_runs_have_the_same_bounds():
     """One policy: the same fish may become the same, whatever it was measured by."""
     fish, paths = load_fish(FISH), (*PAIR, "tail.lift.c1", "body.plane_xy.drag.c0")
-    problem = SeriesProblem(simulate(Setup(runs=1, duration=2.0)), fish, paths=paths)
-    whole = WholeRuns(fish, paths).bounds
+    measured = simulate(Setup(runs=1, duration=2.0))
+    problem = SeriesProblem(measured, fish, paths=paths)
+    whole = Free(WholeRunProblem(measured, fish, paths=paths), (), ()).bounds
     runs = Free(problem, (), ()).bounds
     for name in ("rows", "low", "high"):
         np.testing.assert_array_equal(getattr(runs, name), getattr(whole, name))

@@ -11,7 +11,6 @@ from scipy.special import ndtri
 
 from fish_env.data.retiming import Clocks, retimed
 from fish_env.data.schema import Dataset
-from fish_env.diagnosis.beats import own_ratio
 from fish_env.diagnosis.inputs.changes import Change
 from fish_env.diagnosis.inputs.clocks import strokes_of
 from fish_env.diagnosis.inputs.fine import BIAS, Fine, fine_clock
@@ -20,6 +19,7 @@ from fish_env.diagnosis.inputs.search import Found, search
 from fish_env.diagnosis.inputs.weighing import BEAT, Scales
 from fish_env.diagnosis.recorded import recorded
 from fish_env.errors import DatasetError
+from fish_env.identification.beats import own_ratio
 from fish_env.inference.input_faults import InputFault
 from fish_env.params.io import load_fish
 from fish_env.params.schema import FishParams

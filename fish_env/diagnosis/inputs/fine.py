@@ -13,13 +13,13 @@ import numpy as np
 from scipy.special import chdtrc, ndtr, ndtri
 
 from fish_env.data.schema import Dataset
-from fish_env.diagnosis.beats import beats_of, by_run
 from fish_env.diagnosis.inputs.changes import Change
 from fish_env.diagnosis.inputs.clock_changes import beat, clock, skew
 from fish_env.diagnosis.inputs.clocks import strokes_of
 from fish_env.diagnosis.inputs.ratios import Ratio, ratio_near
 from fish_env.diagnosis.inputs.skews import Aligner
 from fish_env.diagnosis.recorded import recorded
+from fish_env.identification.beats import beats_of, by_run
 from fish_env.rigidbody.consistency import check_consistency
 from fish_env.rigidbody.kinematic_fit import Estimate
 

@@ -4,18 +4,27 @@ from __future__ import annotations
 
 import numpy as np
 
-from fish_env.arrays import FloatArray
+from fish_env.arrays import FloatArray, IntArray
 from fish_env.inference.estimate.free import Linearised
-from fish_env.inference.estimate.information import block_sums
+from fish_env.inference.estimate.information import block_index, sums_over
 
 
-def sandwich(lin: Linearised, inverse: FloatArray, prior: FloatArray) -> FloatArray:
+def sandwich(
+    lin: Linearised, inverse: FloatArray, prior: FloatArray, clusters: IntArray | None = None
+) -> FloatArray:
     """Covariance corrected for residuals that are still coloured (Morelli and Klein, 1995).
 
-    Scores are summed over blocks longer than the correlation; where their spread exceeds what
-    white residuals give, the covariance grows by that much. It never shrinks.
+    Scores are summed over clusters that err independently; where their spread exceeds what white
+    residuals give, the covariance grows by that much. It never shrinks.
+
+    Args:
+        lin: residuals and slopes at the estimates.
+        inverse: (n, n) inverse of the information.
+        prior: (n,) precision.
+        clusters: (D,) number of the cluster of each residual; default: blocks of time.
     """
-    sums = block_sums(lin.slopes * lin.residuals[:, None], lin.run_of, lin.time_of)
+    index = block_index(lin.run_of, lin.time_of) if clusters is None else clusters
+    sums = sums_over(index, lin.slopes * lin.residuals[:, None])
     sums -= sums.mean(axis=0)
     meat = sums.T @ sums * len(sums) / max(len(sums) - 1, 1)
     robust = inverse @ (meat + np.diag(prior)) @ inverse

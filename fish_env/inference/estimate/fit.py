@@ -363,7 +363,7 @@ def _finish(
     hessian = information(lin.slopes, free.prior)
     pull = gradient(lin.slopes, lin.residuals, free.prior, vector)
     inverse = np.asarray(np.linalg.inv(hessian), float)
-    covariance = sandwich(lin, inverse, free.prior)
+    covariance = sandwich(lin, inverse, free.prior, problem.clusters())
     scale = free.scale()
     physical = scale @ covariance @ scale.T
     point = free.unpack(vector)

@@ -19,7 +19,6 @@ from fish_env.inference.estimate.run_variation import Marginal
 from fish_env.inference.problem import Evaluation, Point, Problem
 
 P = TypeVar("P", bound=Problem)
-Z_STEP = 0.05
 SHORTEST = 0.02
 """Shortest step for differences, as a share of the longest."""
 DIFFERENCE = 0.3
@@ -76,7 +75,9 @@ class Free:
         self.count = len(problem.baseline)
         self.names = (*problem.baseline.paths, *(f.path for f in self.freedoms))
         self.prior = prior_precision(problem.baseline, len(self.freedoms), released)
-        self.largest_steps = np.r_[np.full(self.count, Z_STEP), [f.step for f in self.freedoms]]
+        self.largest_steps = np.r_[
+            np.full(self.count, problem.coefficient_step), [f.step for f in self.freedoms]
+        ]
         self.steps = self.largest_steps
         self.nonsmooth = problem.refines_steps((*(f.path for f in self.freedoms), *self.held))
 

@@ -64,17 +64,9 @@ def gradient(
     return np.asarray(inner(slopes, residuals[:, None])[:, 0] + prior * at)
 
 
-def block_sums(
-    scores: FloatArray,
-    run_of: IntArray,
-    time_of: FloatArray,
-    length_s: float = POLICY.score_block_s,
-) -> FloatArray:
-    """Scores (D, m) summed over blocks of time of each run, shape (blocks, m)."""
-    return sums_over(block_index(run_of, time_of, length_s), scores)
-
-
-def block_index(run_of: IntArray, time_of: FloatArray, length_s: float) -> IntArray:
+def block_index(
+    run_of: IntArray, time_of: FloatArray, length_s: float = POLICY.score_block_s
+) -> IntArray:
     """(D,) number of the block of time that each residual lies in, counted over all runs."""
     block = run_of * 10_000 + np.floor(time_of / length_s).astype(np.int64)
     return np.unique(block, return_inverse=True)[1]

@@ -237,7 +237,8 @@ def fit(
         "identified.yaml"
     ),
     results: Annotated[
-        Path | None, typer.Option(help="JSON file for estimates and errors.")
+        Path | None,
+        typer.Option("--json", "--results", help="File for all numbers; - is standard output."),
     ] = None,
     trust_effects: TrustEffects = False,
 ) -> None:
@@ -246,10 +247,11 @@ def fit(
     **Example:** `robofish fit trials --objective whole-run --effects servo_lag --leave-out run`
     """
     from fish_env.commands.fit import effects_from, fit_and_write
+    from fish_env.commands.numbers import console_for
 
     fit_and_write(
-        Console(), dataset, fish, effects_from(effects), out, trust_effects, objective, leave_out,
-        results,
+        console_for(results), dataset, fish, effects_from(effects), out, trust_effects, objective,
+        leave_out, results,
     )  # fmt: skip
 
 

@@ -14,9 +14,7 @@ from rich.progress import Progress
 from rich.table import Table
 
 from fish_env.commands.numbers import write_json
-from fish_env.comparison import RunComparison, RunsComparison, SteadyComparison
-from fish_env.comparison.runs import compare_runs
-from fish_env.comparison.tables import compare_steady
+from fish_env.comparison import RunComparison, RunsComparison, SteadyComparison, compare
 from fish_env.comparison.words import in_words, shown_unit
 from fish_env.data import Dataset, SteadyDataset, dataset_files, load_dataset
 from fish_env.errors import DatasetError
@@ -79,10 +77,10 @@ def _compare(
 ) -> Comparison:
     if isinstance(measured, SteadyDataset):
         with console.status("simulating until steady"):
-            return compare_steady(measured, fish, dt)
+            return compare(measured, fish, dt)
     with Progress(console=console, transient=True) as progress:
         task = progress.add_task("simulating runs", total=len(measured.runs))
-        return compare_runs(measured, fish, dt, lambda _: progress.advance(task))
+        return compare(measured, fish, dt, progress=lambda _: progress.advance(task))
 
 
 def suggest_diagnosis(console: Console, dataset: str) -> None:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from rich.console import Console
 
+from fish_env.comparison.errors import plain
 from fish_env.files import STANDARD, write_text
 
 
@@ -37,20 +36,3 @@ def write_json(console: Console, file: Path, content: Mapping[str, Any] | list[A
     write_text(file, json.dumps(plain(content), indent=1, allow_nan=False) + "\n")
     if str(file) != STANDARD:
         console.print(f"numbers: {file}", soft_wrap=True, markup=False)
-
-
-def plain(value: Any) -> Any:
-    """Returns results as JSON can hold them.
-
-    Args:
-        value: Nested mappings, sequences, texts and numbers, NumPy's too.
-    """
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
-        return plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return str(value) if isinstance(value, Path) else value

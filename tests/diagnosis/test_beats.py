@@ -7,9 +7,15 @@ import pytest
 
 from fish_env.data import CommandSteps, Dataset, Run
 from fish_env.data.vocabulary import COMMANDS
-from fish_env.identification.beats import beats_of, by_run, frequency_of, uneven, with_measured_beats
 from fish_env.diagnosis.pipeline import diagnose
 from fish_env.errors import DatasetError
+from fish_env.identification.beats import (
+    beats_of,
+    by_run,
+    frequency_of,
+    uneven,
+    with_measured_beats,
+)
 from fish_env.params import load_fish
 from fish_env.simulator import Simulator
 

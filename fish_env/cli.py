@@ -371,7 +371,7 @@ def main() -> None:
 
 def _run() -> None:
     try:
-        app()
+        app(prog_name="robofish")
     except Interrupted as error:
         _complain("yellow", f"robofish: {error}")
         raise SystemExit(INTERRUPTED) from None

@@ -93,9 +93,7 @@ def _stopped(source: str, folder: Path, config: TrainConfig) -> str:
     """What was kept of a training that a person stopped, and how to go on."""
     options = f"--out {folder} --seed {config.seed} --steps {config.total_steps}"
     if not (folder / CHECKPOINT).exists():
-        return (
-            f"stopped before the first checkpoint; start again: robofish train {source} {options}"
-        )
+        return f"stopped before the first checkpoint; start anew: robofish train {source} {options}"
     return (
         f"stopped; {folder / CHECKPOINT} keeps what was learnt until the last checkpoint. "
         f"Go on with: robofish train {source} {options} --resume"

@@ -109,7 +109,8 @@ def read_waypoints(file: Path) -> FloatArray:
     for number, row in enumerate(rows, 2):
         if len(row) != len(COLUMNS) or not all(abs(value) <= FARTHEST for value in row):
             raise ConfigError(
-                f"{file}: waypoint {number - 1}: give three numbers (m) of at most {FARTHEST:g}"
+                f"{file}: line {number}: give north,east,depth as numbers (m) of at most "
+                f"{FARTHEST:g}"
             )
     points = np.array(rows).reshape(-1, len(COLUMNS))
     if not 2 <= len(points) <= MOST_WAYPOINTS or not np.diff(points, axis=0).any(axis=1).all():

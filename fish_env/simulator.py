@@ -26,8 +26,6 @@ from fish_env.reading import is_number, shown
 from fish_env.trajectory import Trajectory
 
 REST_COMMANDS = (0.0, 0.0, 0.0, 0.0, 0.0)
-SHORTEST_STEP = 1e-6
-"""s. Rounding errors of the steps grow beyond what shorter steps gain."""
 MOST_STEPS = 1e8
 """Physics steps of one simulation, some minutes."""
 MOST_SAMPLES = 2_000_000
@@ -146,10 +144,6 @@ class Simulator:
         user_effects: Iterable[Effect] = (),
         trust_effects: bool = False,
     ) -> None:
-        if not is_number(dt) or not SHORTEST_STEP <= dt <= 0.1:
-            raise ScheduleError(
-                f"dt = {shown(dt)} s: choose a physics step from {SHORTEST_STEP:g} to 0.1 s"
-            )
         self.fish = as_fish(fish, trust_effects)
         self.model = build_model(self.fish, effects, user_effects)
         self.model.check_step(dt)

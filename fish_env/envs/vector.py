@@ -32,8 +32,8 @@ from fish_env.rendering import Scene
 Float32Array = npt.NDArray[np.float32]
 
 
-MOST_FISH = 1_000_000
-"""One fish takes some ten kilobytes."""
+MOST_FISH = 200_000
+"""A batch of so many takes some gigabytes."""
 MOST_THREADS = 4096
 
 

@@ -6,12 +6,14 @@ import warnings
 import numpy as np
 import pytest
 
+from fish_env.comparison import compare
 from fish_env.data import load_dataset
 from fish_env.envs.batch import real_actions
 from fish_env.envs.options import env_options
 from fish_env.errors import ConfigError, ParameterError, ScheduleError
 from fish_env.params import load_fish
 from fish_env.simulator import Simulator
+from fish_env.steady import steady_motion
 from tests.fixtures.measured_data import DESCRIPTION, good_folder
 from tests.fuzzing.found_inputs import (
     DESCRIPTIONS,
@@ -110,6 +112,8 @@ def test_a_grouped_number_is_one_and_base_60_is_none(tmp_path):
 def test_a_step_that_never_ends_is_refused(dt):
     with pytest.raises(ScheduleError, match="dt = "):
         Simulator("zheng-2021-a", dt=dt)
+    with pytest.raises(ScheduleError, match="dt = "):
+        compare(load_dataset("msu-steady"), dt=dt)
 
 
 @pytest.mark.parametrize(
@@ -137,3 +141,8 @@ def test_an_action_that_is_no_five_numbers_is_refused(action):
 def test_a_randomisation_that_draws_an_impossible_fish_is_refused():
     with pytest.raises(ConfigError, match=r"mass\.total.*no fish is possible"):
         env_options(randomization={"mass.total": [0.05, 3.0]})
+
+
+def test_a_beat_that_outlasts_the_wait_is_refused():
+    with pytest.raises(ScheduleError, match=r"tail_frequency 1e-300 Hz.*at least"):
+        steady_motion(load_fish("zheng-2021-a"), [[0.0, 0.3, 1e-300, 0.0, 0.0]])

@@ -23,8 +23,8 @@ import yaml
 
 MOST_TEXT_BYTES = 1_000_000
 """Of a YAML or JSON file; the largest that this package writes has a tenth of it."""
-MOST_TABLE_BYTES = 300_000_000
-"""Of a table: some three million rows."""
+MOST_TABLE_BYTES = 100_000_000
+"""Of a table: some two million rows, which take up to 3 GB of memory."""
 DEEPEST = 40
 """Levels of nesting; the deepest file of this package has six."""
 MOST_VALUES = 60_000

@@ -126,7 +126,7 @@ def read_results(path: Path) -> list[Result]:
     except FileNotFoundError:
         raise ConfigError(f"{path}: no such file; `robofish evaluate --json` makes one") from None
     except Unreadable as error:
-        raise ConfigError(f"{path}: {error}") from error
+        raise ConfigError(f"{path}: no results of `robofish evaluate`: {error}") from error
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise ConfigError(f"{path}: no results of `robofish evaluate`: {error!r}") from error
 

@@ -43,7 +43,7 @@ def check_count(name: str, value: Any, most: int) -> None:
     """
     whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
     if not whole or not 1 <= value <= most:
-        raise ConfigError(f"{name} {shown(value)}: a whole number from 1 to {most:,}")
+        raise ConfigError(f"{name} {shown(value)}: a whole number, at least 1 and at most {most:,}")
 
 
 def check_settings(tree: Tree, label: str) -> None:

@@ -8,7 +8,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint docs bench benchmark-diagnosis benchmark-realistic benchmark-power benchmark-time benchmark-agents benchmark-loop clean
+.PHONY: help setup demo test lint docs bench benchmark-diagnosis benchmark-realistic benchmark-power benchmark-time benchmark-agents benchmark-loop fuzz clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 28
@@ -61,6 +61,10 @@ benchmark-agents: setup  ## measure controllers and shipped policies on the froz
 
 benchmark-loop: setup  ## measure hidden fish, diagnose, learn on what was found, judge on them
 	$(BIN)/python -m scripts.measure_to_policy
+
+FUZZ_EXAMPLES ?= 2000
+fuzz: setup  ## try FUZZ_EXAMPLES hostile inputs in each test of the readers (2000: about an hour)
+	FUZZ_EXAMPLES=$(FUZZ_EXAMPLES) $(BIN)/python -m pytest tests/fuzzing
 
 clean:  ## remove .venv and everything that builds and tests leave behind
 	rm -rf $(VENV) build dist out .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

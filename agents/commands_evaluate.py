@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
 
-from agents.options import TrustEffects
+from fish_env.commands.options import Json, TrustEffects
 from fish_env.errors import ConfigError
-from fish_env.files import check_outputs
+from fish_env.files import STANDARD, check_outputs
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -36,7 +35,7 @@ def evaluate(
     episodes: Annotated[
         int | None, typer.Option(min=1, help="Only the first so many, for a first look.")
     ] = None,
-    json: Annotated[Path | None, typer.Option(help="File for all numbers.")] = None,
+    json: Json = None,
     trust_effects: TrustEffects = False,
 ) -> None:
     """Measure an agent on frozen sets of episodes, with 95 % intervals.
@@ -53,8 +52,9 @@ def evaluate(
     from agents.evaluation.results import write_results
     from agents.evaluation.suites import load_suite, suite_files, suite_names
     from agents.registry import agent_files, load_agents
+    from fish_env.commands.numbers import console_for
 
-    console = Console()
+    console = console_for(json)
     names = suite_names() if suite == ALL else [suite]
     read = [file for name in names for file in suite_files(name)]
     check_outputs([json], [*read, *agent_files(agent)])
@@ -70,7 +70,8 @@ def evaluate(
     print_results(console, results)
     if json is not None:
         write_results(json, results)
-        console.print(f"written: {json}", soft_wrap=True)
+        if str(json) != STANDARD:
+            console.print(f"written: {json}", soft_wrap=True)
 
 
 def task_names(task: str) -> list[str]:

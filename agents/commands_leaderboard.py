@@ -8,6 +8,8 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from fish_env.commands.options import Json
+
 
 def register(app: typer.Typer) -> None:
     """Adds the command to `robofish`."""
@@ -22,6 +24,7 @@ def leaderboard(
     metric: Annotated[
         str | None, typer.Option(help="Only this one, with its intervals; as in those files.")
     ] = None,
+    json: Json = None,
 ) -> None:
     """Show how the shipped agents do on the frozen suites, best return first.
 
@@ -32,10 +35,16 @@ def leaderboard(
     from rich.markdown import Markdown
 
     from agents.evaluation.leaderboard import SHIPPED, by_metric, overview
-    from agents.evaluation.results import read_results
+    from agents.evaluation.results import read_results, write_results
+    from fish_env.files import STANDARD, check_outputs
 
     results = [row for file in (SHIPPED, *(add or [])) for row in read_results(file)]
     table = overview(results) if metric is None else by_metric(results, metric)
+    if json is not None:
+        check_outputs([json], [SHIPPED, *(add or [])])
+        write_results(json, results)
+        if str(json) == STANDARD:
+            return
     console = Console()
     # A table in a file or a pipe is wanted as it stands in the README.
     if console.is_terminal:

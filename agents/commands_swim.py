@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
-from agents.options import TrustEffects
+from fish_env.commands.options import Json, TrustEffects
 
 
 def register(app: typer.Typer) -> None:
@@ -30,6 +29,7 @@ def swim(
     out: Annotated[Path, typer.Option(help="Folder for pictures.")] = Path("out/swim"),
     video: Annotated[Path | None, typer.Option(help="A film to write, .mp4.")] = None,
     replay: Annotated[Path | None, typer.Option(help="HTML page that shows it swim.")] = None,
+    json: Json = None,
     trust_effects: TrustEffects = False,
 ) -> None:
     """Let an agent swim one episode, and save pictures of it.
@@ -38,7 +38,11 @@ def swim(
 
     **Example:** `robofish swim --agent pid --task track --replay swim.html`
     """
-    from agents.swimming import Wish, swim_and_show
+    from agents.swimming import Wish, numbers_of, swim_and_show
+    from fish_env.commands.numbers import console_for, write_json
 
     wish = Wish(agent, task, suite, seed, path, out, video, replay, trust_effects)
-    swim_and_show(Console(), wish)
+    console = console_for(json, replay)
+    episode = swim_and_show(console, wish)
+    if json is not None:
+        write_json(console, json, numbers_of(wish, episode))

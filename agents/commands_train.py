@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from agents.options import TrustEffects
+from fish_env.commands.options import TrustEffects
 
 
 def train(

@@ -25,9 +25,13 @@ from fish_env.envs.robotic_fish_3d import RoboticFish3DEnv
 from fish_env.envs.tasks import TASKS
 from fish_env.errors import ConfigError
 from fish_env.files import check_outputs
+from fish_env.reading import Unreadable, plain_number, read_text
 from fish_env.rendering import check_installed
 
 COLUMNS = ("north", "east", "depth")
+FARTHEST = 1000.0
+"""m. A path as long as this takes three hours."""
+MOST_WAYPOINTS = 1000
 SLOWNESS = 1.5
 """A path may take this many times as long as its length at cruise speed, and ten seconds."""
 
@@ -90,14 +94,31 @@ def read_waypoints(file: Path) -> FloatArray:
     Raises:
         ConfigError: no such file, or not these columns.
     """
-    if not file.is_file():
-        raise ConfigError(f"{file}: no such file; give a CSV file with {', '.join(COLUMNS)}")
-    table = np.genfromtxt(file, delimiter=",", names=True, dtype=float)
-    if table.dtype.names != COLUMNS or not all(np.isfinite(table[c]).all() for c in COLUMNS):
+    try:
+        lines = [line.split(",") for line in read_text(file).splitlines() if line.strip()]
+    except FileNotFoundError:
         raise ConfigError(
-            f"{file}: a first line '{','.join(COLUMNS)}' and numbers (m) below it are needed"
+            f"{file}: no such file; give a CSV file with {', '.join(COLUMNS)}"
+        ) from None
+    except Unreadable as error:
+        raise ConfigError(f"{file}: {error}") from None
+    header = tuple(cell.strip() for cell in lines[0]) if lines else ()
+    if header != COLUMNS:
+        raise ConfigError(f"{file}: the first line must be '{','.join(COLUMNS)}'")
+    rows = [[plain_number(cell) for cell in line] for line in lines[1:]]
+    for number, row in enumerate(rows, 2):
+        if len(row) != len(COLUMNS) or not all(abs(value) <= FARTHEST for value in row):
+            raise ConfigError(
+                f"{file}: line {number}: give north,east,depth as numbers (m) of at most "
+                f"{FARTHEST:g}"
+            )
+    points = np.array(rows).reshape(-1, len(COLUMNS))
+    if not 2 <= len(points) <= MOST_WAYPOINTS or not np.diff(points, axis=0).any(axis=1).all():
+        raise ConfigError(
+            f"{file}: give 2 to {MOST_WAYPOINTS} waypoints, each at another place than the one "
+            "before"
         )
-    return np.column_stack([table[column] for column in COLUMNS])
+    return points
 
 
 def _environment(
@@ -140,6 +161,28 @@ def _in_words(episode: Episode, follower: PathFollower | None) -> str:
         f"{np.degrees(end.worst('heading_error')):.1f} degrees over a tail beat and "
         f"{100 * end.worst('speed_error') / end.worst('goal_speed'):.0f} % of the speed."
     )
+
+
+def numbers_of(wish: Wish, episode: Episode) -> dict[str, Any]:
+    """What an episode came to, as numbers.
+
+    Args:
+        wish: what was asked for.
+        episode: what was swum.
+    """
+    end = episode.last(10.0)
+    return {
+        "agent": wish.agent,
+        "task": wish.task,
+        "suite": wish.suite,
+        "seed": wish.seed,
+        "duration_s": episode["time_s"][-1],
+        "succeeded": episode.succeeded,
+        "failure": episode["failure"][-1],
+        "worst_depth_error_m_last_10_s": end.worst("depth_error"),
+        "worst_heading_error_rad_last_10_s": end.worst("heading_error"),
+        "worst_speed_error_m_s_last_10_s": end.worst("speed_error"),
+    }
 
 
 def _files(

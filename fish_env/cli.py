@@ -19,33 +19,35 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from fish_env.errors import RoboticFishError
+from fish_env.commands.options import Commands, Json, TrustEffects, Version
+from fish_env.errors import Interrupted, RoboticFishError
 
 app = typer.Typer(
     name="robofish",
+    cls=Commands,
     help="Simulate, compare and study a tail-driven robotic fish.",
     no_args_is_help=True,
-    add_completion=False,
     rich_markup_mode="markdown",
     pretty_exceptions_enable=False,
 )
 
-TrustEffects = Annotated[
-    bool,
-    typer.Option(
-        "--trust-effects",
-        help="Run the Python files of effects that the fish's file names. Reading runs no code.",
-    ),
-]
+
+@app.callback()
+def robofish(version: Version = False) -> None:
+    """Simulate, compare and study a tail-driven robotic fish."""
 
 
 @app.command()
 def simulate(
-    case: Annotated[Path, typer.Argument(help="The case, a JSON file.", metavar="CASE.json")],
+    case: Annotated[
+        Path,
+        typer.Argument(help="The case, a JSON file; - is standard input.", metavar="CASE.json"),
+    ],
     dt: Annotated[float, typer.Option(help="Longest physics step, s.")] = 0.001,
     rate: Annotated[float, typer.Option(help="Samples per second.")] = 10.0,
     out: Annotated[
-        Path | None, typer.Option(help="A .csv or .parquet file; without it, CSV is printed.")
+        Path | None,
+        typer.Option(help="A .csv or .parquet file; without it, or with -, CSV is printed."),
     ] = None,
     replay: Annotated[Path | None, typer.Option(help="HTML page that shows it swim.")] = None,
     trust_effects: TrustEffects = False,
@@ -70,7 +72,7 @@ def compare(
     fish: Annotated[
         str | None, typer.Option(help="Another fish than the dataset names: preset or file.")
     ] = None,
-    json: Annotated[Path | None, typer.Option(help="File for all numbers.")] = None,
+    json: Json = None,
     out: Annotated[Path | None, typer.Option(help="Folder for pictures.")] = None,
     dt: Annotated[float, typer.Option(help="Longest physics step, s.")] = 0.01,
     runs: Annotated[bool, typer.Option("--runs", help="Print every run.")] = False,
@@ -87,8 +89,9 @@ def compare(
     **Example:** `robofish compare msu-steady --out pictures --json errors.json`
     """
     from fish_env.commands.compare import compare_dataset
+    from fish_env.commands.numbers import console_for
 
-    compare_dataset(Console(), dataset, fish, json, out, dt, runs, replay, trust_effects)
+    compare_dataset(console_for(json), dataset, fish, json, out, dt, runs, replay, trust_effects)
 
 
 @app.command("import")
@@ -135,9 +138,14 @@ def import_command(
 def replay(
     files: Annotated[
         list[Path],
-        typer.Argument(help="Trajectories (.csv, .parquet), or runs of a dataset.", metavar="FILE"),
+        typer.Argument(
+            help="Trajectories (.csv, .parquet, or - for CSV from standard input) or runs.",
+            metavar="FILE",
+        ),
     ],
-    out: Annotated[Path, typer.Option(help="The page to write.")] = Path("replay.html"),
+    out: Annotated[Path, typer.Option(help="The page to write; - is standard output.")] = Path(
+        "replay.html"
+    ),
     fish: Annotated[
         str | None, typer.Option(help="Fish whose size is drawn: preset or file.")
     ] = None,
@@ -152,9 +160,10 @@ def replay(
 
     **Example:** `robofish replay swim.csv --case case.json --out swim.html`
     """
+    from fish_env.commands.numbers import console_for
     from fish_env.commands.replay import replay_files
 
-    replay_files(Console(), files, out, fish, case)
+    replay_files(console_for(out), files, out, fish, case)
 
 
 @app.command()
@@ -175,7 +184,8 @@ def diagnose(
             "--measured-beats", help="Tail frequencies from the hull's swaying, not as commanded."
         ),
     ] = False,
-    seed: Annotated[int, typer.Option(help="Of all that is random.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of all that is random.")] = 0,
+    json: Json = None,
     trust_effects: TrustEffects = False,
 ) -> None:
     """Find what the simulation gets wrong: a cause with numbers, or an honest "none I know".
@@ -187,8 +197,11 @@ def diagnose(
     **Example:** `robofish diagnose pool-trials --out out/pool`
     """
     from fish_env.commands.diagnose import diagnose_dataset
+    from fish_env.commands.numbers import console_for
 
-    diagnose_dataset(Console(), dataset, out, fish, quick, seed, measured_beats, trust_effects)
+    diagnose_dataset(
+        console_for(json), dataset, out, fish, quick, seed, measured_beats, trust_effects, json
+    )
 
 
 @app.command()
@@ -224,7 +237,8 @@ def fit(
         "identified.yaml"
     ),
     results: Annotated[
-        Path | None, typer.Option(help="JSON file for estimates and errors.")
+        Path | None,
+        typer.Option("--json", "--results", help="File for all numbers; - is standard output."),
     ] = None,
     trust_inputs: Annotated[
         bool,
@@ -240,10 +254,11 @@ def fit(
     **Example:** `robofish fit trials --objective whole-run --effects servo_lag --leave-out run`
     """
     from fish_env.commands.fit import effects_from, fit_and_write
+    from fish_env.commands.numbers import console_for
 
     fit_and_write(
-        Console(), dataset, fish, effects_from(effects), out, trust_effects, objective, leave_out,
-        results, trust_inputs,
+        console_for(results), dataset, fish, effects_from(effects), out, trust_effects, objective,
+        leave_out, results, trust_inputs,
     )  # fmt: skip
 
 
@@ -252,6 +267,7 @@ def info(
     fish: Annotated[str, typer.Option(help="A preset's name, or a parameter file.")] = (
         "zheng-2021-a"
     ),
+    json: Json = None,
     trust_effects: TrustEffects = False,
 ) -> None:
     """Show a fish: parameters and where they come from, trim, stability, reach and speeds.
@@ -259,8 +275,9 @@ def info(
     **Example:** `robofish info --fish msu-tail-fish`
     """
     from fish_env.commands.info import print_info
+    from fish_env.commands.numbers import console_for
 
-    print_info(Console(), fish, trust_effects)
+    print_info(console_for(json), fish, trust_effects, json)
 
 
 @app.command()
@@ -316,17 +333,20 @@ def demo(
 
 
 @app.command()
-def effects() -> None:
+def effects(json: Json = None) -> None:
     """List the effects that can be added to the model, with their parameters.
 
     **Example:** `robofish effects`
     """
     from fish_env.commands.effects import print_effects
+    from fish_env.commands.numbers import console_for
 
-    print_effects(Console())
+    print_effects(console_for(json), json)
 
 
 GROUP = "robofish.commands"
+INTERRUPTED = 130
+"""Exit status of a command that a person stopped, as of shells."""
 
 
 def add_commands(to: typer.Typer) -> None:
@@ -344,7 +364,10 @@ add_commands(app)
 
 
 def main() -> None:
-    """Runs `robofish`. An error that we raise on purpose is one red line, exit status 2."""
+    """Runs `robofish`. An error that we raise on purpose is one red line, exit status 2.
+
+    Ctrl-C is one yellow line, exit status 130.
+    """
     with warnings.catch_warnings():
         warnings.showwarning = lambda message, *_: _complain("yellow", f"robofish: {message}")
         # On its way out the interpreter would look for garbage among all that the compiler made,
@@ -355,7 +378,10 @@ def main() -> None:
 
 def _run() -> None:
     try:
-        app()
+        app(prog_name="robofish")
+    except Interrupted as error:
+        _complain("yellow", f"robofish: {error}")
+        raise SystemExit(INTERRUPTED) from None
     except RoboticFishError as error:
         _complain("red", f"robofish: {error}")
         raise SystemExit(2) from None
@@ -366,7 +392,9 @@ def _run() -> None:
 
 
 def _complain(colour: str, text: str) -> None:
-    line = " ".join(text.split())
+    from fish_env.reading import printable
+
+    line = printable(text)
     Console(stderr=True, soft_wrap=True).print(f"[{colour}]{escape(line)}[/{colour}]")
 
 

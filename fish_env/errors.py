@@ -31,6 +31,10 @@ class OutputError(RoboticFishError, OSError):
     """Raised when a file cannot be written, or when writing it would replace one that is read."""
 
 
+class Interrupted(RoboticFishError):
+    """Raised when a person stops a command; says what was kept and how to go on."""
+
+
 class MissingExtraError(RoboticFishError, ImportError):
     """Raised when a feature needs a package that only an optional extra installs."""
 

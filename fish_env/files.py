@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import errno
 import os
+import sys
 import uuid
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -15,6 +16,8 @@ from pathlib import Path
 
 from fish_env.errors import OutputError
 
+STANDARD = "-"
+"""As an output of a command: standard output; as an input: standard input."""
 PART = ".part"
 """Files that are being written have this in their names; a kill may leave one behind."""
 FORBIDDEN = '/\\:*?"<>|'
@@ -59,7 +62,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
 
 
 def write_bytes(path: str | Path, content: bytes) -> None:
-    """Writes a file at once, see :func:`replacing`.
+    """Writes a file at once, see :func:`replacing`; `-` is standard output.
 
     Args:
         path: The file to write.
@@ -68,8 +71,24 @@ def write_bytes(path: str | Path, content: bytes) -> None:
     Raises:
         OutputError: The file cannot be written.
     """
+    if str(path) == STANDARD:
+        _to_standard_output(content)
+        return
     with replacing(path) as part:
         part.write_bytes(content)
+
+
+def _to_standard_output(content: bytes) -> None:
+    try:
+        sys.stdout.flush()
+        stream = getattr(sys.stdout, "buffer", None)
+        if stream is None:  # replaced by a stream of text, as notebooks do
+            sys.stdout.write(content.decode("utf-8"))
+        else:
+            stream.write(content)
+            stream.flush()
+    except OSError as error:
+        raise cannot_write("standard output", error) from error
 
 
 def write_text(path: str | Path, text: str) -> None:
@@ -128,7 +147,7 @@ def check_outputs(
     read = [Path(path) for path in inputs if path is not None]
     written: list[Path] = []
     for output in (Path(path) for path in outputs if path is not None):
-        for other in read:
+        for other in read if str(output) != STANDARD else ():
             if _same(output, other):
                 called = "" if output == other else f" (as {other})"
                 raise OutputError(

@@ -22,9 +22,16 @@ from fish_env.model.runtime import Grid
 from fish_env.model.state import BASE_STATES, INPUTS
 from fish_env.params.io import as_fish
 from fish_env.params.schema import FishParams
+from fish_env.reading import is_number, shown
 from fish_env.trajectory import Trajectory
 
 REST_COMMANDS = (0.0, 0.0, 0.0, 0.0, 0.0)
+MOST_STEPS = 1e8
+"""Physics steps of one simulation, some minutes."""
+MOST_SAMPLES = 2_000_000
+"""Samples of one simulation, half a gigabyte."""
+LONGEST = 1e7
+"""s. Latest sample of a simulation; later ones are fewer bits apart than a step."""
 
 
 @dataclass(frozen=True)
@@ -137,8 +144,6 @@ class Simulator:
         user_effects: Iterable[Effect] = (),
         trust_effects: bool = False,
     ) -> None:
-        if not 0 < dt <= 0.1:
-            raise ScheduleError(f"dt = {dt} s: choose a physics step between 0 and 0.1 s")
         self.fish = as_fish(fish, trust_effects)
         self.model = build_model(self.fish, effects, user_effects)
         self.model.check_step(dt)
@@ -175,6 +180,7 @@ class Simulator:
         steps = commands if isinstance(commands, CommandSteps) else schedule(commands)
         self._warn_reach(steps)
         times = _sample_times(duration_s, rate_hz, sample_times_s)
+        _check_length(times, self.dt)
         arrivals = np.append(steps.times_s, steps.times_s[1:] + self.model.command_delay)
         grid, starts = time_grid(times, arrivals, self.dt)
         start = initial or InitialState()
@@ -290,6 +296,20 @@ class Simulator:
             )
 
 
+def _check_length(times: FloatArray, dt: float) -> None:
+    """Refuses what would take hours, or times that a float cannot tell apart."""
+    if times.size > MOST_SAMPLES or np.abs(times[[0, -1]]).max() > LONGEST:
+        raise ScheduleError(
+            f"{times.size:,} samples from {times[0]:g} to {times[-1]:g} s: simulate at most "
+            f"{MOST_SAMPLES:,}, within {LONGEST:g} s of 0"
+        )
+    if (times[-1] - times[0]) / dt > MOST_STEPS:
+        raise ScheduleError(
+            f"{times[-1] - times[0]:g} s in steps of {dt:g} s are more than {MOST_STEPS:g} steps; "
+            "lower the duration or use longer steps (dt)"
+        )
+
+
 def _sample_times(
     duration_s: float | None, rate_hz: float, sample_times_s: npt.ArrayLike | None
 ) -> FloatArray:
@@ -302,8 +322,15 @@ def _sample_times(
             raise ScheduleError("sample_times_s must be at least two finite, increasing times")
         return times
     assert duration_s is not None
-    if not (0 < duration_s < np.inf and 0 < rate_hz < np.inf):
-        raise ScheduleError(f"duration {duration_s} s and rate {rate_hz} Hz must be positive")
+    if not (is_number(duration_s) and is_number(rate_hz) and duration_s > 0 and rate_hz > 0):
+        raise ScheduleError(
+            f"duration {shown(duration_s)} s and rate {shown(rate_hz)} Hz must be positive numbers"
+        )
+    if duration_s * rate_hz > MOST_SAMPLES:
+        raise ScheduleError(
+            f"{duration_s:g} s at {rate_hz:g} Hz are more than {MOST_SAMPLES:,} samples; lower the "
+            "duration or the rate"
+        )
     count = int(np.floor(duration_s * rate_hz + 1e-9))
     times = np.arange(count + 1) / rate_hz
     return times if times[-1] > duration_s - 1e-9 else np.append(times, duration_s)

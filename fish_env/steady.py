@@ -83,6 +83,14 @@ def steady_motion(
     model = fish if isinstance(fish, ExtendedModel) else build_model(fish)
     model.check_step(dt)
     asked = _checked(commands)
+    frequency = asked[:, _FREQUENCY]
+    slow = (frequency > 0.0) & (frequency * longest_s < beats)
+    if slow.any():
+        raise ScheduleError(
+            f"tail_frequency {frequency[slow][0]:g} Hz: {beats} beats last longer than the "
+            f"{longest_s:g} s that a steady motion is waited for; give 0 or at least "
+            f"{beats / longest_s:.2g} Hz"
+        )
     record = np.repeat(model.record, len(asked), axis=1) if records is None else records
     result: dict[str, FloatArray] = {}
     for lanes in _lanes_by_frequency(asked[:, _FREQUENCY]):

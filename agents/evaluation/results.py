@@ -18,8 +18,10 @@ from agents.registry import Agent
 from fish_env.envs.registration import ENV_ID
 from fish_env.errors import ConfigError
 from fish_env.files import write_text
+from fish_env.reading import Unreadable, read_json
 
 RATES = ("success_rate", "failure_rate")
+MOST_BYTES = 20_000_000
 
 
 @dataclass(frozen=True)
@@ -119,11 +121,13 @@ def read_results(path: Path) -> list[Result]:
         ConfigError: no such file, or not results.
     """
     try:
-        rows = json.loads(path.read_text(encoding="utf-8"))["results"]
+        rows = read_json(path, MOST_BYTES)["results"]
         return [_from_json(row) for row in rows]
     except FileNotFoundError:
         raise ConfigError(f"{path}: no such file; `robofish evaluate --json` makes one") from None
-    except (ValueError, KeyError, TypeError) as error:
+    except Unreadable as error:
+        raise ConfigError(f"{path}: no results of `robofish evaluate`: {error}") from error
+    except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise ConfigError(f"{path}: no results of `robofish evaluate`: {error!r}") from error
 
 

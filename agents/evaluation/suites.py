@@ -7,13 +7,13 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from fish_env.envs.tasks import TASKS
 from fish_env.envs.vector import RoboticFish3DVectorEnv
 from fish_env.errors import ConfigError
 from fish_env.params.io import config_root, fish_files
+from fish_env.reading import Unreadable, is_number, located, read_yaml, shown
 
+MOST = {"version": 10**9, "seed": 10**12, "episodes": 100_000, "episode_steps": 100_000}
 RESERVED_SEEDS = range(1_000_000, 2_000_000)
 """Seeds of episodes that belong to the suites: nothing is trained, tuned or selected on them."""
 FINGERPRINT_TOLERANCE = 1e-3
@@ -96,9 +96,9 @@ def load_suite(name_or_path: str | Path, trust_effects: bool = False) -> Suite:
     """
     path = _find(name_or_path)
     try:
-        tree = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: not readable as YAML: {error}") from error
+        tree = read_yaml(path)
+    except Unreadable as error:
+        raise ConfigError(f"{path}: {error}") from error
     suite = _checked(tree, path)
     if not trust_effects:
         return suite
@@ -127,7 +127,11 @@ def environment_files(options: Mapping[str, Any]) -> list[Path]:
 
 def _find(name_or_path: str | Path) -> Path:
     named = str(name_or_path) in suite_names()
-    path = config_root() / "benchmarks" / f"{name_or_path}.yaml" if named else Path(name_or_path)
+    try:
+        path = config_root() / "benchmarks" / f"{name_or_path}.yaml"
+        path = path if named else located(name_or_path)
+    except Unreadable as error:
+        raise ConfigError(f"{error}") from None
     if not path.is_file():
         raise ConfigError(
             f"suite '{name_or_path}': neither one of {', '.join(suite_names())} nor a file"
@@ -139,15 +143,25 @@ def _checked(tree: Any, path: Path) -> Suite:
     wanted = {field.name for field in fields(Suite)}
     if not isinstance(tree, dict) or set(tree) != wanted:
         given = set(tree) if isinstance(tree, dict) else set()
+        unknown = shown(sorted(map(str, given - wanted)))
         raise ConfigError(
             f"{path}: a suite has exactly the keys {', '.join(sorted(wanted))}; "
-            f"missing: {sorted(wanted - given)}, unknown: {sorted(given - wanted)}"
+            f"missing: {sorted(wanted - given)}, unknown: {unknown}"
         )
     for key in ("version", "seed", "episodes", "episode_steps"):
-        if not isinstance(tree[key], int) or tree[key] < 1:
-            raise ConfigError(f"{path}: '{key}' must be a whole number from 1 up, got {tree[key]}")
+        if type(tree[key]) is not int or not 1 <= tree[key] <= MOST[key]:
+            raise ConfigError(
+                f"{path}: '{key}' must be a whole number from 1 to {MOST[key]:,}, "
+                f"got {shown(tree[key])}"
+            )
+    for key in ("name", "summary"):
+        if not isinstance(tree[key], str) or not tree[key].isprintable():
+            raise ConfigError(f"{path}: '{key}' must be a text on one line")
     prints = tree["fingerprint"]
-    if not isinstance(tree["environment"], dict) or set(prints or ()) != set(TASKS):
+    whole = isinstance(prints, dict) and set(prints) == set(TASKS)
+    if not isinstance(tree["environment"], dict) or not (
+        whole and all(map(is_number, prints.values()))
+    ):
         raise ConfigError(
             f"{path}: 'environment' must be a mapping of options, 'fingerprint' one with a number "
             f"for each of {', '.join(TASKS)}"

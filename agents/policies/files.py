@@ -9,6 +9,9 @@ from __future__ import annotations
 import hashlib
 import io
 import json
+import math
+import struct
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -25,13 +28,16 @@ from fish_env.envs.layout import OBSERVATION
 from fish_env.envs.registration import ENV_ID
 from fish_env.errors import ConfigError
 from fish_env.files import write_bytes
+from fish_env.reading import Unreadable, located, parse_json, read_bytes, short, shown
 
 FORMAT = "robofish-policy-1"
 ACTIONS = 5
+MOST_LAYERS = 20
 MOST_BYTES = 20_000_000
 """A policy file is some tens of kilobytes; a larger archive is not unpacked."""
 UNREADABLE = (
     zipfile.BadZipFile, zlib.error, EOFError, OSError, ValueError, KeyError, RuntimeError,
+    TypeError, OverflowError, MemoryError, struct.error, tokenize.TokenError, SyntaxError,
 )  # fmt: skip
 """What a damaged archive raises; RuntimeError where it seems encrypted or of a later ZIP."""
 Arrays = Mapping[str, npt.NDArray[Any]]
@@ -94,9 +100,9 @@ def read_policy(path: str | Path) -> PolicyFile:
     arrays = _unpack(file)
     document = _text(file, arrays, "about")
     try:
-        about = json.loads(document)
-    except json.JSONDecodeError as error:
-        raise ConfigError(f"{file}: its description is no JSON ({error}); it is damaged") from None
+        about = parse_json(document)
+    except Unreadable as error:
+        raise ConfigError(f"{file}: its description: {error.reason}; it is damaged") from None
     if not isinstance(about, dict) or about.get("format") != FORMAT:
         raise ConfigError(f"{file}: not a policy file of the format {FORMAT}")
     _check_environment(file, about)
@@ -105,24 +111,62 @@ def read_policy(path: str | Path) -> PolicyFile:
         raise ConfigError(f"{file}: its checksum does not fit; it was changed or is damaged")
     try:
         return _build(about, numbers)
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise ConfigError(f"{file}: {error!r} in its description; it is damaged") from None
 
 
 def _unpack(file: Path) -> dict[str, npt.NDArray[Any]]:
-    if not file.is_file():
-        raise ConfigError(f"{file}: no such policy file")
     try:
-        with zipfile.ZipFile(file) as archive:
-            size = sum(member.file_size for member in archive.infolist())
-        if size > MOST_BYTES:
-            raise ConfigError(f"{file}: {size} bytes unpacked; no policy is larger than 20 MB")
-        with np.load(file, allow_pickle=False) as members:
-            return {name: members[name] for name in members.files}
+        if not located(file).is_file():
+            raise ConfigError(f"{file}: no such policy file")
+        content = read_bytes(file, MOST_BYTES)
+        return read_arrays(content, MOST_BYTES)
+    except Unreadable as error:
+        raise ConfigError(f"{file}: {error}") from None
     except UNREADABLE as error:
         raise ConfigError(
             f"{file}: not a readable policy file ({error}); it is truncated, damaged or foreign"
         ) from None
+
+
+def read_arrays(content: bytes, most: int) -> dict[str, npt.NDArray[Any]]:
+    """Unpacks NumPy's archive without pickles, in bounded memory.
+
+    Args:
+        content: of the file.
+        most: bytes that may be unpacked; a header that asks for more is refused, whatever the
+            archive says of its sizes.
+
+    Raises:
+        ValueError, KeyError, BadZipFile: no such archive, damaged, or larger.
+    """
+    arrays = dict[str, npt.NDArray[Any]]()
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        left = most
+        for member in archive.infolist():
+            with archive.open(member) as stream:
+                packed = stream.read(left + 1)
+            left -= len(packed)
+            if left < 0:
+                raise ValueError(f"more than {most / 1e6:g} MB unpacked")
+            if not member.filename.endswith(".npy"):
+                raise ValueError(f"{member.filename!r} is no array")
+            _check_size(packed, most)
+            array = np.lib.format.read_array(io.BytesIO(packed), allow_pickle=False)
+            arrays[member.filename.removesuffix(".npy")] = array
+    return arrays
+
+
+def _check_size(packed: bytes, most: int) -> None:
+    """Refuses a header that promises more than the file holds, before memory is taken for it."""
+    stream = io.BytesIO(packed)
+    version = np.lib.format.read_magic(stream)
+    read = np.lib.format.read_array_header_1_0
+    if version != (1, 0):
+        read = np.lib.format.read_array_header_2_0
+    shape, _, kind = read(stream)
+    if math.prod(shape) * kind.itemsize > most or any(size < 0 for size in shape):
+        raise ValueError(f"an array of shape {shape}")
 
 
 def _text(file: Path, arrays: Arrays, name: str) -> str:
@@ -135,14 +179,15 @@ def _text(file: Path, arrays: Arrays, name: str) -> str:
 def _check_environment(file: Path, about: Mapping[str, Any]) -> None:
     if about.get("environment") != ENV_ID:
         raise ConfigError(
-            f"{file}: trained in {about.get('environment')}, and this is {ENV_ID}, which behaves "
-            "otherwise; train it again, or install the version of the package that it belongs to"
+            f"{file}: trained in {short(str(about.get('environment')))}, and this is {ENV_ID}, "
+            "which behaves otherwise; train it again, or install the version of the package that "
+            "it belongs to"
         )
     sizes = (about.get("observation"), about.get("actions"))
     if sizes != (len(OBSERVATION), ACTIONS):
         raise ConfigError(
-            f"{file}: for {sizes[0]} observations and {sizes[1]} actions; {ENV_ID} has "
-            f"{len(OBSERVATION)} and {ACTIONS}"
+            f"{file}: for {shown(sizes[0])} observations and {shown(sizes[1])} actions; {ENV_ID} "
+            f"has {len(OBSERVATION)} and {ACTIONS}"
         )
 
 
@@ -151,6 +196,8 @@ def _build(about: Mapping[str, Any], arrays: Arrays) -> PolicyFile:
         int(about["frames"]), tuple(map(float, about["low_pass_s"])), float(about["period_s"])
     )
     layers = int(about["layers"])
+    if not 1 <= layers <= MOST_LAYERS:
+        raise ValueError(f"{layers} layers")
     weights = tuple(arrays[f"weight_{i}"] for i in range(layers))
     biases = tuple(arrays[f"bias_{i}"] for i in range(layers))
     network = Network(
@@ -164,8 +211,12 @@ def _build(about: Mapping[str, Any], arrays: Arrays) -> PolicyFile:
 
 
 def _check_network(network: Network, seen: int) -> None:
+    if not 0.0 < network.limit < np.inf:
+        raise ValueError(f"a limit of {network.limit}")
     if network.activation not in ACTIVATIONS or network.output not in OUTPUTS:
         raise ValueError(f"unknown '{network.activation}' or '{network.output}'")
+    if network.mean.dtype.kind != "f" or network.scale.dtype.kind != "f":
+        raise ValueError("the normalisation must be floating-point numbers")
     if network.mean.shape != (seen,) or network.scale.shape != (seen,):
         raise ValueError("the normalisation does not fit the observation")
     width = seen

@@ -10,7 +10,8 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from agents.training.card import shares
 from agents.training.config import TrainConfig, files_behind, load_train_config
-from agents.training.run import CONFIG, Outcome, outputs, train
+from agents.training.run import CHECKPOINT, CONFIG, Outcome, outputs, train
+from fish_env.errors import Interrupted
 from fish_env.files import check_outputs
 
 
@@ -81,8 +82,22 @@ def run(
         TimeRemainingColumn(),
     )  # fmt: skip
     with Progress(*columns, console=console, transient=True) as bar:
-        outcome = train(config, folder, Screen(bar, config.total_steps), resume)
+        try:
+            outcome = train(config, folder, Screen(bar, config.total_steps), resume)
+        except KeyboardInterrupt:
+            raise Interrupted(_stopped(source, folder, config)) from None
     _report(console, config, outcome)
+
+
+def _stopped(source: str, folder: Path, config: TrainConfig) -> str:
+    """What was kept of a training that a person stopped, and how to go on."""
+    options = f"--out {folder} --seed {config.seed} --steps {config.total_steps}"
+    if not (folder / CHECKPOINT).exists():
+        return f"stopped before the first checkpoint; start anew: robofish train {source} {options}"
+    return (
+        f"stopped; {folder / CHECKPOINT} keeps what was learnt until the last checkpoint. "
+        f"Go on with: robofish train {source} {options} --resume"
+    )
 
 
 def _report(console: Console, config: TrainConfig, outcome: Outcome) -> None:

@@ -16,10 +16,10 @@ from agents.policies.history import HistorySpec
 from agents.policies.network import ACTIVATIONS
 from agents.training.schema import build
 from agents.training.teacher_gains import TEACHER_GAIN_NAMES
-from fish_env.envs.config_checks import is_number
 from fish_env.envs.options import env_options
 from fish_env.errors import ConfigError
 from fish_env.params.io import config_root
+from fish_env.reading import Unreadable, is_number, located, read_yaml
 
 SCHEDULES = ("constant", "linear")
 NOT_BY_FILE = "no file can say that it is trusted; remove the key and give --trust-effects"
@@ -303,9 +303,9 @@ def load_train_config(
     """
     file = _find(name_or_path)
     try:
-        tree = yaml.safe_load(file.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{file}: not readable as YAML: {error}") from error
+        tree = read_yaml(file)
+    except Unreadable as error:
+        raise ConfigError(f"{file}: {error}") from error
     if isinstance(tree, Mapping):
         tree = {"name": file.stem, **tree}
         if TRUST in tree:
@@ -335,7 +335,10 @@ def _find(name_or_path: str | Path) -> Path:
     shipped = sorted(file.stem for file in folder.glob("*.yaml"))
     if str(name_or_path) in shipped:
         return folder / f"{name_or_path}.yaml"
-    path = Path(name_or_path).expanduser()
+    try:
+        path = located(name_or_path)
+    except Unreadable as error:
+        raise ConfigError(f"{error}") from None
     if path.is_file():
         return path
     raise ConfigError(

@@ -6,7 +6,6 @@ Reading such a file can run no code: arrays of objects are refused, and JSON hol
 from __future__ import annotations
 
 import json
-import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,10 +13,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from agents.policies.files import read_arrays
 from fish_env.files import replacing
+from fish_env.reading import Unreadable, parse_json, read_bytes
 
 Tree = Any
 """None, bool, int, float, str, array, list of trees, or mapping from str to trees."""
+MOST_BYTES = 8_000_000_000
+"""A replay buffer of a million steps has one."""
 TREE, ARRAY = "tree", "__array__"
 
 
@@ -44,14 +47,11 @@ def read_plain(path: Path) -> Tree:
     Raises:
         OSError, ValueError, KeyError, BadZipFile: it is no such file, or damaged.
     """
-    if not zipfile.is_zipfile(path):
-        raise ValueError("no archive of arrays")
-    with np.load(path, allow_pickle=False) as archive:
-        arrays = {name: archive[name] for name in archive.files}
-    foreign = [name for name, value in arrays.items() if not isinstance(value, np.ndarray)]
-    if foreign:
-        raise ValueError(f"{foreign[0]} is no array")
-    return _with_arrays(json.loads(str(arrays[TREE])), arrays)
+    try:
+        arrays = read_arrays(read_bytes(path, MOST_BYTES), MOST_BYTES)
+        return _with_arrays(parse_json(str(arrays[TREE])), arrays)
+    except Unreadable as error:
+        raise ValueError(error.reason) from None
 
 
 def _without_arrays(value: Tree, arrays: dict[str, npt.NDArray[Any]], place: str) -> Tree:

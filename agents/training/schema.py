@@ -6,8 +6,8 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any, TypeVar, get_args, get_origin, get_type_hints
 
-from fish_env.envs.config_checks import is_number
 from fish_env.errors import ConfigError
+from fish_env.reading import is_number, short, shown
 
 T = TypeVar("T")
 
@@ -29,7 +29,9 @@ def build(cls: type[T], tree: Any, place: str) -> T:
         raise ConfigError(f"{place}: must be a mapping with {', '.join(known)}")
     for key in tree:
         if key not in known:
-            raise ConfigError(f"{place}: unknown key '{key}'; known here: {', '.join(known)}")
+            raise ConfigError(
+                f"{place}: unknown key '{short(str(key))}'; known here: {', '.join(known)}"
+            )
     hints = get_type_hints(cls)
     values: dict[str, Any] = {}
     for name, field in known.items():
@@ -52,11 +54,11 @@ def _value(hint: Any, value: Any, place: str) -> Any:
         return None if value is None else _value(inner, value, place)
     if get_origin(hint) is tuple:
         if not isinstance(value, (list, tuple)):
-            raise ConfigError(f"{place} must be a list, got {value!r}")
+            raise ConfigError(f"{place} must be a list, got {shown(value)}")
         return tuple(_value(kinds[0], item, place) for item in value)
     if get_origin(hint) is Mapping:
         if not isinstance(value, Mapping):
-            raise ConfigError(f"{place} must be a mapping, got {value!r}")
+            raise ConfigError(f"{place} must be a mapping, got {shown(value)}")
         return dict(value)
     return _scalar(hint, value, place)
 
@@ -70,4 +72,4 @@ def _scalar(kind: type, value: Any, place: str) -> Any:
     if kind in (bool, str) and isinstance(value, kind):
         return value
     names = {float: "a finite number", int: "a whole number", bool: "true or false", str: "a text"}
-    raise ConfigError(f"{place} must be {names[kind]}, got {value!r}")
+    raise ConfigError(f"{place} must be {names[kind]}, got {shown(value)}")

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import difflib
 import json
-import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +15,16 @@ from typing import Any
 
 from fish_env.data.schema import CommandSteps
 from fish_env.errors import ScheduleError
+from fish_env.files import STANDARD
 from fish_env.params import FishParams, list_fish, load_fish
+from fish_env.reading import (
+    Unreadable,
+    is_number,
+    located,
+    parse_json,
+    read_json,
+    read_standard_input,
+)
 from fish_env.simulator import InitialState, schedule
 
 REQUIRED = ("fish", "duration_s", "schedule")
@@ -53,7 +61,7 @@ def read_case(file: Path, trust_effects: bool = False) -> Case:
     """Reads a case.
 
     Args:
-        file: The case.
+        file: The case; `-` is standard input, paths in it are then relative to this folder.
         trust_effects: Let its simulation run the effect files that the fish's file names.
 
     Raises:
@@ -74,11 +82,12 @@ def read_case(file: Path, trust_effects: bool = False) -> Case:
 
 def _read_json(file: Path) -> Mapping[str, Any]:
     try:
-        data = json.loads(file.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ScheduleError(f"{file}: cannot be read, {error.strerror}; check the path") from error
-    except ValueError as error:
-        raise ScheduleError(f"{file}: this is no JSON: {error}") from error
+        standard = str(file) == STANDARD
+        data = parse_json(read_standard_input()) if standard else read_json(file)
+    except FileNotFoundError:
+        raise ScheduleError(f"{file}: no such file; check the path") from None
+    except Unreadable as error:
+        raise ScheduleError(f"{file}: {error}") from error
     return _mapping(data, str(file))
 
 
@@ -105,7 +114,10 @@ def _check_keys(
 def _fish(name: Any, file: Path, trust_effects: bool) -> FishParams:
     if not isinstance(name, str):
         raise ScheduleError(f"{file}: fish: expected a preset's name or a path, got {_shown(name)}")
-    beside = file.parent / name
+    try:
+        beside = located(name, file.parent)
+    except Unreadable as error:
+        raise ScheduleError(f"{file}: fish: {error}") from None
     # A name without an ending that is no file is a misspelt preset: load_fish suggests the nearest.
     is_path = name not in list_fish() and (beside.is_file() or beside.suffix in (".yaml", ".yml"))
     return load_fish(beside if is_path else name, trust_effects)
@@ -153,7 +165,7 @@ def _numbers(data: Any, where: str) -> dict[str, float]:
 
 
 def _number(value: Any, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if not is_number(value):
         raise ScheduleError(f"{where}: expected a finite number, got {_shown(value)}")
     return float(value)
 

@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 from rich import box
 from rich.console import Console
+from rich.markup import escape
 from rich.padding import Padding
 from rich.progress import Progress
 from rich.table import Table
 
-from fish_env.comparison import RunComparison, RunsComparison, SteadyComparison
-from fish_env.comparison.runs import compare_runs
-from fish_env.comparison.tables import compare_steady
+from fish_env.commands.numbers import write_json
+from fish_env.comparison import RunComparison, RunsComparison, SteadyComparison, compare
 from fish_env.comparison.words import in_words, shown_unit
 from fish_env.data import Dataset, SteadyDataset, dataset_files, load_dataset
 from fish_env.errors import DatasetError
-from fish_env.files import check_outputs, write_text
+from fish_env.files import check_outputs
 from fish_env.params import FishParams, fish_files, load_fish
 
 Comparison = RunsComparison | SteadyComparison
@@ -61,10 +60,10 @@ def compare_dataset(
     comparison = _compare(console, measured, model, dt)
     print_comparison(console, comparison, every_run)
     if json_file is not None:
-        write_text(json_file, json.dumps(comparison.as_dict(), indent=1, allow_nan=False) + "\n")
-        console.print(f"numbers: {json_file}", soft_wrap=True)
+        write_json(console, json_file, comparison.as_dict())
     if out is not None:
         draw(console, comparison, out)
+    suggest_diagnosis(console, dataset)
     if replay is not None and isinstance(measured, Dataset):
         from fish_env.commands.replay import replay_comparison
 
@@ -78,10 +77,21 @@ def _compare(
 ) -> Comparison:
     if isinstance(measured, SteadyDataset):
         with console.status("simulating until steady"):
-            return compare_steady(measured, fish, dt)
+            return compare(measured, fish, dt)
     with Progress(console=console, transient=True) as progress:
         task = progress.add_task("simulating runs", total=len(measured.runs))
-        return compare_runs(measured, fish, dt, lambda _: progress.advance(task))
+        return compare(measured, fish, dt, progress=lambda _: progress.advance(task))
+
+
+def suggest_diagnosis(console: Console, dataset: str) -> None:
+    """Names the command that finds the cause of what a comparison shows."""
+    name = Path(dataset).resolve().name if Path(dataset).exists() else dataset
+    console.print(
+        f"next: to find what causes these errors: robofish diagnose {dataset} --out out/{name}",
+        soft_wrap=True,
+        highlight=False,
+        markup=False,
+    )
 
 
 def draw(console: Console, comparison: Comparison, folder: Path) -> None:
@@ -101,22 +111,23 @@ def draw(console: Console, comparison: Comparison, folder: Path) -> None:
 
 
 def print_comparison(console: Console, comparison: Comparison, every_run: bool = False) -> None:
-    """Prints tables, findings in words, and the notes of the dataset."""
+    """Prints the findings in words, tables, and the notes of the dataset."""
     effects = ", ".join(comparison.effects) or "none"
     console.print(
-        f"[bold]{comparison.dataset}[/bold] against fish [bold]{comparison.fish}[/bold] "
-        f"(effects: {effects}); errors are simulated minus measured",
+        f"[bold]{escape(comparison.dataset)}[/bold] against fish "
+        f"[bold]{escape(comparison.fish)}[/bold] (effects: {escape(effects)}); "
+        "errors are simulated minus measured",
         highlight=False,
         soft_wrap=True,
     )
+    for sentence in in_words(comparison):
+        console.print(f"• {sentence}", highlight=False, markup=False)
     if isinstance(comparison, SteadyComparison):
         _print_steady(console, comparison)
     else:
         _print_runs(console, comparison, every_run)
-    for sentence in in_words(comparison):
-        console.print(f"• {sentence}", highlight=False)
     for note in comparison.notes:
-        console.print(f"note: {note}", style="dim", highlight=False)
+        console.print(f"note: {note}", style="dim", highlight=False, markup=False)
 
 
 def _table(title: str, *columns: str) -> Table:
@@ -158,7 +169,8 @@ def _print_steady(console: Console, comparison: SteadyComparison) -> None:
     console.print(table)
     console.print(Padding("\n".join(left_out), (0, 0, 1, 0)), style="dim", highlight=False)
     if comparison.unsteady:
-        console.print(f"not steady after the longest wait: {', '.join(comparison.unsteady)}")
+        names = ", ".join(comparison.unsteady)
+        console.print(f"not steady after the longest wait: {names}", markup=False)
     console.print(_worst_table(comparison))
 
 
@@ -170,7 +182,7 @@ def _worst_table(comparison: SteadyComparison) -> Table:
         unit, factor = shown_unit(name)
         for condition, error, measured, simulated in comparison.worst(name):
             numbers = (factor * value for value in (measured, simulated, error))
-            table.add_row(condition, name, unit, *map(_shown, numbers))
+            table.add_row(escape(condition), name, unit, *map(_shown, numbers))
         table.add_section()
     return table
 
@@ -184,7 +196,7 @@ def _print_runs(console: Console, comparison: RunsComparison, every_run: bool) -
     else:
         console.print("every run: --runs, or --json for all numbers", style="dim")
     starts = dict.fromkeys(run.start_from for run in comparison.runs)
-    console.print(f"simulations start from: {'; or '.join(starts)}", highlight=False)
+    console.print(f"simulations start from: {'; or '.join(starts)}", highlight=False, markup=False)
 
 
 def _error_table(title: str, first: str, groups: Groups) -> Table:
@@ -193,7 +205,7 @@ def _error_table(title: str, first: str, groups: Groups) -> Table:
     for name, runs in groups.items():
         for row, channel in enumerate(runs[0].errors):
             path = [float(np.nanmax(run.path_error_m)) for run in runs if run.path_error_m.size]
-            heading = (name, str(len(runs))) if row == 0 else ("", "")
+            heading = (escape(name), str(len(runs))) if row == 0 else ("", "")
             farthest = f"{max(path):.3f}" if path and row == 0 else ""
             table.add_row(*heading, *_errors(channel, runs), farthest)
         table.add_section()

@@ -12,9 +12,13 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from fish_env.commands.numbers import write_json
+from fish_env.data import dataset_files
 from fish_env.diagnosis.answer import holds_elsewhere, words
 from fish_env.diagnosis.pipeline import diagnose
 from fish_env.diagnosis.writing import EXTENDED
+from fish_env.errors import Interrupted
+from fish_env.files import check_outputs
 from fish_env.identification.generic_forces import wrench_unit
 from fish_env.inference.verdict import EXTENDING
 
@@ -31,6 +35,7 @@ def diagnose_dataset(
     seed: int,
     measured_beats: bool = False,
     trust_effects: bool = False,
+    json_file: Path | None = None,
 ) -> dict[str, Any]:
     """Diagnoses a dataset, prints the verdict and writes the files.
 
@@ -43,10 +48,12 @@ def diagnose_dataset(
         seed: Of the split into runs and of the null distributions.
         measured_beats: Take the tail's frequencies from the hull's swaying.
         trust_effects: Run the effect files that the fish's file names.
+        json_file: File for the content of `diagnosis.json` once more.
 
     Raises:
         RoboticFishError: The data or the fish cannot be used.
     """
+    check_outputs([json_file], dataset_files(dataset))
     # What is loaded by now stays, and hardly anything made later refers to itself: to look for
     # garbage as often as usual would take a fifteenth of a first look's time.
     gc.freeze()
@@ -58,9 +65,17 @@ def diagnose_dataset(
         def tell(step: str) -> None:
             progress.update(task, description=step)
 
-        answer = diagnose(dataset, out, seed, quick, fish, tell, measured_beats, trust_effects)
+        try:
+            answer = diagnose(dataset, out, seed, quick, fish, tell, measured_beats, trust_effects)
+        except KeyboardInterrupt:
+            raise Interrupted(
+                f"stopped; nothing was written, {out} is as it was. Start again, with --quick for "
+                "a first look"
+            ) from None
     print_answer(console, answer)
     _print_files(console, out, answer["verdict"] in EXTENDING)
+    if json_file is not None:
+        write_json(console, json_file, answer)
     return answer
 
 
@@ -96,7 +111,7 @@ def print_answer(console: Console, answer: dict[str, Any]) -> None:
     for doubt in answer.get("doubts", ()):
         console.print(f"doubt: {escape(doubt)}", highlight=False)
     for note in answer["notes"]:
-        console.print(f"note: {note}", style="dim", highlight=False)
+        console.print(f"note: {note}", style="dim", highlight=False, markup=False)
 
 
 def _table(title: str, *columns: str) -> Table:

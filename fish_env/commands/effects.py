@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 from math import isinf
+from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
@@ -11,13 +14,21 @@ from rich.rule import Rule
 from rich.table import Table
 from rich.text import Text
 
+from fish_env.commands.numbers import write_json
 from fish_env.effects import catalogue
 from fish_env.model.effect import SECTIONS, Effect
 
 
-def print_effects(console: Console) -> None:
-    """Prints every effect with its parameters, section by section."""
+def print_effects(console: Console, json_file: Path | None = None) -> None:
+    """Prints every effect with its parameters, section by section.
+
+    Args:
+        console: Where they go.
+        json_file: File for the same as JSON.
+    """
     effects = catalogue().values()
+    if json_file is not None:
+        write_json(console, json_file, {effect.name: _numbers(effect) for effect in effects})
     for section in SECTIONS:
         members = [effect for effect in effects if effect.section == section]
         if members:
@@ -29,6 +40,12 @@ def print_effects(console: Console) -> None:
         "with Simulator(fish, effects=...). At its neutral values an effect changes nothing.",
         highlight=False,
     )
+
+
+def _numbers(effect: Effect) -> dict[str, Any]:
+    words = {name: getattr(effect, name) for name in ("section", "summary", "equation", "source")}
+    parameters = {p.name: dataclasses.asdict(p) for p in effect.parameters}
+    return {**words, "parameters": parameters, "confusable_with": effect.confusable_with}
 
 
 def _print_effect(console: Console, effect: Effect) -> None:

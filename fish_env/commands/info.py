@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 from rich import box
 from rich.console import Console, Group
@@ -10,23 +14,33 @@ from rich.panel import Panel
 from rich.rule import Rule
 from rich.table import Table
 
+from fish_env.commands.numbers import write_json
 from fish_env.effects.extended import build_model
-from fish_env.params import FishParams, list_fish, load_fish
+from fish_env.files import check_outputs
+from fish_env.params import FishParams, fish_files, list_fish, load_fish
 from fish_env.simulator import Simulator
 from fish_env.studies import portrait
 
+PARAMETER_FIELDS = ("value", "unit", "prior_sd", "status", "source")
 DEG = 180.0 / np.pi
 
 
-def print_info(console: Console, fish_name: str, trust_effects: bool = False) -> None:
+def print_info(
+    console: Console,
+    fish_name: str,
+    trust_effects: bool = False,
+    json_file: Path | None = None,
+) -> None:
     """Prints parameters, trim, stability, reach, speeds and effects of a fish.
 
     Args:
         console: Where they go.
         fish_name: A preset's name, or a parameter file.
         trust_effects: Run the effect files that the fish's file names.
+        json_file: File for all numbers.
     """
     fish = load_fish(fish_name, trust_effects)
+    check_outputs([json_file], fish_files(fish))
     simulator = Simulator(fish)
     console.print(_heading(fish))
     console.print(_parameters(fish))
@@ -37,17 +51,38 @@ def print_info(console: Console, fish_name: str, trust_effects: bool = False) ->
         speeds = portrait.cruise_speeds(fish)
     console.print(_speeds(speeds))
     _print_effects(console, fish)
+    if json_file is not None:
+        write_json(console, json_file, _numbers(fish, simulator, speeds))
+
+
+def _numbers(fish: FishParams, simulator: Simulator, speeds: np.ndarray) -> dict[str, Any]:
+    parameters = {
+        path: {name: getattr(fish.info(path), name) for name in PARAMETER_FIELDS}
+        for path in fish.values()
+    }
+    return {
+        "fish": fish.name,
+        "parameters": parameters,
+        "block_displacement_reach_m": simulator.crank.reach,
+        "static_margins": dataclasses.asdict(portrait.static_margins(simulator)),
+        "speeds_m_s": {
+            "amplitudes_deg": portrait.AMPLITUDES_DEG,
+            "frequencies_hz": portrait.FREQUENCIES_HZ,
+            "speeds": speeds,
+        },
+        "effects": fish.effects,
+    }
 
 
 def _heading(fish: FishParams) -> Panel:
     surplus = 1000.0 * (fish.get("mass.buoyancy") - fish.get("mass.total"))
     floats = "neutral" if abs(surplus) < 1e-6 else ("floats" if surplus > 0 else "sinks")
     lines = [
-        f"file      {fish.source_file}",
+        f"file      {escape(str(fish.source_file))}",
         f"mass      {fish.get('mass.total'):g} kg, buoyancy {surplus:+.2f} g ({floats})",
         f"presets   {', '.join(list_fish())}",
     ]
-    return Panel(Group(*lines), title=f"[bold]{fish.name}[/bold]", title_align="left")
+    return Panel(Group(*lines), title=f"[bold]{escape(fish.name)}[/bold]", title_align="left")
 
 
 def _sources(fish: FishParams) -> dict[str, int]:
@@ -150,4 +185,6 @@ def _print_effects(console: Console, fish: FishParams) -> None:
     for name in fish.effects:
         values = model.effects.get(name)
         text = ", ".join(f"{key} {value:g}" for key, value in (values or {}).items())
-        console.print(f"{name}: {text or 'at its neutral values, so off'}", highlight=False)
+        console.print(
+            f"{name}: {text or 'at its neutral values, so off'}", highlight=False, markup=False
+        )

@@ -11,7 +11,7 @@ from fish_env.commands.case import Case, read_case
 from fish_env.comparison import RunsComparison
 from fish_env.data import Dataset
 from fish_env.data.description import FILE_NAME
-from fish_env.files import check_outputs
+from fish_env.files import STANDARD, check_outputs
 from fish_env.params import FishParams, fish_files, load_fish
 from fish_env.replay import Group, motion_from_run, motion_from_trajectory, write_replay
 from fish_env.replay.reading import read_replay_file
@@ -99,6 +99,8 @@ def _written(
     console: Console, groups: Sequence[Group], fish: FishParams, out: Path, title: str
 ) -> Path:
     page = write_replay(groups, fish, out, title)
+    if str(page) == STANDARD:
+        return page
     size = page.stat().st_size / 1e6
     console.print(f"replay: {page} ({size:.1f} MB), open it in a browser", soft_wrap=True)
     return page

@@ -12,7 +12,7 @@ from rich.console import Console
 from fish_env.arrays import FloatArray
 from fish_env.commands.case import read_case
 from fish_env.errors import ScheduleError, missing_extra
-from fish_env.files import cannot_write, check_outputs, replacing
+from fish_env.files import STANDARD, cannot_write, check_outputs, replacing
 from fish_env.params import fish_files
 from fish_env.simulator import Simulator
 from fish_env.trajectory import POSE_COLUMNS, Trajectory
@@ -35,7 +35,7 @@ def simulate_case(
         case_file: The case, see :mod:`fish_env.commands.case`.
         dt: Longest physics step, s.
         rate_hz: Samples per second.
-        out: `.csv` or `.parquet` file.
+        out: `.csv` or `.parquet` file; `-` is standard output.
         replay: HTML page that shows the fish swim.
         trust_effects: Run the effect files that the fish's file names.
 
@@ -43,6 +43,7 @@ def simulate_case(
         ScheduleError: The case or the output's ending is not as it should be.
         OutputError: An output would replace a file that is read, or cannot be written.
     """
+    out = None if out is not None and str(out) == STANDARD else out
     if out is not None and out.suffix not in SUFFIXES:
         raise ScheduleError(f"{out}: give the output the ending .csv or .parquet")
     case = read_case(case_file, trust_effects)

@@ -1,5 +1,6 @@
 """Simulated against measured motion: how wrong a fish's model is, where, and by how much."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 from fish_env.comparison.errors import ChannelError
@@ -25,6 +26,7 @@ def compare(
     fish: FishParams | str | Path | None = None,
     dt: float = 0.01,
     trust_effects: bool = False,
+    progress: Callable[[str], None] | None = None,
 ) -> RunsComparison | SteadyComparison:
     """Simulates what a dataset measured and compares the two.
 
@@ -33,6 +35,7 @@ def compare(
         fish: Another fish than the one the dataset names.
         dt: Longest physics step, s.
         trust_effects: Run the effect files that the fish's file names, see `load_fish`.
+        progress: Told the id of each run that was simulated.
 
     Raises:
         RoboticFishError: The fish is unknown, or its simulation is not possible.
@@ -40,4 +43,4 @@ def compare(
     chosen = as_fish(fish or dataset.fish, trust_effects)
     if isinstance(dataset, SteadyDataset):
         return compare_steady(dataset, chosen, dt)
-    return compare_runs(dataset, chosen, dt)
+    return compare_runs(dataset, chosen, dt, progress)

@@ -16,6 +16,9 @@ from fish_env.errors import DatasetError
 EPOCH_S = 1e8
 """s, about three years. No run lasts so long, so a later time counts from a date."""
 
+LONGEST_S = 1e6
+"""s, twelve days. No run lasts so long."""
+
 SLOW, SLOWER = 0.5, 1.5
 """s. Median sample intervals from which a clock is asked for its unit: beyond the second always,
 beyond the first if the tail beats so fast that nobody would sample it so slowly."""
@@ -48,7 +51,7 @@ def read_time(table: Table, clock: Clock) -> tuple[FloatArray, tuple[str, ...]]:
         first = table.text(clock.column)[0]
         return time, (f"{place}: the run begins at t = 0, which is {first}",)
     if begins:
-        stamp = datetime.fromtimestamp(begins, UTC).isoformat(timespec="milliseconds")
+        stamp = _date(begins, table)
         return time, (f"{place}: the run begins at t = 0, which is {stamp} if 1970 is 0",)
     return time, ()
 
@@ -64,6 +67,16 @@ def _from_numbers(table: Table, factor: float) -> tuple[FloatArray, float]:
         first = int(cells[0])
         return np.array([float(int(cell) - first) for cell in cells]) * factor, first * factor
     return (time - time[0]) * factor, float(time[0] * factor)
+
+
+def _date(begins: float, table: Table) -> str:
+    """A time since 1970, s, as a date."""
+    try:
+        return datetime.fromtimestamp(begins, UTC).isoformat(timespec="milliseconds")
+    except (ValueError, OverflowError, OSError):
+        raise table.at(TIME, table.rows[0]).refuse(
+            f"{begins:.4g} s is no date", "Correct the time or its unit"
+        ) from None
 
 
 def _from_text(table: Table) -> FloatArray:
@@ -136,9 +149,11 @@ def check_clock(time: FloatArray, commands: FloatArray, clock: Clock, table: Tab
         DatasetError: The samples are too far apart for seconds.
     """
     if clock.declared or time.size < FEWEST:
+        _check_span(time, table)
         return
     interval = float(np.median(np.diff(time)))
     if interval < SLOW or (interval < SLOWER and _beats(commands) * interval < SLOW):
+        _check_span(time, table)
         return
     unit = _likely_unit(interval)
     raise table.at(TIME).refuse(
@@ -147,6 +162,13 @@ def check_clock(time: FloatArray, commands: FloatArray, clock: Clock, table: Tab
         f"Declare its unit in dataset.yaml: `time: {{column: {clock.column}, unit: {unit}}}`, or "
         "`unit: s` if it is in seconds",
     )
+
+
+def _check_span(time: FloatArray, table: Table) -> None:
+    if not time[-1] - time[0] <= LONGEST_S:
+        raise table.at(TIME, table.rows[-1]).refuse(
+            f"the run lasts {time[-1] - time[0]:.4g} s", "Correct the time or its unit"
+        )
 
 
 def check_seconds(dataset: Dataset) -> None:

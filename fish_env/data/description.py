@@ -1,6 +1,7 @@
 """What dataset.yaml says about the data beside it."""
 
 import math
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -170,7 +171,7 @@ def _find_fish(top: Section) -> str:
     name, presets = top.text("fish"), list_fish()
     if name in presets:
         return name
-    path = (top.place.file.parent / Path(name).expanduser()).resolve()
+    path = top.path("fish").resolve()
     if not path.is_file():
         raise top.at("fish").refuse(
             f"'{name}' is neither a fish that comes with the package nor the path of a file",
@@ -232,7 +233,7 @@ def _parse_runs(top: Section) -> tuple[RunEntry, ...]:
         ("id", [entry.id for entry in entries]),
         ("file", [str(entry.file.resolve()) for entry in entries]),
     ):
-        twice = [value for value in values if values.count(value) > 1]
+        twice = [value for value, count in Counter(values).items() if count > 1]
         if twice:
             raise top.at("runs").refuse(
                 f"two runs have the {what} '{twice[0]}'", f"Give each run a {what} of its own"
@@ -248,7 +249,7 @@ def _parse_run(item: object, top: Section) -> RunEntry:
     section.require(["file", "start", "tail_phase"])
     return RunEntry(
         id=id,
-        file=(top.place.file.parent / Path(section.text("file")).expanduser()),
+        file=section.path("file"),
         start=cast(Start, section.choice("start", ["rest", "unknown"])),
         tail_phase=_parse_phase(section),
         condition=section.text("condition") if "condition" in section else None,
@@ -267,7 +268,7 @@ def _parse_phase(section: Section) -> float | None:
 def _find_table(top: Section) -> Path:
     folder = top.place.file.parent
     if "file" in top:
-        return folder / Path(top.text("file")).expanduser()
+        return top.path("file")
     tables = sorted(folder.glob("*.csv"))
     if len(tables) != 1:
         raise top.at("file").refuse(

@@ -2,31 +2,21 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
-
-import yaml
 
 from fish_env.data.place import Place, closest
 from fish_env.data.table import read_text
-
-
-class TextLoader(yaml.BaseLoader):
-    """Reads every scalar as text, so that an id `007` or a number `2e-3` stays what it is."""
-
-
-def _construct_mapping(loader: TextLoader, node: yaml.MappingNode) -> dict[Any, Any]:
-    mapping: dict[Any, Any] = {}
-    for key_node, value_node in node.value:
-        key = loader.construct_object(key_node, deep=True)
-        if key in mapping:
-            line = key_node.start_mark.line + 1
-            raise yaml.YAMLError(f"line {line}: the key '{key}' is there twice")
-        value = loader.construct_object(value_node, deep=True)
-        mapping[key] = value
-    return mapping
-
-
-TextLoader.add_constructor("tag:yaml.org,2002:map", _construct_mapping)
+from fish_env.reading import (
+    TextLoader,
+    Unreadable,
+    located,
+    parse_yaml,
+    plain_number,
+    printable_lines,
+    short,
+    shown,
+)
 
 
 class Section:
@@ -67,7 +57,9 @@ class Section:
         names = list(known)
         for key in self._content:
             if key not in names:
-                raise self.at(key).refuse(f"unknown {what} '{key}'", closest(str(key), names))
+                raise self.at(key).refuse(
+                    f"unknown {what} '{short(key)}'", closest(short(key), names)
+                )
 
     def require(self, keys: Iterable[str]) -> None:
         """Refuses the section unless it has all these keys.
@@ -89,6 +81,8 @@ class Section:
         value = self._content[key]
         if not isinstance(value, str) or not value.strip():
             raise self.at(key).refuse("this must be a text", "Write one after the colon")
+        if not printable_lines(value):
+            raise self.at(key).refuse(f"{shown(value)} has a control character", "Write it without")
         return value.strip()
 
     def choice(self, key: str, choices: Iterable[str]) -> str:
@@ -110,13 +104,23 @@ class Section:
             DatasetError: It is not.
         """
         text = self.text(key)
-        try:
-            value = float(text)
-        except ValueError:
-            value = float("nan")
+        value = plain_number(text)
         if not abs(value) < float("inf"):
-            raise self.at(key).refuse(f"'{text}' is not a finite number", "Write a plain number")
+            raise self.at(key).refuse(
+                f"{shown(text)} is not a finite number", "Write a plain number"
+            )
         return value
+
+    def path(self, key: str) -> Path:
+        """Returns a path, relative to the folder of the file; it need not exist.
+
+        Raises:
+            DatasetError: The text is missing, or no path can be so named.
+        """
+        try:
+            return located(self.text(key), self.place.file.parent)
+        except Unreadable as error:
+            raise self.at(key).refuse(error.reason, error.remedy.capitalize()) from None
 
     def holds_section(self, key: str) -> bool:
         """Whether the value of a key is a section of its own."""
@@ -163,10 +167,9 @@ def parse_section(text: str, place: Place) -> Section:
         DatasetError: The text is empty or no YAML, or a key stands in it twice.
     """
     try:
-        content = yaml.load(text, Loader=TextLoader)
-    except (yaml.YAMLError, TypeError) as error:
-        message = " ".join(str(error).split())
-        raise place.refuse(f"this is not valid YAML ({message})", "Correct that line") from error
+        content = parse_yaml(text, TextLoader)
+    except Unreadable as error:
+        raise place.refuse(f"this is {error.reason}", "Correct it") from error
     if content is None:
         raise place.refuse("the file is empty", "Describe the dataset in it")
     return Section(content, place)

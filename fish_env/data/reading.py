@@ -12,6 +12,7 @@ from fish_env.data.schema import Dataset, Run, SteadyDataset, identical_runs
 from fish_env.data.steady import read_steady
 from fish_env.errors import DatasetError
 from fish_env.params import config_root
+from fish_env.reading import Unreadable, located
 
 
 def list_datasets() -> list[str]:
@@ -58,7 +59,10 @@ def find_description(folder_or_name: str | Path) -> Path:
     Raises:
         DatasetError: There is neither such a folder nor a packaged dataset of that name.
     """
-    path = Path(folder_or_name).expanduser()
+    try:
+        path = located(folder_or_name)
+    except Unreadable as error:
+        raise DatasetError(f"{error}") from None
     if path.is_file():
         return path
     if path.is_dir():

@@ -3,14 +3,19 @@
 import csv
 import io
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
+from fish_env import reading
 from fish_env.arrays import FloatArray
 from fish_env.data.place import Place, closest
+
+MOST_COLUMNS = 1000
+NAN = ("nan", "+nan", "-nan")
 
 
 @dataclass(frozen=True)
@@ -93,7 +98,7 @@ class Table:
     def _refuse_cell(self, name: str, index: int) -> None:
         cell = self.cells[self.label(name)][index]
         raise self.at(name, self.rows[index]).refuse(
-            f"'{cell}' is not a finite number",
+            f"'{reading.short(str(cell))}' is not a finite number",
             "Write a plain number with a decimal point, or leave the cell empty "
             "where a sample is missing",
         )
@@ -108,14 +113,19 @@ class Table:
         for row, cell in zip(self.rows, cells, strict=True):
             if not cell:
                 raise self.place.at(row, column).refuse("the cell is empty", "Fill it in")
+            if not cell.isprintable():
+                raise self.place.at(row, column).refuse(
+                    f"{reading.shown(cell)} has a control character", "Write it without"
+                )
         return cells
 
 
 def _number(cell: str) -> float:
-    try:
-        return float(cell) if cell and not cell.isspace() else math.nan
-    except ValueError:
-        return math.inf
+    if not cell or cell.isspace():
+        return math.nan
+    value = reading.plain_number(cell)
+    # What is no number counts as infinite, which is refused.
+    return math.inf if math.isnan(value) and cell.strip().lower() not in NAN else value
 
 
 def read_table(place: Place, fewest_rows: int) -> Table:
@@ -153,7 +163,9 @@ def read_table(place: Place, fewest_rows: int) -> Table:
 
 
 def _read_lines(place: Place) -> list[tuple[int, list[str]]]:
-    reader = csv.reader(io.StringIO(read_text(place), newline=""), strict=True)
+    reader = csv.reader(
+        io.StringIO(read_text(place, reading.MOST_TABLE_BYTES), newline=""), strict=True
+    )
     try:
         lines = [(reader.line_num, cells) for cells in reader]
     except csv.Error as error:
@@ -170,29 +182,36 @@ def _is_blank(cells: list[str]) -> bool:
 
 
 def _check_header(place: Place, names: list[str]) -> None:
-    for name in names:
-        if names.count(name) > 1:
+    if len(names) > MOST_COLUMNS:
+        raise place.at(1).refuse(
+            f"{len(names)} columns, more than {MOST_COLUMNS}",
+            "Give one row per sample and one column per quantity",
+        )
+    for name, count in Counter(names).items():
+        if count > 1:
             raise place.at(1, name).refuse("two columns have this name", "Rename one of them")
 
 
-def read_text(place: Place) -> str:
+def read_text(place: Place, most: int = reading.MOST_TEXT_BYTES) -> str:
     """Reads a UTF-8 file.
+
+    Args:
+        place: The file.
+        most: Bytes from which it is refused.
 
     Raises:
         DatasetError: It is missing, unreadable or no text.
     """
     try:
-        return place.file.read_text(encoding="utf-8-sig")
+        return reading.read_text(place.file, most)
     except FileNotFoundError as error:
         beside = [path.name for path in _neighbours(place.file)]
         raise place.refuse(
             "there is no such file",
             closest(place.file.name, beside) if beside else "Check the path",
         ) from error
-    except UnicodeDecodeError as error:
-        raise place.refuse("this is not UTF-8 text", "Save it as plain UTF-8 text") from error
-    except OSError as error:
-        raise place.refuse(f"it cannot be read ({error.strerror})", "Check the path") from error
+    except reading.Unreadable as error:
+        raise place.refuse(f"it {error.reason}", error.remedy.capitalize()) from error
 
 
 def _neighbours(path: Path) -> list[Path]:

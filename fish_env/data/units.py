@@ -5,6 +5,7 @@ The short names of the table below are read without help. Any other spelling ("d
 """
 
 import math
+import re
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 
 from fish_env.data.place import Place
 from fish_env.data.vocabulary import Quantity
+from fish_env.reading import short
 
 _FACTORS: dict[str, dict[str, float]] = {
     "length": {"m": 1.0, "cm": 0.01, "mm": 0.001},
@@ -41,6 +43,9 @@ _ROOTS: dict[str, dict[str, int]] = {
 
 _LONGEST = 40
 """Characters. No unit has a longer name, and a parser should not be fed with text without end."""
+
+_POWER = re.compile(r"(\*\*|\^)(?!\s*-?\d(?!\s*(\*\*|\^|\d)))")
+"""An exponent other than one digit: a parser would work out `9**9**9`."""
 
 _PIXELS = ("px", "pixel", "pixels")
 _DEGREE_SIGNS = str.maketrans({"\N{MASCULINE ORDINAL INDICATOR}": "°", "\N{RING ABOVE}": "°"})
@@ -84,18 +89,19 @@ def parse_unit(name: str, quantity: Quantity, place: Place) -> Unit:
             # A turn is one cycle: 60 rpm are 1 Hz.
             return _short(name, factor / (2.0 * math.pi), fitting)
     if not known and not any(name in units for units in _FACTORS.values()):
-        raise place.refuse(f"unknown unit '{name}'", remedy)
+        raise place.refuse(f"unknown unit '{short(name)}'", remedy)
     raise place.refuse(
-        f"the unit '{name}' does not measure this, which is of dimension {quantity.dimension}",
+        f"the unit '{short(name)}' does not measure this, which is of dimension "
+        f"{quantity.dimension}",
         remedy,
     )
 
 
 def _short(name: str, factor: float, fitting: dict[str, float]) -> Unit:
     """The unit by its name in the table if it is there, else as it was written."""
-    for short, known in fitting.items():
+    for usual, known in fitting.items():
         if math.isclose(factor, known, rel_tol=1e-12):
-            return Unit(short, known)
+            return Unit(usual, known)
     return Unit(name, factor)
 
 
@@ -110,7 +116,7 @@ def unit_root(name: str) -> tuple[float, dict[str, int]] | None:
         The factor to SI, and the power of each base unit by pint's name; None if unknown.
     """
     text = name.strip().translate(_DEGREE_SIGNS)
-    if not text or len(text) > _LONGEST:
+    if not text or len(text) > _LONGEST or _POWER.search(text):
         return None
     registry = _registry()
     try:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from fish_env.data import Dataset, dataset_files, load_dataset, split_runs
+from fish_env.data import Dataset, SteadyDataset, dataset_files, load_dataset, split_runs
 from fish_env.diagnosis.answer import as_dict
 from fish_env.diagnosis.extended_file import extended_fish
 from fish_env.diagnosis.gain import measure_gain, misfit_of, one_step
@@ -76,7 +76,7 @@ class Diagnosis(Diagnosed):
 
 
 def diagnose(
-    folder: str | Path,
+    folder: str | Path | Dataset | SteadyDataset,
     out: str | Path | None = None,
     seed: int = 0,
     quick: bool = False,
@@ -88,7 +88,7 @@ def diagnose(
     """Diagnose a folder of measured runs.
 
     Args:
-        folder: folder with a dataset.yaml, or the name of a shipped dataset.
+        folder: folder with a dataset.yaml, the name of a shipped dataset, or a dataset.
         out: folder for ``diagnosis.json``, ``report.html`` with its figures and, where there is
             something to extend, ``extended.yaml``; nothing is written without it.
         seed: of the split and of the null distributions.
@@ -107,13 +107,14 @@ def diagnose(
         OutputError: an output would replace a file that is read, or cannot be written.
     """
     tell = progress or (lambda step: None)
-    dataset = load_dataset(folder)
+    dataset = folder if isinstance(folder, Dataset | SteadyDataset) else load_dataset(folder)
     chosen = as_fish(fish or dataset.fish, trust_effects)
     if out is not None:
-        check_outputs(outputs(chosen, Path(out)), [*dataset_files(folder), *fish_files(chosen)])
+        read = [] if isinstance(folder, Dataset | SteadyDataset) else dataset_files(folder)
+        check_outputs(outputs(chosen, Path(out)), [*read, *fish_files(chosen)])
     if not isinstance(dataset, Dataset):
         if measured_beats:
-            raise DatasetError(f"{folder}: means hold no beat; leave out --measured-beats")
+            raise DatasetError(f"{dataset.name}: means hold no beat; leave out --measured-beats")
         where = Path(out) if out is not None else None
         return diagnose_steady(dataset, chosen, seed=seed, quick=quick, progress=tell, out=where)
     if measured_beats:

@@ -11,15 +11,18 @@ import numpy.typing as npt
 
 from fish_env.arrays import FloatArray
 from fish_env.effects.registry import catalogue, get_effect, load_effect_file
-from fish_env.errors import EffectError, ParameterError
+from fish_env.errors import EffectError, ParameterError, ScheduleError
 from fish_env.model.compose import Composition
 from fish_env.model.effect import Effect
 from fish_env.model.runtime import Kernels, kernels
 from fish_env.params.packing import PATHS, pack_tables, pack_values
 from fish_env.params.schema import FishParams
+from fish_env.reading import is_number, shown
 
 EffectValues = Mapping[str, Mapping[str, float]]
 PREFIX = "effects."
+SHORTEST_STEP_S, LONGEST_STEP_S = 1e-6, 0.1
+"""Of the physics. With shorter steps, rounding errors grow beyond what is gained."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,11 +114,17 @@ class ExtendedModel:
         return min(scales, default=float("inf"))
 
     def check_step(self, dt: float) -> None:
-        """Refuse a physics step that is too long for an effect's time constant.
+        """Refuse a physics step that no simulation can take, or too long for an effect.
 
         Raises:
-            EffectError: says the longest step.
+            ScheduleError: no number from 1e-6 to 0.1 s.
+            EffectError: too long for an effect's time constant; says the longest step.
         """
+        if not is_number(dt) or not SHORTEST_STEP_S <= dt <= LONGEST_STEP_S:
+            raise ScheduleError(
+                f"dt = {shown(dt)} s: choose a physics step from {SHORTEST_STEP_S:g} to "
+                f"{LONGEST_STEP_S:g} s"
+            )
         longest = self.longest_step()
         if dt > longest * (1 + 1e-9):
             raise EffectError(
@@ -149,6 +158,8 @@ def build_model(
         raise EffectError(f"effect {name}: the name is taken by a shipped effect, choose another")
     wanted: dict[str, dict[str, float]] = {name: dict(v) for name, v in fish.effects.items()}
     for name, values in (effects or {}).items():
+        if not isinstance(name, str) or not isinstance(values, Mapping):
+            raise EffectError(f"effect {shown(name)}: give a name and a mapping of parameters")
         wanted[name] = {**wanted.get(name, {}), **values}
     for name in wanted:
         if name not in own and name not in catalogue():

@@ -36,6 +36,30 @@ def generator(state: Mapping[str, Any]) -> np.random.Generator:
     return np.random.Generator(bits)
 
 
+def real_actions(actions: npt.ArrayLike, shape: tuple[int, ...]) -> npt.NDArray[Any]:
+    """Returns actions as an array of real numbers.
+
+    Args:
+        actions: what the caller gave. NumPy would read texts as numbers and drop the imaginary
+            part of complex ones, so their type is looked at.
+        shape: the shape they must have.
+
+    Raises:
+        ConfigError: another shape, or no real numbers.
+    """
+    try:
+        given = np.asarray(actions)
+    except (ValueError, TypeError, RuntimeError) as error:
+        raise ConfigError(f"actions must be numbers in shape {shape}: {error}") from None
+    if given.dtype.kind not in "fiub":
+        raise ConfigError(
+            f"actions of type {given.dtype} are no real numbers; give shape {shape}, float32"
+        )
+    if given.shape != shape:
+        raise ConfigError(f"actions have shape {shape}, not {given.shape}")
+    return given
+
+
 def _step_kernels(options: EnvOptions) -> Kernels:
     """The physics of these options with the environment step behind it."""
     composition = options.model.kernels.composition

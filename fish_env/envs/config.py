@@ -10,14 +10,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from fish_env.arrays import FloatArray
-from fish_env.envs.config_checks import check_settings, is_number, speed_range
+from fish_env.envs.config_checks import check_settings, speed_range
 from fish_env.envs.layout import Setup, empty_setup
 from fish_env.errors import ConfigError
 from fish_env.model.state import INPUTS
 from fish_env.params.io import config_root
+from fish_env.reading import Unreadable, is_number, located, printable, read_yaml, short, shown
 
 DEFAULT_NAME = "robotic-fish-3d.yaml"
 
@@ -83,16 +83,16 @@ class EnvConfig:
 
 @cache
 def _default_tree() -> dict[str, Any]:
-    return dict(yaml.safe_load((config_root() / "env" / DEFAULT_NAME).read_text(encoding="utf-8")))
+    return dict(read_yaml(config_root() / "env" / DEFAULT_NAME))
 
 
 def _read(path: Path) -> Mapping[str, Any]:
-    if not path.is_file():
-        raise ConfigError(f"{path}: no such file; give the path of a YAML file")
     try:
-        tree = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: not readable as YAML: {error}") from error
+        tree = read_yaml(located(path))
+    except FileNotFoundError:
+        raise ConfigError(f"{path}: no such file; give the path of a YAML file") from None
+    except Unreadable as error:
+        raise ConfigError(f"{path}: {error}") from error
     if not isinstance(tree, Mapping):
         raise ConfigError(f"{path}: must be a mapping like {DEFAULT_NAME}")
     return tree
@@ -114,7 +114,7 @@ def load_env_config(
         label = str(source)
         source = _read(Path(source))
     if source is not None and not isinstance(source, Mapping):
-        raise ConfigError(f"config {source!r}: give the path of a YAML file or a mapping")
+        raise ConfigError(f"config {shown(source)}: give the path of a YAML file or a mapping")
     _merge(tree, source or {}, label, "")
     rates = {"control": control_hz, "physics": physics_hz}
     given = {key: value for key, value in rates.items() if value is not None}
@@ -126,7 +126,9 @@ def _merge(into: dict[str, Any], changes: Mapping[str, Any], label: str, prefix:
     for key, value in changes.items():
         path = f"{prefix}{key}"
         if key not in into:
-            raise ConfigError(f"{label}: unknown key '{path}'; known here: {', '.join(into)}")
+            raise ConfigError(
+                f"{label}: unknown key '{short(printable(path))}'; known here: {', '.join(into)}"
+            )
         if isinstance(into[key], dict):
             if not isinstance(value, Mapping):
                 raise ConfigError(
@@ -145,9 +147,9 @@ def _number_like(value: Any, default: Any, label: str, path: str) -> Any:
     items = value if isinstance(value, (list, tuple)) and ranges else [value]
     for item in items:
         if not is_number(item):
-            raise ConfigError(f"{label}: '{path}' must be a finite number, got {item!r}")
+            raise ConfigError(f"{label}: '{path}' must be a finite number, got {shown(item)}")
     if isinstance(default, list) and len(items) != len(default):
-        raise ConfigError(f"{label}: '{path}' must have {len(default)} numbers, got {value!r}")
+        raise ConfigError(f"{label}: '{path}' must have {len(default)} numbers, got {shown(value)}")
     return list(value) if isinstance(value, (list, tuple)) and ranges else value
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -10,17 +9,13 @@ import numpy as np
 
 from fish_env.errors import ConfigError
 from fish_env.model.state import INPUTS
+from fish_env.reading import is_number, shown
 
 SLOWEST_PHYSICS_HZ = 10.0
+FASTEST_PHYSICS_HZ, SLOWEST_CONTROL_HZ = 1e5, 0.01
 Tree = dict[str, Any]
 Rule = Iterator[tuple[bool, str]]
 """Pairs of a condition and what to say when it does not hold."""
-
-
-def is_number(value: Any) -> bool:
-    """Whether a value is a finite number (a bool is not)."""
-    numeric = isinstance(value, (int, float, np.integer, np.floating))
-    return numeric and not isinstance(value, bool) and math.isfinite(value)
 
 
 def speed_range(name: str, value: Any) -> list[float]:
@@ -31,8 +26,24 @@ def speed_range(name: str, value: Any) -> list[float]:
     """
     speeds = list(value) if isinstance(value, (list, tuple)) else [value, value]
     if len(speeds) != 2 or not all(map(is_number, speeds)) or not 0 <= speeds[0] <= speeds[1]:
-        raise ConfigError(f"{name} {value!r}: a speed >= 0 (m/s) or a range [low, high]")
+        raise ConfigError(f"{name} {shown(value)}: a speed >= 0 (m/s) or a range [low, high]")
     return [float(speed) for speed in speeds]
+
+
+def check_count(name: str, value: Any, most: int) -> None:
+    """Refuses what is no whole number from 1 up.
+
+    Args:
+        name: of the option.
+        value: given for it.
+        most: largest value.
+
+    Raises:
+        ConfigError: not such a number.
+    """
+    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    if not whole or not 1 <= value <= most:
+        raise ConfigError(f"{name} {shown(value)}: a whole number, at least 1 and at most {most:,}")
 
 
 def check_settings(tree: Tree, label: str) -> None:
@@ -54,6 +65,11 @@ def rates(tree: Tree) -> Rule:
     yield (
         physics >= SLOWEST_PHYSICS_HZ,
         f"rates: physics at {physics:g} Hz is too slow, use {SLOWEST_PHYSICS_HZ:g} Hz or more",
+    )
+    yield (
+        physics <= FASTEST_PHYSICS_HZ and control >= SLOWEST_CONTROL_HZ,
+        f"rates: at most {FASTEST_PHYSICS_HZ:g} Hz of physics, at least {SLOWEST_CONTROL_HZ:g} Hz "
+        "of control",
     )
     substeps = round(physics / control)
     yield (

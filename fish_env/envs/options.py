@@ -12,7 +12,7 @@ import numpy as np
 from fish_env.arrays import FloatArray
 from fish_env.effects.extended import PREFIX, EffectValues, ExtendedModel, build_model
 from fish_env.envs.config import EnvConfig, load_env_config
-from fish_env.envs.config_checks import is_number, speed_range
+from fish_env.envs.config_checks import speed_range
 from fish_env.envs.layout import SENSORS
 from fish_env.envs.randomization import Randomization, build_randomization
 from fish_env.envs.tasks import TASKS
@@ -21,6 +21,7 @@ from fish_env.model.crank_slider import CrankSlider
 from fish_env.model.state import INPUTS
 from fish_env.params.io import as_fish
 from fish_env.params.schema import FishParams
+from fish_env.reading import is_number, shown
 
 NOISE_GROUPS = {
     "depth": ("depth",),
@@ -81,8 +82,12 @@ def env_options(
         ConfigError: an unknown task or option, or values out of range.
         EffectError: an unknown effect, or one too fast for the physics step.
     """
-    if task not in TASKS:
-        raise ConfigError(f"unknown task '{task}': choose one of {', '.join(TASKS)}")
+    if not isinstance(task, str) or task not in TASKS:
+        raise ConfigError(f"unknown task {shown(task)}: choose one of {', '.join(TASKS)}")
+    if not isinstance(trust_effects, bool):
+        raise ConfigError(f"trust_effects {shown(trust_effects)}: True or False")
+    if not isinstance(fish, (str, Path, FishParams)):
+        raise ConfigError(f"fish {shown(fish)}: a preset's name, a file, or parameters")
     settings = load_env_config(config, control_hz, physics_hz)
     if cruise_speed is not None:
         settings.tree["goal"]["cruise_speed"] = speed_range("cruise_speed", cruise_speed)
@@ -90,7 +95,7 @@ def env_options(
     whole = _names_effects(randomization, loaded)
     model = build_model(loaded, _water(effects, current, wave), whole_catalogue=whole)
     model.check_step(settings.dt)
-    _check_effects(effects or {}, model)
+    _check_effects({} if effects is None else effects, model)
     _check_reach(settings, loaded)
     random = build_randomization(randomization, loaded, model)
     if random is not None:
@@ -112,17 +117,20 @@ def _water(
     current: tuple[float, float, float] | None,
     wave: Mapping[str, float] | None,
 ) -> dict[str, Mapping[str, float]]:
+    if effects is not None and not isinstance(effects, Mapping):
+        raise ConfigError(f"effects {shown(effects)}: a mapping of names to parameters")
     combined: dict[str, Mapping[str, float]] = dict(effects or {})
     for name, value in (("current", current), ("wave", wave)):
         if value is not None and name in combined:
             raise ConfigError(f"{name} is given twice, as an option and in effects; drop one")
     if current is not None:
-        if np.shape(current) != (3,) or not all(is_number(speed) for speed in current):
-            raise ConfigError(f"current {current!r}: three speeds (north, east, down) in m/s")
+        triple = isinstance(current, (list, tuple, np.ndarray)) and len(current) == 3
+        if not triple or not all(is_number(speed) for speed in current):
+            raise ConfigError(f"current {shown(current)}: three speeds (north, east, down) in m/s")
         combined["current"] = dict(zip(("north", "east", "down"), map(float, current), strict=True))
     if wave is not None:
         if not isinstance(wave, Mapping) or not all(map(is_number, wave.values())):
-            raise ConfigError(f"wave {wave!r}: a mapping like {{'amplitude': 0.05}} (m/s)")
+            raise ConfigError(f"wave {shown(wave)}: a mapping like {{'amplitude': 0.05}} (m/s)")
         combined["wave"] = dict(wave)
     return combined
 
@@ -130,7 +138,7 @@ def _water(
 def _names_effects(spec: str | Mapping[str, Any] | None, fish: FishParams) -> bool:
     """Whether effects that are off now may come on by a draw, so that the kernel needs them."""
     names: Iterable[Any] = spec if isinstance(spec, Mapping) else ()
-    if spec == "posterior" and fish.posterior is not None:
+    if isinstance(spec, str) and spec == "posterior" and fish.posterior is not None:
         names = fish.posterior.names
     return any(str(name).startswith(PREFIX) for name in names)
 
@@ -156,6 +164,10 @@ def _check_reach(settings: EnvConfig, fish: FishParams) -> None:
 
 
 def _noise(spec: Mapping[str, float] | None) -> FloatArray | None:
+    if spec is None:
+        return None
+    if not isinstance(spec, Mapping):
+        raise ConfigError(f"observation_noise {shown(spec)}: a mapping of sensors to deviations")
     if not spec:
         return None
     sd = dict.fromkeys(SENSORS, 0.0)
@@ -163,8 +175,8 @@ def _noise(spec: Mapping[str, float] | None) -> FloatArray | None:
         sensors = NOISE_GROUPS.get(name) or ((name,) if name in sd else ())
         if not sensors or not is_number(value) or value < 0:
             raise ConfigError(
-                f"observation_noise '{name}': {value!r}; give a standard deviation >= 0 (SI) for "
-                f"any of {', '.join([*NOISE_GROUPS, *SENSORS])}"
+                f"observation_noise {shown(name)}: {shown(value)}; give a standard deviation >= 0 "
+                f"(SI) for any of {', '.join([*NOISE_GROUPS, *SENSORS])}"
             )
         sd |= dict.fromkeys(sensors, float(value))
     return np.array(list(sd.values()))
@@ -172,7 +184,7 @@ def _noise(spec: Mapping[str, float] | None) -> FloatArray | None:
 
 def _lag(name: str, delay_s: float, dt: float) -> int:
     if not is_number(delay_s) or not 0 <= delay_s <= 2.0:
-        raise ConfigError(f"{name} = {delay_s} s: choose a delay between 0 and 2 s")
+        raise ConfigError(f"{name} = {shown(delay_s)} s: choose a delay between 0 and 2 s")
     steps = round(delay_s / dt)
     if abs(steps * dt - delay_s) > 1e-9:
         raise ConfigError(

@@ -12,12 +12,14 @@ from scipy.special import ndtr, ndtri
 
 from fish_env.arrays import BoolArray, FloatArray
 from fish_env.effects.extended import PREFIX, ExtendedModel
-from fish_env.envs.config_checks import is_number
-from fish_env.errors import ConfigError, EffectError
+from fish_env.errors import ConfigError, EffectError, ParameterError
 from fish_env.params.schema import FishParams
+from fish_env.reading import is_number, shown
 
 TRUNCATE = 2.5
 """Normal draws stay within this many standard deviations."""
+MOST_SD = 1e6
+"""Largest standard deviation, absolute or relative; more would overflow."""
 QUANTILES = 65
 """Points of each distribution at which a step that is too long is looked for."""
 
@@ -112,13 +114,15 @@ def build_randomization(
     """
     if spec is None:
         return None
-    if spec == "prior":
+    if isinstance(spec, str) and spec == "prior":
         return _from_prior(fish, model)
-    if spec == "posterior":
+    if isinstance(spec, str) and spec == "posterior":
         return _from_posterior(fish, model)
-    if not isinstance(spec, Mapping) or not spec:
+    named = isinstance(spec, Mapping) and all(isinstance(path, str) for path in spec)
+    if not isinstance(spec, Mapping) or not spec or not named:
         raise ConfigError(
-            f"randomization: give 'prior', 'posterior' or a mapping of parameters, not {spec!r}"
+            "randomization: give 'prior', 'posterior' or a mapping of parameters, not "
+            f"{shown(spec)}"
         )
     entries = [_entry(path, value, fish, model) for path, value in spec.items()]
     uniform, first, second = (np.array(column) for column in zip(*entries, strict=True))
@@ -128,7 +132,25 @@ def build_randomization(
         raise ConfigError(
             f"randomization of '{path}': {spec[path]!r} leaves its bounds {lower[i]} to {upper[i]}"
         )
-    return Randomization(tuple(spec), uniform, first, second, np.eye(len(entries)), lower, upper)
+    factor = np.eye(len(entries))
+    drawn = Randomization(tuple(spec), uniform, first, second, factor, lower, upper)
+    _check_possible(drawn, fish)
+    return drawn
+
+
+def _check_possible(random: Randomization, fish: FishParams) -> None:
+    """Refuse draws of which the smallest or the largest make no possible fish."""
+    ends = random.draw(np.tile([0.0, 1.0], (len(random.paths), 1)))
+    own = {path: values for path, values in ends.items() if not path.startswith(PREFIX)}
+    for path, values in own.items():
+        for value in values:
+            try:
+                fish.replace({path: float(value)})
+            except ParameterError as error:
+                raise ConfigError(
+                    f"randomization of '{path}': it draws {value:g}, with which no fish is "
+                    f"possible ({error}); narrow it"
+                ) from None
 
 
 def _bounds(
@@ -166,20 +188,20 @@ def _entry(
     nominal = _nominal(path, fish, model)
     if isinstance(value, Mapping) and len(value) == 1:
         key, number = next(iter(value.items()))
-        scale = {"relative": abs(nominal), "sd": 1.0}.get(key, 0.0)
+        scale = {"relative": abs(nominal), "sd": 1.0}.get(str(key), 0.0)
         if scale == 0.0 and key == "relative":
             raise ConfigError(
                 f"randomization of '{path}': relative to its value 0 nothing varies; "
                 "give {'sd': sd} or [low, high]"
             )
-        if is_number(number) and number >= 0 and 0.0 < scale < np.inf:
+        if is_number(number) and 0 <= number <= MOST_SD and 0.0 < scale < np.inf:
             return False, nominal, scale * float(number)
     pair = value if isinstance(value, (list, tuple)) and len(value) == 2 else ()
     if pair and all(map(is_number, pair)) and pair[0] <= pair[1]:
         return True, float(pair[0]), float(pair[1])
     raise ConfigError(
         f"randomization of '{path}': give {{'relative': sd}}, {{'sd': sd}} or [low, high], "
-        f"not {value!r}"
+        f"not {shown(value)}"
     )
 
 
@@ -208,9 +230,18 @@ def _correlated(
     upper: FloatArray,
 ) -> Randomization:
     matrix = np.asarray(covariance, float)
-    sd = np.sqrt(np.diag(matrix))
-    correlation = matrix / np.outer(sd, sd) + 1e-12 * np.eye(len(sd))
     count = len(paths)
-    factor = np.linalg.cholesky(correlation)
+    if not count:
+        raise ConfigError("randomization: the fish's posterior names no parameter; use 'prior'")
+    sd = np.sqrt(np.diag(matrix))
+    scale = np.where(sd > 0.0, sd, 1.0)
+    correlation = matrix / np.outer(scale, scale) + np.diag(np.where(sd > 0.0, 1e-12, 1.0))
+    try:
+        factor = np.linalg.cholesky(correlation)
+    except np.linalg.LinAlgError:
+        raise ConfigError(
+            "randomization: the covariance of the fish's posterior is singular beyond rounding; "
+            "use 'prior', or fit the fish anew"
+        ) from None
     centre = np.asarray(mean, float)
     return Randomization(paths, np.zeros(count, bool), centre, sd, factor, lower, upper)

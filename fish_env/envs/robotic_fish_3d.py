@@ -12,11 +12,10 @@ import numpy.typing as npt
 from gymnasium.spaces import Box
 
 from fish_env.effects.extended import EffectValues
-from fish_env.envs.batch import FishBatch
+from fish_env.envs.batch import FishBatch, real_actions
 from fish_env.envs.layout import OBSERVATION, OBSERVATION_LIMIT, OUTPUTS
 from fish_env.envs.options import env_options
 from fish_env.envs.viewing import Frame, Viewer, Watched
-from fish_env.errors import ConfigError
 from fish_env.params.schema import FishParams
 from fish_env.rendering import Scene
 
@@ -222,12 +221,10 @@ class RoboticFish3DEnv(Watched, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.
         """One control step.
 
         Raises:
-            ConfigError: not five numbers, one of them NaN, or a step before the first reset.
+            ConfigError: not five real numbers, one of them NaN, or a step before the first reset.
         """
         batch = self._batch
-        if np.shape(action) != ACTION_SHAPE:
-            raise ConfigError(f"an action has shape {ACTION_SHAPE}, not {np.shape(action)}")
-        batch.step(action)
+        batch.step(real_actions(action, ACTION_SHAPE))
         reward, *outputs = batch.results
         info = dict(zip(OUTPUTS, outputs, strict=True))
         self._viewer.after_step(batch)

@@ -10,7 +10,6 @@ import numpy as np
 from fish_env.arrays import FloatArray
 from fish_env.effects.extended import PREFIX
 from fish_env.envs.config import EnvConfig
-from fish_env.envs.config_checks import is_number
 from fish_env.envs.layout import GOAL, REFERENCE
 from fish_env.envs.options import EnvOptions
 from fish_env.envs.randomization import with_effects
@@ -19,6 +18,7 @@ from fish_env.envs.tasks.hold import between
 from fish_env.errors import ConfigError
 from fish_env.model.frames import quaternion_from_euler
 from fish_env.model.state import BASE_STATES
+from fish_env.reading import is_number
 
 POSE_DRAWS = 6
 STATE_KEYS = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -12,10 +13,12 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
 from fish_env.arrays import BoolArray, FloatArray, IntArray
-from fish_env.envs.batch import FishBatch, generator
+from fish_env.envs.batch import FishBatch, generator, real_actions
+from fish_env.envs.config_checks import check_count
 from fish_env.envs.layout import OUTPUTS
 from fish_env.envs.options import env_options
 from fish_env.envs.robotic_fish_3d import (
+    ACTION_SHAPE,
     FAILURE,
     PARAMETER,
     action_space,
@@ -23,9 +26,23 @@ from fish_env.envs.robotic_fish_3d import (
 )
 from fish_env.envs.viewing import Frame, Viewer, Watched
 from fish_env.errors import ConfigError
+from fish_env.reading import shown
 from fish_env.rendering import Scene
 
 Float32Array = npt.NDArray[np.float32]
+
+
+MOST_FISH = 200_000
+"""A batch of so many takes some gigabytes."""
+MOST_THREADS = 4096
+
+
+def _autoreset(mode: AutoresetMode | str) -> AutoresetMode:
+    try:
+        return AutoresetMode(mode)
+    except ValueError:
+        known = ", ".join(f"'{known.value}'" for known in AutoresetMode)
+        raise ConfigError(f"autoreset_mode {shown(mode)}: one of {known}") from None
 
 
 class RoboticFish3DVectorEnv(Watched, VectorEnv[Float32Array, Float32Array, npt.NDArray[Any]]):
@@ -69,13 +86,14 @@ class RoboticFish3DVectorEnv(Watched, VectorEnv[Float32Array, Float32Array, npt.
         render_size: tuple[int, int] = (640, 480),
         **kwargs: Any,
     ) -> None:
-        if num_envs < 1 or max_episode_steps < 1:
-            raise ConfigError("num_envs and max_episode_steps must be at least 1")
+        check_count("num_envs", num_envs, MOST_FISH)
+        check_count("max_episode_steps", max_episode_steps, sys.maxsize)
+        check_count("render_count", render_count, MOST_FISH)
+        if threads is not None:
+            check_count("threads", threads, MOST_THREADS)
         self.num_envs = num_envs
         self.max_episode_steps = max_episode_steps
-        self.autoreset_mode = AutoresetMode(autoreset_mode)
-        if render_count < 1:
-            raise ConfigError(f"render_count {render_count}: at least 1")
+        self.autoreset_mode = _autoreset(autoreset_mode)
         self.render_mode = render_mode
         self.options = env_options(**kwargs)
         self.metadata = {
@@ -127,9 +145,11 @@ class RoboticFish3DVectorEnv(Watched, VectorEnv[Float32Array, Float32Array, npt.
             ConfigError: actions of another shape or with a NaN, a step before the first reset, or
                 a fish that has ended and was not reset (autoreset DISABLED).
         """
-        self._check_step(np.shape(actions))
+        shape = (self.num_envs, *ACTION_SHAPE)
+        given = real_actions(actions, shape)
+        self._check_step()
         batch, mode = self.batch, self.autoreset_mode
-        batch.step(actions)
+        batch.step(given)
         self._steps += 1
         reward = batch.reward.copy()
         terminated = batch.outputs[FAILURE] > 0
@@ -191,9 +211,7 @@ class RoboticFish3DVectorEnv(Watched, VectorEnv[Float32Array, Float32Array, npt.
         """One fish as it is now, to be drawn by :mod:`fish_env.rendering` at any time."""
         return self._viewer.scene(self.batch, fish)
 
-    def _check_step(self, shape: tuple[int, ...]) -> None:
-        if shape != self.action_space.shape:
-            raise ConfigError(f"actions have shape {self.action_space.shape}, not {shape}")
+    def _check_step(self) -> None:
         if self.autoreset_mode is AutoresetMode.DISABLED and self._ended.any():
             raise ConfigError(
                 f"fish {np.flatnonzero(self._ended).tolist()} have ended: reset them with "

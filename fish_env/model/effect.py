@@ -44,6 +44,7 @@ from typing import Any
 from fish_env.errors import EffectError
 from fish_env.inference.effects import EffectParameter as EffectParameter
 from fish_env.inference.effects import Switched
+from fish_env.reading import shown
 
 STAGES = (
     "inputs",
@@ -175,15 +176,22 @@ class Effect(Switched):
             EffectError: an unknown name, not a number, or outside the physical bounds.
         """
         names = [p.name for p in self.parameters]
+        if not isinstance(values, Mapping):
+            raise EffectError(
+                f"effect {self.name}: {shown(values)}; give parameters, it has {names}"
+            )
         for name in values:
             if name not in names:
                 raise EffectError(f"effect {self.name}: no parameter '{name}', it has {names}")
         return {p.name: self._checked(p, values.get(p.name, p.neutral)) for p in self.parameters}
 
     def _checked(self, parameter: EffectParameter, value: float) -> float:
-        number = float(value)
+        try:
+            number = float("nan") if isinstance(value, (str, bytes, bool)) else float(value)
+        except (TypeError, ValueError, OverflowError):
+            number = float("nan")
         if isnan(number) or not (isfinite(number) or number == parameter.neutral):
-            raise EffectError(f"effect {self.name}.{parameter.name}: {value} is not finite")
+            raise EffectError(f"effect {self.name}.{parameter.name}: {shown(value)} is not finite")
         if not parameter.lower <= number <= parameter.upper:
             raise EffectError(
                 f"effect {self.name}.{parameter.name} = {value} {parameter.unit}: "

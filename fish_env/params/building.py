@@ -12,6 +12,7 @@ from fish_env.params.groups import Prior
 from fish_env.params.provenance import UNSTATED, Origin, Posterior, Provenance
 from fish_env.params.schema import FishParams
 from fish_env.params.tables import CoefficientTable, TableKind, read_table
+from fish_env.reading import short, shown
 
 AXES = 3
 OPTIONAL = ("effects", "provenance", "posterior")
@@ -48,11 +49,13 @@ def check_keys(
     required, known = list(required), [*required, *optional]
     if not isinstance(data, Mapping):
         keys = ", ".join(known)
-        raise ParameterError(f"{file}: {path} is {data!r}; write a section with the keys {keys}")
+        raise ParameterError(
+            f"{file}: {path or 'the file'} is {shown(data)}; write a section with the keys {keys}"
+        )
     for key in data:
         if key not in known:
-            hint = closest(str(key), known) or f"; known keys are {', '.join(known)}"
-            raise ParameterError(f"{file}: unknown key {join(path, str(key))}{hint}")
+            hint = closest(short(str(key)), known) or f"; known keys are {', '.join(known)}"
+            raise ParameterError(f"{file}: unknown key {join(path, short(str(key)))}{hint}")
     for key in required:
         if key not in data:
             raise ParameterError(f"{file}: missing key {join(path, key)}; add it or name a base")
@@ -82,7 +85,7 @@ def build_field(
 def build_vector(value: Any, path: str, file: Path) -> tuple[Any, ...]:
     """Builds a vector of three numbers."""
     if not isinstance(value, list) or len(value) != AXES:
-        raise ParameterError(f"{file}: {path} is {value!r}; write three numbers, [x, y, z]")
+        raise ParameterError(f"{file}: {path} is {shown(value)}; write three numbers, [x, y, z]")
     return tuple(as_number(item) for item in value)
 
 
@@ -92,7 +95,9 @@ def build_table(
     """Reads the table that replaces a curve."""
     check_keys(value, ["table"], (), path, file)
     if not isinstance(value["table"], str):
-        raise ParameterError(f"{file}: {path}.table is {value['table']!r}; give a CSV file's path")
+        raise ParameterError(
+            f"{file}: {path}.table is {shown(value['table'])}; give a CSV file's path"
+        )
     try:
         return read_table(Path(value["table"]), kind)
     except ParameterError as error:
@@ -105,7 +110,7 @@ def build_effects(data: Any, file: Path) -> dict[str, Any]:
         return {}
     if not isinstance(data, Mapping):
         raise ParameterError(
-            f"{file}: effects is {data!r}; write effect names with their parameters"
+            f"{file}: effects is {shown(data)}; write effect names with their parameters"
         )
     return {name: build_effect(parameters) for name, parameters in data.items()}
 
@@ -140,9 +145,9 @@ def build_posterior(data: Any, file: Path) -> Posterior | None:
     if data is None:
         return None
     check_keys(data, ["names", "mean", "covariance", "validity"], (), "posterior", file)
-    lists = [data[key] for key in ("names", "mean", "covariance")]
-    if not all(isinstance(item, list) for item in (*lists, *lists[2])):
+    names, mean, covariance = (data[key] for key in ("names", "mean", "covariance"))
+    whole = all(isinstance(item, list) for item in (names, mean, covariance))
+    if not whole or not all(isinstance(row, list) for row in covariance):
         raise ParameterError(f"{file}: posterior: write names, mean and covariance rows as lists")
-    names, mean, covariance = lists
     rows = tuple(tuple(as_number(item) for item in row) for row in covariance)
     return Posterior(tuple(names), tuple(map(as_number, mean)), rows, data["validity"] or {})

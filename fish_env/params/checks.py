@@ -28,6 +28,7 @@ from fish_env.params import trees
 from fish_env.params.balance import central_inertia
 from fish_env.params.fields import Leaf, leaves, tables
 from fish_env.params.provenance import STATUSES, Origin, Posterior
+from fish_env.reading import printable_lines, shown
 
 if TYPE_CHECKING:
     from fish_env.params.schema import FishParams
@@ -39,8 +40,10 @@ def check_fish(fish: "FishParams") -> None:
     Raises:
         ParameterError: Something is impossible; names file, key and remedy.
     """
-    if not isinstance(fish.name, str) or not fish.name:
-        raise fault(fish, "name", f"is {fish.name!r}", "give the fish a name, as text")
+    if not isinstance(fish.name, str) or not fish.name.isprintable() or not fish.name.strip():
+        raise fault(
+            fish, "name", f"is {shown(fish.name)}", "give the fish a name, as printable text"
+        )
     for leaf in (*leaves(fish), *leaves(fish.prior, "prior")):
         check_number(fish, leaf.path, leaf.value)
         check_bounds(fish, leaf)
@@ -82,9 +85,9 @@ def unknown_path(fish: "FishParams", path: str) -> str:
 def check_number(fish: "FishParams", key: str, value: Any) -> None:
     """Checks that a value is one finite number; true and false are not."""
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
-        shown = f"{value!r} ({type(value).__name__})"
-        raise fault(fish, key, f"is {shown}, not a number", "write a plain number in SI units")
-    if not math.isfinite(value):
+        what = f"{shown(value)} ({type(value).__name__})"
+        raise fault(fish, key, f"is {what}, not a number", "write a plain number in SI units")
+    if not -math.inf < float(value) < math.inf:
         raise fault(fish, key, f"is {value}", "write a finite number")
 
 
@@ -166,7 +169,7 @@ def check_effects(fish: "FishParams") -> None:
         key = f"effects.{name}"
         if not isinstance(name, str) or not isinstance(parameters, Mapping):
             remedy = "write each effect as a name with its parameters below"
-            raise fault(fish, key, f"is {parameters!r}", remedy)
+            raise fault(fish, key, f"is {shown(parameters)}", remedy)
         for parameter, value in parameters.items():
             check_number(fish, f"{key}.{parameter}", value)
 
@@ -186,10 +189,10 @@ def check_origin(fish: "FishParams", path: str, origin: Origin) -> None:
     """Checks status and source of one origin."""
     if origin.status not in STATUSES:
         remedy = f"use one of {', '.join(STATUSES)}"
-        raise fault(fish, f"provenance.{path}.status", f"is {origin.status!r}", remedy)
-    if not isinstance(origin.source, str) or not origin.source:
+        raise fault(fish, f"provenance.{path}.status", f"is {shown(origin.status)}", remedy)
+    if not isinstance(origin.source, str) or not printable_lines(origin.source.strip() or "\0"):
         remedy = "say in words where the value comes from"
-        raise fault(fish, f"provenance.{path}.source", f"is {origin.source!r}", remedy)
+        raise fault(fish, f"provenance.{path}.source", f"is {shown(origin.source)}", remedy)
 
 
 def check_posterior(fish: "FishParams", posterior: Posterior) -> None:
@@ -197,11 +200,12 @@ def check_posterior(fish: "FishParams", posterior: Posterior) -> None:
     check_names(fish, posterior.names)
     if not isinstance(posterior.validity, Mapping):
         remedy = "write it as keys and values"
-        raise fault(fish, "posterior.validity", f"is {posterior.validity!r}", remedy)
+        raise fault(fish, "posterior.validity", f"is {shown(posterior.validity)}", remedy)
     count = len(posterior.names)
     rows = [len(row) for row in posterior.covariance]
     if len(posterior.mean) != count or rows != [count] * count:
-        problem = f"has {count} names, {len(posterior.mean)} means and covariance rows of {rows}"
+        lengths = shown(rows)
+        problem = f"has {count} names, {len(posterior.mean)} means and covariance rows of {lengths}"
         raise fault(fish, "posterior", problem, "give one mean and one row and column per name")
     for value in (*posterior.mean, *(item for row in posterior.covariance for item in row)):
         check_number(fish, "posterior", value)
@@ -212,7 +216,9 @@ def check_names(fish: "FishParams", names: tuple[str, ...]) -> None:
     """Checks that a posterior names parameters or effect parameters of the fish, once each."""
     known = {leaf.path for leaf in leaves(fish)}
     known |= {f"effects.{name}.{key}" for name, values in fish.effects.items() for key in values}
-    for name in map(str, names):
+    for name in names:
+        if not isinstance(name, str):
+            raise fault(fish, f"posterior.names: {shown(name)}", "is no text", "write a path")
         if name not in known:
             remedy = f"name a parameter or an effect parameter of this file{closest(name, known)}"
             raise fault(fish, f"posterior.names: {name}", "is unknown", remedy)

@@ -75,8 +75,12 @@ def join(path: str, name: str) -> str:
 
 def as_number(value: Any) -> Any:
     """Returns a real number as a float; leaves anything else, booleans too, to the checks."""
-    real = isinstance(value, numbers.Real) and not isinstance(value, bool)
-    return float(value) if real else value
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        return value
+    try:
+        return float(value)
+    except OverflowError:
+        return math.copysign(math.inf, value)
 
 
 def parameter_fields(group: Any) -> Iterator[dataclasses.Field[Any]]:

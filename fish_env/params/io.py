@@ -18,8 +18,10 @@ from fish_env.params.files import read_yaml, write_yaml
 from fish_env.params.provenance import Origin, Posterior, Provenance
 from fish_env.params.schema import FishParams
 from fish_env.params.tables import write_table
+from fish_env.reading import Unreadable, located, short, shown
 
 SUFFIXES = (".yaml", ".yml")
+MOST_BASES = 20
 
 
 def config_root() -> Path:
@@ -87,7 +89,7 @@ def fish_files(fish: FishParams | str | Path) -> list[Path]:
     while file is not None and file not in found:
         found.append(file)
         data = read_yaml(file)
-        resolve_tables(data, file.parent)
+        resolve_tables(data, file)
         found += tables_in(data)
         effects = data.get("effects")
         if isinstance(effects, Mapping):
@@ -117,30 +119,37 @@ def find_fish(name_or_path: str | Path, folder: Path) -> Path:
     name = str(name_or_path)
     if name in list_fish():
         return config_root() / "fish" / f"{name}.yaml"
-    path = (folder / Path(name).expanduser()).resolve()
+    try:
+        path = located(name, folder).resolve()
+    except Unreadable as error:
+        raise ParameterError(f"{error}") from None
     if path.is_file():
         return path
     if path.suffix in SUFFIXES:
         raise ParameterError(f"{path}: no such file; check the path")
     presets = list_fish()
     raise ParameterError(
-        f"no fish '{name}'{closest(name, presets) or ';'} "
+        f"no fish '{short(name)}'{closest(name, presets) or ';'} "
         f"give the path of a YAML file or one of {', '.join(presets)}"
     )
 
 
 def read_merged(file: Path, above: tuple[Path, ...]) -> dict[str, Any]:
     """Reads a file merged over its bases, its table paths made absolute."""
+    if len(above) > MOST_BASES:
+        raise ParameterError(
+            f"{above[0]}: base: more than {MOST_BASES} bases stand on each other; merge some"
+        )
     if file in above:
         chain = " -> ".join(str(path) for path in (*above, file))
         raise ParameterError(f"{file}: base: the bases form a circle, {chain}; remove one")
     data = read_yaml(file)
     base = data.pop("base", None)
-    resolve_tables(data, file.parent)
+    resolve_tables(data, file)
     if base is None:
         return data
     if not isinstance(base, str):
-        raise ParameterError(f"{file}: base is {base!r}; give the name or the path of a fish")
+        raise ParameterError(f"{file}: base is {shown(base)}; give the name or the path of a fish")
     if "name" not in data:
         raise ParameterError(f"{file}: missing key name; a fish that differs needs its own")
     return merged(read_merged(find_base(base, file), (*above, file)), data)
@@ -154,14 +163,17 @@ def find_base(base: str, file: Path) -> Path:
         raise ParameterError(f"{file}: base: {error}") from error
 
 
-def resolve_tables(data: Any, folder: Path) -> None:
-    """Makes the table paths in nested data absolute, in place."""
+def resolve_tables(data: Any, file: Path) -> None:
+    """Makes the table paths in nested data of a file absolute, in place."""
     if not isinstance(data, dict):
         return
     if isinstance(data.get("table"), str):
-        data["table"] = str((folder / data["table"]).resolve())
+        try:
+            data["table"] = str(located(data["table"], file.parent).resolve())
+        except Unreadable as error:
+            raise ParameterError(f"{file}: table: {error}") from None
     for value in data.values():
-        resolve_tables(value, folder)
+        resolve_tables(value, file)
 
 
 def merged(base: Mapping[str, Any], change: Mapping[str, Any]) -> dict[str, Any]:

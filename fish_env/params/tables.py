@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from fish_env.errors import ParameterError
 from fish_env.files import write_text
+from fish_env.reading import Unreadable, plain_number, read_text, short
 
 TableKind = Literal["drag", "lift", "impact_moment"]
 
@@ -169,10 +170,15 @@ def read_table(path: Path, kind: TableKind) -> CoefficientTable:
         ParameterError: The file is missing or is not such a table; names file, line and remedy.
     """
     try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise ParameterError(f"{path}: cannot read the coefficient table ({error})") from error
-    rows = list(csv.reader(text.splitlines()))
+        rows = list(csv.reader(read_text(path).splitlines()))
+    except FileNotFoundError:
+        raise ParameterError(
+            f"{path}: cannot read the coefficient table, there is no such file; check the path"
+        ) from None
+    except Unreadable as error:
+        raise ParameterError(f"{path}: the coefficient table {error}") from error
+    except csv.Error as error:
+        raise ParameterError(f"{path}: no CSV table ({error}); check its quotation marks") from None
     scale = read_header(path, rows[0] if rows else [])
     pairs = [read_row(path, line, row) for line, row in enumerate(rows[1:], start=2) if row]
     return CoefficientTable(
@@ -188,7 +194,8 @@ def read_header(path: Path, header: list[str]) -> float:
     names = [name.strip() for name in header]
     if len(names) != 2 or names[0] not in ANGLE_SCALE or names[1] != "C":
         raise ParameterError(
-            f"{path}: line 1 is '{','.join(header)}'; the header must be alpha_rad,C or alpha_deg,C"
+            f"{path}: line 1 is '{short(','.join(header))}'; the header must be alpha_rad,C "
+            "or alpha_deg,C"
         )
     return ANGLE_SCALE[names[0]]
 
@@ -196,10 +203,13 @@ def read_header(path: Path, header: list[str]) -> float:
 def read_row(path: Path, line: int, row: list[str]) -> tuple[float, float]:
     """Reads one line as an angle and a coefficient."""
     try:
-        alpha, value = (float(cell) for cell in row)
+        alpha, value = map(plain_number, row)
+        if any(math.isnan(plain_number(c)) and c.strip().lower() != "nan" for c in row):
+            raise ValueError
     except ValueError as error:
         raise ParameterError(
-            f"{path}: line {line} is '{','.join(row)}'; give two numbers, angle and coefficient"
+            f"{path}: line {line} is '{short(','.join(row))}'; give two numbers, angle and "
+            "coefficient"
         ) from error
     return alpha, value
 

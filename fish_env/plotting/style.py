@@ -78,8 +78,24 @@ def shades(count: int) -> list[Any]:
     return [colormaps[COLOUR_MAP](0.85 * i / max(1, count - 1)) for i in range(count)]
 
 
+def keep_literal(figure: Figure) -> None:
+    """Shows a text between dollar signs that is no formula, such as a run's name, as it stands."""
+    from matplotlib.mathtext import MathTextParser
+    from matplotlib.text import Text
+
+    parser = MathTextParser("agg")
+    for text in figure.findobj(Text):
+        assert isinstance(text, Text)
+        if "$" in text.get_text():
+            try:
+                parser.parse(text.get_text())
+            except (ValueError, RecursionError):
+                text.set_parse_math(False)
+
+
 def save(figure: Figure, folder: Path, name: str, formats: tuple[str, ...] | None = None) -> Path:
     """Writes a figure as `<folder>/<name>.<format>` for each format; returns the first path."""
+    keep_literal(figure)
     paths = [folder / f"{name}.{ending}" for ending in formats or FORMATS]
     for path in paths:
         with replacing(path) as part:

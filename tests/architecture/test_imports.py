@@ -11,11 +11,14 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 LINTER = Path(sys.executable).with_name("lint-imports")
-# What agents act on; and the one style of pictures, so that theirs look alike.
+# What agents act on; the one style of pictures and the options of commands, so that theirs look
+# alike; and the one way to read files.
 OPEN_TO_AGENTS = {
     "arrays",
+    "commands",
     "errors",
     "files",
+    "reading",
     "params",
     "trajectory",
     "simulator",

@@ -91,7 +91,7 @@ def test_rates_must_be_numbers(rate):
 
 
 @pytest.mark.parametrize(
-    ("text", "message"), [("a: [", "not readable as YAML"), ("", "must be a mapping like")]
+    ("text", "message"), [("a: [", "not valid YAML"), ("", "must be a mapping like")]
 )
 def test_unreadable_files_are_named(text, message, tmp_path):
     """A broken or empty file is an error that names it."""

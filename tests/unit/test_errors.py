@@ -10,7 +10,7 @@ from fish_env import errors
 def test_every_error_is_a_robotic_fish_error_and_says_when_it_is_raised():
     classes = [item for item in vars(errors).values() if isinstance(item, type)]
     raised = [item for item in classes if issubclass(item, Exception)]
-    assert len(raised) == 9
+    assert len(raised) == 10
     for item in raised:
         assert issubclass(item, errors.RoboticFishError)
         assert item.__doc__

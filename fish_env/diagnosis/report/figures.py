@@ -18,7 +18,7 @@ from fish_env.diagnosis.report.units import label, shown_unit
 from fish_env.files import file_name, replacing
 from fish_env.inference.hypotheses import PARAMETER
 from fish_env.plotting.comparison import COMMAND_UNITS
-from fish_env.plotting.style import BLUE, DOTS_PER_INCH, MEASURED, VERMILION, drawing
+from fish_env.plotting.style import BLUE, DOTS_PER_INCH, MEASURED, VERMILION, drawing, keep_literal
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -69,6 +69,7 @@ def _page(width: float, height: float) -> Iterator[Figure]:
 
 def _saved(figure: Figure, album: Album, name: str) -> Path:
     """Writes the figure and returns the path of the SVG."""
+    keep_literal(figure)
     vector = album.folder / f"{name}.svg"
     engine = figure.get_layout_engine()
     if engine is not None:

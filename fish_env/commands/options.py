@@ -1,0 +1,57 @@
+"""Options that several commands share, and what all of them do alike."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from fish_env.errors import Interrupted
+
+DISTRIBUTION = "robotic-fish"
+
+TrustEffects = Annotated[
+    bool,
+    typer.Option(
+        "--trust-effects",
+        help="Run the Python files of effects that the fish's file names. Reading runs no code.",
+    ),
+]
+Json = Annotated[
+    Path | None, typer.Option("--json", help="File for all numbers; - is standard output.")
+]
+
+
+class Commands(TyperGroup):
+    """The commands; a person's Ctrl-C ends each with one line."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Runs a command.
+
+        Raises:
+            Interrupted: A person stopped it, and it did not say itself what was kept.
+        """
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            raise Interrupted(
+                "stopped; files that were complete stay, nothing is half written. Start again to "
+                "get the rest"
+            ) from None
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"{DISTRIBUTION} {version(DISTRIBUTION)}")
+        raise typer.Exit
+
+
+Version = Annotated[
+    bool,
+    typer.Option(
+        "--version", callback=_show_version, is_eager=True, help="Show the version and exit."
+    ),
+]

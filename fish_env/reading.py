@@ -1,0 +1,388 @@
+"""Reading files that others wrote: no hang, no unbounded memory, one line for each fault.
+
+Every reader of the package goes through :func:`read_bytes` or :func:`read_text`, every YAML and
+JSON file through :func:`read_yaml`, :func:`parse_yaml` or :func:`read_json`. They raise
+:class:`Unreadable`, which a reader words as an error of its own with the place at fault.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+import reprlib
+import stat
+import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+
+MOST_TEXT_BYTES = 1_000_000
+"""Of a YAML or JSON file; the largest that this package writes has a tenth of it."""
+MOST_TABLE_BYTES = 100_000_000
+"""Of a table: some two million rows, which take up to 3 GB of memory."""
+DEEPEST = 40
+"""Levels of nesting; the deepest file of this package has six."""
+MOST_VALUES = 60_000
+"""Values in a file, those behind an alias counted as often as they stand in it."""
+LONGEST_SHOWN = 60
+LARGEST = sys.float_info.max
+_PAGE = 65_536
+_REPR = reprlib.Repr()
+_REPR.maxstring = _REPR.maxother = _REPR.maxlong = LONGEST_SHOWN
+_LARGEST_INT = 2**63
+_BAD_VALUE = (ValueError, TypeError, KeyError, IndexError, AttributeError, OverflowError)
+"""What PyYAML raises for a tagged value that is not of its tag, such as `!!int x`."""
+
+
+class Unreadable(Exception):
+    """Raised for a file that cannot be read.
+
+    Attributes:
+        reason: What is wrong with it.
+        remedy: What to change.
+    """
+
+    def __init__(self, reason: str, remedy: str) -> None:
+        super().__init__(reason, remedy)
+        self.reason = reason
+        self.remedy = remedy
+
+    def __str__(self) -> str:
+        return f"{self.reason}; {self.remedy}"
+
+
+def shown(value: Any, most: int = LONGEST_SHOWN) -> str:
+    """Returns a value as one short line for a message.
+
+    Args:
+        value: Anything, such as what a file says.
+        most: Characters from which it is cut.
+    """
+    try:
+        # repr would write out all of a long text or list before it is cut.
+        text = repr(value[:most]) if isinstance(value, str) else reprlib.Repr.repr(_REPR, value)
+    except ValueError:  # an integer of thousands of digits
+        text = "a number of thousands of digits"
+    return short(text, most + 2)
+
+
+def short(text: str, most: int = LONGEST_SHOWN) -> str:
+    """Returns a text, cut where it is too long for a message.
+
+    Args:
+        text: Anything.
+        most: Characters from which it is cut.
+    """
+    return text if len(text) <= most else f"{text[: most - 3]}..."
+
+
+def printable(text: str) -> str:
+    """Returns a text on one line, control characters and lone surrogates as escapes.
+
+    Args:
+        text: Anything, such as a name in a file.
+    """
+    line = " ".join(text.split())
+    if line.isprintable():
+        return line
+    return "".join(
+        c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in line
+    )
+
+
+def printable_lines(text: str) -> bool:
+    """Whether a text holds no control characters but line ends and tabs, nor lone surrogates.
+
+    Args:
+        text: Anything, such as a name in a file.
+    """
+    return all(c.isprintable() or c in "\n\t" for c in text)
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value is a finite number (a bool is not).
+
+    Args:
+        value: Anything.
+    """
+    numeric = isinstance(value, (int, float, np.integer, np.floating))
+    return numeric and not isinstance(value, bool) and bool(-LARGEST <= value <= LARGEST)
+
+
+def plain_number(text: str) -> float:
+    """Reads a number as CSV files and people write it, NaN if it is none.
+
+    Python also reads `1_000` and digits of other scripts, which most programs do not.
+
+    Args:
+        text: Such as `-1.5e-3`, `inf` or `nan`.
+    """
+    try:
+        return float(text) if "_" not in text and text.isascii() else math.nan
+    except ValueError:
+        return math.nan
+
+
+def located(name: str | Path, folder: Path | None = None) -> Path:
+    """Returns the path that a name in a file or an option means; it need not exist.
+
+    Args:
+        name: A path; `~` is the home folder.
+        folder: What a relative path is relative to; default: the working folder.
+
+    Raises:
+        Unreadable: No path can have this name, or its links lead round in a circle.
+    """
+    try:
+        path = (folder or Path()) / Path(name).expanduser()
+        with suppress(FileNotFoundError, NotADirectoryError, PermissionError):
+            path.stat()
+            path.resolve()
+        return path
+    except RuntimeError:
+        raise Unreadable(
+            f"{shown(str(name))} names the home of a user who is not there, or links in a circle",
+            "write the whole path",
+        ) from None
+    except (ValueError, OSError) as error:
+        why = error.strerror if isinstance(error, OSError) else "a character no path can hold"
+        raise Unreadable(f"{shown(str(name))} is no path ({why})", "correct it") from None
+
+
+def read_bytes(path: Path, most: int = MOST_TEXT_BYTES) -> bytes:
+    """Reads a whole file, which must be a file: of a pipe or a device no end is known.
+
+    Args:
+        path: The file.
+        most: Bytes from which it is refused.
+
+    Raises:
+        FileNotFoundError: It is missing.
+        Unreadable: It is no regular file, is too large or cannot be read.
+    """
+    try:
+        # Without the flag, opening a pipe waits for whoever writes to it.
+        opened = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+        with os.fdopen(opened, "rb") as stream:
+            about = os.fstat(opened)
+            if not stat.S_ISREG(about.st_mode):
+                raise Unreadable("is a pipe or a device, not a file", "name a file")
+            content = stream.read(min(most, max(about.st_size, _PAGE)) + 1)
+    except FileNotFoundError:
+        raise
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise Unreadable(f"cannot be read ({why})", "check the path and its rights") from error
+    if len(content) > most:
+        raise Unreadable(f"larger than {most / 1e6:g} MB", "split it, or name the right file")
+    return content
+
+
+def read_standard_input(most: int = MOST_TEXT_BYTES) -> str:
+    """Reads all of standard input as UTF-8 text.
+
+    Args:
+        most: Bytes from which it is refused.
+
+    Raises:
+        Unreadable: It is larger, or no such text.
+    """
+    stream: Any = getattr(sys.stdin, "buffer", sys.stdin)
+    content = stream.read(most + 1)
+    if len(content) > most:
+        raise Unreadable(f"larger than {most / 1e6:g} MB", "send less")
+    try:
+        return content if isinstance(content, str) else content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise Unreadable("is not UTF-8 text", "send plain UTF-8 text") from None
+
+
+def read_text(path: Path, most: int = MOST_TEXT_BYTES) -> str:
+    """Reads a whole file of UTF-8 text; a byte-order mark is left out.
+
+    Args:
+        path: The file.
+        most: Bytes from which it is refused.
+
+    Raises:
+        FileNotFoundError: It is missing.
+        Unreadable: It cannot be read, see :func:`read_bytes`, or is no such text.
+    """
+    try:
+        return read_bytes(path, most).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise Unreadable(
+            f"is not UTF-8 text (byte {error.start})", "save it as plain UTF-8 text"
+        ) from None
+
+
+class Loader(yaml.SafeLoader):
+    """YAML's safe loader, bounded in depth and size, without the guesses of YAML 1.1.
+
+    A repeated key is refused. `1e-3` is a number. `12:30`, which YAML 1.1 takes for 750, and
+    `1_0` are text, so that whoever wants a number refuses them.
+    """
+
+    def __init__(self, stream: str) -> None:
+        super().__init__(stream)
+        self._depth = 0
+        self._counts = [0]
+        self._sizes: dict[int, int] = {}
+
+    def compose_node(self, parent: Any, index: Any) -> Any:
+        """Composes a node and counts what it holds, aliases in full."""
+        event: Any = self.peek_event()  # type: ignore[no-untyped-call]
+        if self._depth > DEEPEST:
+            self._refuse(event, f"nested more than {DEEPEST} levels deep")
+        alias = isinstance(event, yaml.AliasEvent)
+        self._depth += 1
+        self._counts.append(1)
+        node = super().compose_node(parent, index)
+        size = self._counts.pop()
+        self._depth -= 1
+        if alias:
+            if id(node) not in self._sizes:
+                self._refuse(event, f"the alias '{event.anchor}' contains itself")
+            size = self._sizes[id(node)]
+        else:
+            self._sizes[id(node)] = size
+        self._counts[-1] += size
+        if self._counts[-1] > MOST_VALUES:
+            self._refuse(event, f"more than {MOST_VALUES:,} values, with aliases written out")
+        return node
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        """Builds a mapping and refuses a key that stands in it twice."""
+        seen = set[str]()
+        for key_node, _ in node.value:
+            if not isinstance(key_node, yaml.ScalarNode):
+                self._refuse(key_node, "a key must be a word or a number")
+            if key_node.value in seen:
+                self._refuse(key_node, f"the key '{short(key_node.value)}' is there twice")
+            seen.add(key_node.value)
+        return super().construct_mapping(node, deep=True)
+
+    def construct_yaml_int(self, node: yaml.ScalarNode) -> int:
+        """Builds a whole number of at most 19 digits."""
+        digits = len(node.value)
+        value = super().construct_yaml_int(node) if digits < 70 else _LARGEST_INT
+        if abs(value) >= _LARGEST_INT:
+            self._refuse(node, f"a whole number of {digits} digits")
+        return value
+
+    @staticmethod
+    def _refuse(at: Any, problem: str) -> None:
+        raise yaml.MarkedYAMLError(problem=problem, problem_mark=at.start_mark)
+
+
+def _construct_map(loader: Loader, node: yaml.MappingNode) -> dict[Any, Any]:
+    return loader.construct_mapping(node, deep=True)
+
+
+Loader.add_constructor("tag:yaml.org,2002:map", _construct_map)
+Loader.add_constructor("tag:yaml.org,2002:int", Loader.construct_yaml_int)
+_NUMBERS = {
+    "int": re.compile(
+        r"^[-+]?(0|[1-9][0-9]*|[1-9][0-9]{0,2}(_[0-9]{3})+|0o[0-7]+|0x[0-9a-fA-F]+)$"
+    ),
+    "float": re.compile(
+        r"^[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?$"
+        r"|^[-+]?\.(inf|Inf|INF)$|^\.(nan|NaN|NAN)$"
+    ),
+}
+_KINDS = {f"tag:yaml.org,2002:{name}" for name in (*_NUMBERS, "timestamp")}
+Loader.yaml_implicit_resolvers = {
+    first: [pair for pair in pairs if pair[0] not in _KINDS]
+    for first, pairs in yaml.SafeLoader.yaml_implicit_resolvers.items()
+}
+for _name, _pattern in _NUMBERS.items():
+    Loader.add_implicit_resolver(f"tag:yaml.org,2002:{_name}", _pattern, list("-+0123456789."))
+
+
+class TextLoader(Loader):
+    """The same, with every scalar left as its text: an id `007` stays what it is."""
+
+
+TextLoader.yaml_implicit_resolvers = {}
+TextLoader.yaml_constructors = {
+    f"tag:yaml.org,2002:{kind}": constructor
+    for kind, constructor in (
+        ("map", _construct_map),
+        ("seq", lambda loader, node: loader.construct_sequence(node, deep=True)),
+        ("str", lambda loader, node: loader.construct_scalar(node)),
+    )
+}
+
+
+def parse_yaml(text: str, loader: type[Loader] = Loader) -> Any:
+    """Reads YAML text.
+
+    Args:
+        text: The YAML.
+        loader: `Loader`, or `TextLoader` for values as text.
+
+    Raises:
+        Unreadable: It is no YAML, nests too deep, grows too large by its aliases, repeats a key
+            or holds a value that is not of its tag; names the line.
+    """
+    try:
+        return yaml.load(text, Loader=loader)
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        line = f"line {mark.line + 1}: " if mark is not None else ""
+        problem = printable(error.problem or error.context or "wrong")
+        raise Unreadable(
+            f"not valid YAML, {line}{short(problem, 120)}", "correct that line"
+        ) from None
+    except (yaml.YAMLError, RecursionError, *_BAD_VALUE) as error:
+        reason = short(printable(str(error)), 120)
+        raise Unreadable(f"not valid YAML ({reason})", "correct it") from None
+
+
+def read_yaml(path: Path, loader: type[Loader] = Loader) -> Any:
+    """Reads a YAML file.
+
+    Args:
+        path: The file.
+        loader: As for :func:`parse_yaml`.
+
+    Raises:
+        FileNotFoundError: It is missing.
+        Unreadable: It cannot be read, or see :func:`parse_yaml`.
+    """
+    return parse_yaml(read_text(path), loader)
+
+
+def parse_json(text: str) -> Any:
+    """Reads JSON text.
+
+    Args:
+        text: The JSON.
+
+    Raises:
+        Unreadable: It is no JSON, nests too deep or holds a number of thousands of digits.
+    """
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError) as error:
+        reason = short(printable(str(error)), 120)
+        raise Unreadable(f"this is no JSON ({reason})", "correct it") from None
+
+
+def read_json(path: Path, most: int = MOST_TEXT_BYTES) -> Any:
+    """Reads a JSON file.
+
+    Args:
+        path: The file.
+        most: Bytes from which it is refused.
+
+    Raises:
+        FileNotFoundError: It is missing.
+        Unreadable: It cannot be read or is no JSON, see :func:`parse_json`.
+    """
+    return parse_json(read_text(path, most))

@@ -1,0 +1,148 @@
+"""What once broke a reader is refused in one line, in little time."""
+
+import os
+import warnings
+
+import numpy as np
+import pytest
+
+from fish_env.comparison import compare
+from fish_env.data import load_dataset
+from fish_env.envs.batch import real_actions
+from fish_env.envs.options import env_options
+from fish_env.errors import ConfigError, ParameterError, ScheduleError
+from fish_env.params import load_fish
+from fish_env.simulator import Simulator
+from fish_env.steady import steady_motion
+from tests.fixtures.measured_data import DESCRIPTION, good_folder
+from tests.fuzzing.found_inputs import (
+    DESCRIPTIONS,
+    FISH,
+    OPTIONS,
+    PATHS,
+    RUNS,
+    TEXTS,
+    UNITS,
+    WRONG,
+)
+from tests.fuzzing.readers import READERS, fault
+
+
+@pytest.fixture(autouse=True)
+def _quiet():
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
+
+
+@pytest.mark.parametrize("text", TEXTS.values(), ids=TEXTS)
+@pytest.mark.parametrize("reader", READERS)
+def test_every_reader_refuses_every_found_text(reader, text, tmp_path):
+    read, suffix = READERS[reader]
+    file = tmp_path / f"x{suffix}"
+    file.write_bytes(text.encode("utf-8", "surrogatepass"))
+    message = fault(read, file)
+    settings = reader in ("environment", "files of a fish")  # these read any keys of some kinds
+    assert message is None if message is None and settings else message
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_every_reader_refuses_what_is_no_file(reader, tmp_path):
+    read, suffix = READERS[reader]
+    pipe, folder = tmp_path / f"pipe{suffix}", tmp_path / f"folder{suffix}"
+    os.mkfifo(pipe)
+    folder.mkdir()
+    loop = tmp_path / f"loop{suffix}"
+    loop.symlink_to(loop)
+    for path in (pipe, folder, loop, *map(type(tmp_path), PATHS)):
+        assert fault(read, path), path
+
+
+@pytest.mark.parametrize("change", FISH.values(), ids=FISH)
+def test_a_fish_that_cannot_be_is_refused(change, tmp_path):
+    file = tmp_path / "mine.yaml"
+    base = "" if "base" in change else "base: zheng-2021-a\n"
+    file.write_text(f"{base}name: mine\n{change}\n")
+    assert "mine.yaml" in str(fault(load_fish, file))
+
+
+def test_a_long_chain_of_bases_is_refused(tmp_path):
+    for i in range(200):
+        (tmp_path / f"f{i}.yaml").write_text(f"base: f{i + 1}.yaml\nname: x\n")
+    assert "bases" in str(fault(load_fish, tmp_path / "f0.yaml"))
+
+
+@pytest.mark.parametrize("text", RUNS.values(), ids=RUNS)
+def test_a_run_that_cannot_be_is_refused(text, tmp_path):
+    message = str(fault(load_dataset, good_folder(tmp_path, run=text)))
+    assert "r01.csv" in message
+
+
+@pytest.mark.parametrize("change", DESCRIPTIONS.values(), ids=DESCRIPTIONS)
+def test_a_description_that_cannot_be_is_refused(change, tmp_path):
+    runs = [DESCRIPTION["runs"][0] | change]
+    assert fault(load_dataset, good_folder(tmp_path, runs=runs))
+
+
+@pytest.mark.parametrize("unit", UNITS, ids=range(len(UNITS)))
+def test_a_unit_is_not_worked_out(unit, tmp_path):
+    channels = DESCRIPTION["channels"] | {"x": unit}
+    assert "x" in str(fault(load_dataset, good_folder(tmp_path, channels=channels)))
+
+
+@pytest.mark.parametrize("option", OPTIONS)
+def test_an_option_of_a_wrong_type_is_refused_by_name(option):
+    fits = 0
+    for value in WRONG:
+        message = fault(env_options, **{option: value})
+        fits += message is None
+    assert fits <= 6, "most of these must be refused"
+
+
+def test_a_grouped_number_is_one_and_base_60_is_none(tmp_path):
+    file = tmp_path / "f.yaml"
+    file.write_text("name: x\nbase: zheng-2021-a\nwater: {density: 1_000}\n")
+    assert load_fish(file).get("water.density") == 1000.0
+    file.write_text("name: x\nbase: zheng-2021-a\nwater: {density: 16:40}\n")
+    with pytest.raises(ParameterError, match="'16:40'"):
+        load_fish(file)
+
+
+@pytest.mark.parametrize("dt", [0.0, -1.0, 1e-12, 1e-300, float("nan"), float("inf"), "x", 1j])
+def test_a_step_that_never_ends_is_refused(dt):
+    with pytest.raises(ScheduleError, match="dt = "):
+        Simulator("zheng-2021-a", dt=dt)
+    with pytest.raises(ScheduleError, match="dt = "):
+        compare(load_dataset("msu-steady"), dt=dt)
+
+
+@pytest.mark.parametrize(
+    ("duration", "rate"),
+    [(1e12, 10.0), (1e5, 1e9), (1e300, 1e-300), (float("nan"), 1.0), (10**400, 1.0), ("1", 1.0)],
+)
+def test_a_duration_that_never_ends_is_refused(duration, rate):
+    with pytest.raises(ScheduleError, match=r"duration|samples|steps"):
+        Simulator("zheng-2021-a", dt=1e-4).run([{"t": 0.0}], duration, rate_hz=rate)
+
+
+@pytest.mark.parametrize(
+    "action",
+    [
+        np.zeros(5, complex), ["0"] * 5, np.array(["0"] * 5), np.zeros(5, object), None, 0.0,
+        [[0.0], [0.0, 0.0]], np.zeros((5, 1)), {"a": 1}, np.zeros(5, "M8[s]"), [10**400] * 5,
+    ],
+    ids=range(11),
+)  # fmt: skip
+def test_an_action_that_is_no_five_numbers_is_refused(action):
+    with pytest.raises(ConfigError, match=r"actions"):
+        real_actions(action, (5,))
+
+
+def test_a_randomisation_that_draws_an_impossible_fish_is_refused():
+    with pytest.raises(ConfigError, match=r"mass\.total.*no fish is possible"):
+        env_options(randomization={"mass.total": [0.05, 3.0]})
+
+
+def test_a_beat_that_outlasts_the_wait_is_refused():
+    with pytest.raises(ScheduleError, match=r"tail_frequency 1e-300 Hz.*at least"):
+        steady_motion(load_fish("zheng-2021-a"), [[0.0, 0.3, 1e-300, 0.0, 0.0]])

@@ -1,0 +1,127 @@
+"""What every command does alike: version, completion, `-`, `--json`, Ctrl-C."""
+
+import io
+import json
+import sys
+from importlib.metadata import version
+
+import pytest
+
+from fish_env.files import check_outputs, write_text
+from tests.command_line import run
+from tests.fixtures.measured_data import good_folder
+
+CASE = {
+    "fish": "zheng-2021-a",
+    "duration_s": 0.3,
+    "schedule": [{"t": 0, "tail_amplitude": 0.3, "tail_frequency": 1.0}],
+}
+PRINTING = (
+    "compare", "diagnose", "effects", "evaluate", "fit", "info", "leaderboard", "swim",
+)  # fmt: skip
+
+
+@pytest.fixture
+def standard_input(monkeypatch):
+    def put(text: str) -> None:
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(text.encode())))
+
+    return put
+
+
+def test_the_version_is_that_of_the_package(capsys):
+    status, out, _ = run(capsys, "--version")
+    assert (status, out.strip()) == (0, f"robotic-fish {version('robotic-fish')}")
+
+
+def test_the_shell_completes_the_commands(capsys, monkeypatch):
+    monkeypatch.setenv("_ROBOFISH_COMPLETE", "complete_bash")
+    monkeypatch.setenv("COMP_WORDS", "robofish dia")
+    monkeypatch.setenv("COMP_CWORD", "1")
+    _, out, _ = run(capsys)
+    assert out.split() == ["diagnose"]
+
+
+@pytest.mark.parametrize("command", PRINTING)
+def test_every_command_that_prints_results_writes_numbers(command, capsys):
+    _, out, _ = run(capsys, command, "--help")
+    assert "--json" in out
+
+
+def test_numbers_go_to_standard_output_alone(capsys):
+    status, out, err = run(capsys, "effects", "--json", "-")
+    assert status == 0
+    assert json.loads(out)["servo_lag"]["parameters"]["time_constant"]["unit"] == "s"
+    assert "servo_lag" in err
+    _, out, _ = run(capsys, "leaderboard", "--json", "-")
+    assert json.loads(out)["results"]
+
+
+def test_info_as_numbers(tmp_path, capsys):
+    target = tmp_path / "fish.json"
+    assert run(capsys, "info", "--json", str(target))[0] == 0
+    found = json.loads(target.read_text())
+    assert found["parameters"]["mass.total"]["unit"] == "kg"
+
+
+def test_a_swim_goes_through_a_pipe_into_a_page(capsys, standard_input):
+    standard_input(json.dumps(CASE))
+    status, table, _ = run(capsys, "simulate", "-", "--out", "-", "--rate", "20")
+    assert status == 0
+    assert table.startswith("t,x,y,z,")
+    standard_input(table)
+    status, page, err = run(capsys, "replay", "-", "--out", "-")
+    assert status == 0
+    assert page.startswith("<!")
+    assert "robofish:" not in err
+
+
+@pytest.mark.parametrize("text", ["", "no JSON", "[" * 100_000, "\ud7ff"])
+def test_bad_standard_input_is_one_line(text, capsys, standard_input):
+    standard_input(text)
+    for arguments in (("simulate", "-"), ("replay", "-", "--out", "-")):
+        status, _, err = run(capsys, *arguments)
+        assert status == 2
+        assert err.startswith("robofish: ")
+        assert err.count("\n") == 1
+        standard_input(text)
+
+
+def test_two_outputs_cannot_both_be_standard_output():
+    from fish_env.errors import OutputError
+
+    with pytest.raises(OutputError, match="two outputs"):
+        check_outputs(["-", "-"])
+
+
+def test_text_goes_to_standard_output(capfd):
+    write_text("-", "größer\n")
+    assert capfd.readouterr().out == "größer\n"
+
+
+def test_ctrl_c_says_what_was_kept(capsys, monkeypatch):
+    def stopped(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("fish_env.commands.effects.print_effects", stopped)
+    status, _, err = run(capsys, "effects")
+    assert status == 130
+    assert err.count("\n") == 1
+    assert "nothing is half written" in err
+    monkeypatch.setattr("fish_env.commands.diagnose.diagnose", stopped)
+    status, _, err = run(capsys, "diagnose", "msu-steady", "--out", "out/none")
+    assert status == 130
+    assert "out/none is as it was" in err
+    monkeypatch.setattr("agents.training.command.train", stopped)
+    status, _, err = run(capsys, "train", "ppo-hold", "--out", "out/none")
+    assert status == 130
+    assert "start anew: robofish train ppo-hold --out out/none" in " ".join(err.split())
+
+
+def test_compare_leads_with_its_findings_and_names_diagnose(tmp_path, capsys):
+    runs = [{"id": "[/red]", "file": "r01.csv", "start": "rest", "tail_phase": 0.0}]
+    folder = good_folder(tmp_path / "my pool", runs=runs, name="$\\frac{ [bold]")
+    status, out, err = run(capsys, "compare", str(folder), "--out", str(tmp_path / "pictures"))
+    assert (status, err) == (0, "")
+    assert 0 < out.index("•") < out.index("By condition") < out.index("robofish diagnose")
+    assert "[/red]" in out

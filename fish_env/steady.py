@@ -78,10 +78,9 @@ def steady_motion(
 
     Raises:
         ScheduleError: The commands' shape or values are not as above.
-        EffectError: `dt` is too long for an effect.
     """
     model = fish if isinstance(fish, ExtendedModel) else build_model(fish)
-    model.check_step(dt)
+    dt = dt / model.substeps(dt)
     asked = _checked(commands)
     record = np.repeat(model.record, len(asked), axis=1) if records is None else records
     result: dict[str, FloatArray] = {}

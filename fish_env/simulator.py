@@ -125,15 +125,14 @@ class Simulator:
 
     Args:
         fish: name of a shipped fish, path of a parameter file, or parameters.
-        dt: longest physics step (s).
+        dt: longest physics step (s); it is divided where an effect is faster.
         effects: effects to switch on, beside those in the fish's file: name -> parameters.
         user_effects: effects of your own (see :func:`fish_env.effects.load_effect_file`).
         trust_effects: run the effect files (Python code) beside the fish's file that it names;
             without it they are refused.
 
     Raises:
-        EffectError: an unknown effect, a bad value, an effect file that is not trusted, or a time
-            constant shorter than dt.
+        EffectError: an unknown effect, a bad value, or an effect file that is not trusted.
     """
 
     def __init__(
@@ -146,8 +145,7 @@ class Simulator:
     ) -> None:
         self.fish = as_fish(fish, trust_effects)
         self.model = build_model(self.fish, effects, user_effects)
-        self.model.check_step(dt)
-        self.dt = dt
+        self.dt = dt / self.model.substeps(dt)
 
     @property
     def crank(self) -> CrankSlider:

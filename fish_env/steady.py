@@ -78,10 +78,9 @@ def steady_motion(
 
     Raises:
         ScheduleError: The commands' shape or values are not as above.
-        EffectError: `dt` is too long for an effect.
     """
     model = fish if isinstance(fish, ExtendedModel) else build_model(fish)
-    model.check_step(dt)
+    dt = dt / model.substeps(dt)
     asked = _checked(commands)
     frequency = asked[:, _FREQUENCY]
     slow = (frequency > 0.0) & (frequency * longest_s < beats)

@@ -42,6 +42,7 @@ of 29 cm and 2 kg may show, "possible" what is accepted. Where effects of one se
 same quantity, they act in the order of this page. [Your own effect](your-own.md) is a file of
 yours.
 """
+UNSEARCHED = "To simulate, and to fit on demand: `robofish diagnose` does not look for it."
 
 
 def page() -> str:
@@ -73,6 +74,8 @@ def _entry(effect: Effect) -> str:
     if effect.confusable_with:
         others = ", ".join(f"[`{name}`](#{name})" for name in effect.confusable_with)
         lines.append(f"Easily confused with {others}.\n")
+    if not effect.diagnosed:
+        lines.append(f"{UNSEARCHED}\n")
     return "\n".join([*lines, f"Source: {effect.source.rstrip('.')}.\n"])
 
 

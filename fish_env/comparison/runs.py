@@ -11,11 +11,11 @@ import numpy as np
 from fish_env.arrays import FloatArray
 from fish_env.comparison.errors import ChannelError, aligned, channel_error, plain, unit_of
 from fish_env.comparison.start import measured_start, opening
-from fish_env.data import Dataset, Run
+from fish_env.data import CommandSteps, Dataset, Run
 from fish_env.data.clock import check_seconds
 from fish_env.model.state import INPUTS
 from fish_env.params import FishParams
-from fish_env.sensing import measured_channels, true_times
+from fish_env.sensing import measured_channels, true_command_times, true_times
 from fish_env.simulator import InitialState, Simulator
 
 PHASES = 16
@@ -119,7 +119,6 @@ def compare_runs(
 
     Raises:
         DatasetError: The times of a run can hardly be in seconds.
-        EffectError: `dt` is too long for an effect.
         SimulationDiverged: A simulation did not stay finite.
     """
     check_seconds(dataset)
@@ -156,7 +155,9 @@ def compare_run(simulator: Simulator, run: Run) -> RunComparison:
 def simulate_run(simulator: Simulator, run: Run, start: InitialState) -> dict[str, FloatArray]:
     """The run's channels as the model's sensors would have recorded them, each (n,)."""
     times = true_times(simulator.model, run.time_s)
-    trajectory = simulator.run(run.commands, initial=start, sample_times_s=times)
+    given = true_command_times(simulator.model, run.commands.times_s)
+    commands = CommandSteps(given, run.commands.values)
+    trajectory = simulator.run(commands, initial=start, sample_times_s=times)
     channels = dict(trajectory.channels)
     if "tail_angle" in run.channels:
         channels["tail_angle"] = simulator.outputs(trajectory)["tail_angle"]

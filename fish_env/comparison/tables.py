@@ -123,9 +123,6 @@ def compare_steady(dataset: SteadyDataset, fish: FishParams, dt: float = 0.01) -
         dataset: The measured table.
         fish: Parameters, with the effects in their file.
         dt: Physics step, s.
-
-    Raises:
-        EffectError: `dt` is too long for an effect.
     """
     tolerance = 1e-3
     model = build_model(fish)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fish_env.model.body import flow_drift
 from fish_env.model.effect import Effect, EffectParameter
 from fish_env.model.frames import cross
 from fish_env.model.jit import kernel
@@ -38,18 +39,17 @@ def add_inertia(inertia, tail, fish, e):
 
 @kernel
 def coriolis_and_munk(motion, tail, inputs, centre, fish, e):
-    """-omega x (M_A V_rel) - M_A (omega x V_water); -omega x (I_A omega) - V_rel x (M_A V_rel).
+    """-omega x (M_A V_rel) - M_A drift; -omega x (I_A omega) - V_rel x (M_A V_rel).
 
-    The term with V_water turns d(V_rel)/dt into dV_b/dt in a steady uniform flow, since
-    d(R^T c)/dt = -omega x R^T c; the last one is the Munk moment.
+    The drift, omega x R^T U - R^T DU/Dt, is what d(V_rel)/dt has beside dV_b/dt: water that speeds
+    up takes the fish along by M_A DU/Dt. The last term is the Munk moment.
     """
     omega = Vector(motion.p, motion.q, motion.r)
     velocity = Vector(motion.u, motion.v, motion.w)
-    water = Vector(motion.water_u, motion.water_v, motion.water_w)
     momentum = Vector(e.surge * motion.u, e.sway * motion.v, e.heave * motion.w)
     spin = Vector(e.roll * motion.p, e.pitch * motion.q, e.yaw * motion.r)
     force = cross(omega, momentum)
-    drift = cross(omega, water)
+    drift = flow_drift(motion)
     gyroscopic = cross(omega, spin)
     munk = cross(velocity, momentum)
     return Wrench(

@@ -1,29 +1,32 @@
-"""Attitude misalignment: the attitude sensor is not mounted square."""
+"""Attitude misalignment: the inertial unit is not mounted square."""
 
 from __future__ import annotations
 
 from fish_env.model.effect import Effect, EffectParameter
 
 
-def add_angles(channels, values):
-    """roll, pitch, yaw (rad) with the misalignment added, where they are measured."""
-    return {name: channel + values.get(name, 0.0) for name, channel in channels.items()}
+def mounting(values):
+    """M = R_z(yaw) R_y(pitch) R_x(roll), from the sensor's axes to the body's."""
+    return {f"mount_{name}": values[name] for name in ("roll", "pitch", "yaw")}
 
 
 def _angle(name: str) -> EffectParameter:
-    return EffectParameter(name, "rad", 0.0, -1.0, 1.0, (-0.08, 0.08), f"added to {name}")
+    return EffectParameter(name, "rad", 0.0, -1.0, 1.0, (-0.08, 0.08), f"{name} of the sensor")
 
 
 EFFECT = Effect(
     name="attitude_misalignment",
     section="measurement",
-    summary="The measured angles are off by a constant; the path does not fit the heading.",
-    equation="measured (roll, pitch, yaw) = true angles + misalignment",
-    source="Mounting error of a sensor, or a camera frame not turned to north",
+    summary="Angles and rates are those of a sensor turned in the hull, not of the hull.",
+    equation="measured R = R M, measured omega = M^T omega, M = R_z(yaw) R_y(pitch) R_x(roll)",
+    source="Mounting error of a strapdown unit: Titterton and Weston, Strapdown Inertial "
+    "Navigation Technology, chapter 3",
     parameters=(_angle("roll"), _angle("pitch"), _angle("yaw")),
-    measure=add_angles,
+    geometry=mounting,
     confusable_with=(
+        "camera_tilt",
         "com_offset",
         "gyro_bias",
+        "soft_iron",
     ),
 )

@@ -33,7 +33,9 @@ EFFECT = Effect(
     hooks={"inputs": slow_down},
     drifts_in_phase=True,
     confusable_with=(
+        "beat_load",
         "clock_scale",
+        "clock_skew",
         "frequency_scale",
     ),
 )

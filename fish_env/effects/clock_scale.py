@@ -1,4 +1,4 @@
-"""Clock scale: the recorder's clock runs fast or slow."""
+"""Clock scale: the one clock of a whole log runs fast or slow."""
 
 from __future__ import annotations
 
@@ -13,14 +13,17 @@ def true_time(recorded_s, values):
 EFFECT = Effect(
     name="clock_scale",
     section="measurement",
-    summary="Measurements carry times of a clock that runs at another rate than the servos'.",
-    equation="recorded time = true time / scale",
-    source="Clock skew between two recorders",
-    parameters=(EffectParameter("scale", "-", 1.0, 0.5, 2.0, (0.97, 1.03), "rate of true time"),),
+    summary="The log's clock runs at another rate than true time, for commands and measurements.",
+    equation="recorded time = true time / scale, of commands and measurements alike",
+    source="Rate error of the recorder's oscillator, or a log replayed at another speed",
+    parameters=(EffectParameter("scale", "-", 1.0, 0.2, 5.0, (0.97, 1.03), "rate of true time"),),
     sample_time=true_time,
+    command_time=true_time,
     confusable_with=(
         "battery_sag",
+        "clock_skew",
         "frequency_scale",
+        "gyro_scale",
         "position_scale",
         "sensor_delay",
         "servo_delay",

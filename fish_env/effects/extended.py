@@ -132,6 +132,10 @@ class ExtendedModel:
                 f"the physics step of {dt:g} s; use dt <= {longest:g}, or switch the effect off (0)"
             )
 
+    def substeps(self, dt: float) -> int:
+        """Equal parts of a physics step (s) that resolve the fastest effect; one if it does."""
+        return max(1, int(np.ceil(dt / self.longest_step() * (1.0 - 1e-9))))
+
 
 def build_model(
     fish: FishParams,
@@ -170,7 +174,7 @@ def build_model(
     everything = (*catalogue().values(), *own.values())
     acting = tuple(effect for effect in everything if effect.acts_on_motion)
     needed = whole_catalogue or any(e.name in on or e.name in own for e in acting)
-    measured = tuple(e for e in everything if e.name in on and (e.sample_time or e.measure))
+    measured = tuple(e for e in everything if e.name in on and e.acts_on_record)
     return ExtendedModel(fish, on, acting if needed else (), measured)
 
 

@@ -22,13 +22,15 @@ EFFECT = Effect(
     equation="f1 -> scale f1",
     source="Rate error of the clock that generates the stroke",
     parameters=(
-        EffectParameter("scale", "-", 1.0, 0.2, 3.0, (0.9, 1.05), "beat over commanded beat"),
+        EffectParameter("scale", "-", 1.0, 0.2, 5.0, (0.9, 1.05), "beat over commanded beat"),
     ),
     hooks={"inputs": scale_frequency},
     drifts_in_phase=True,
     confusable_with=(
         "battery_sag",
+        "beat_load",
         "clock_scale",
+        "clock_skew",
         "tail_gain",
     ),
 )

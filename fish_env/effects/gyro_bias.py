@@ -24,6 +24,7 @@ EFFECT = Effect(
     measure=add_bias,
     confusable_with=(
         "attitude_misalignment",
+        "gyro_scale",
         "tail_bias",
     ),
 )

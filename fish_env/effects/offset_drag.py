@@ -29,6 +29,8 @@ EFFECT = Effect(
     confusable_with=(
         "cross_flow_drag",
         "linear_drag",
+        "offset_gain",
         "surface_drag",
+        "swing_loss",
     ),
 )

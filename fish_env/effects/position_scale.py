@@ -27,7 +27,9 @@ EFFECT = Effect(
     measure=scale_position,
     confusable_with=(
         "clock_scale",
+        "clock_skew",
         "current",
+        "refraction",
         "tail_gain",
         "tether",
     ),

@@ -23,6 +23,7 @@ EFFECT = Effect(
     order=1,
     confusable_with=(
         "clock_scale",
+        "clock_skew",
         "servo_delay",
         "servo_lag",
         "wake_memory",

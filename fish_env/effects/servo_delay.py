@@ -24,6 +24,7 @@ EFFECT = Effect(
     step_error=0.001,
     confusable_with=(
         "clock_scale",
+        "clock_skew",
         "sensor_delay",
         "servo_backlash",
         "servo_lag",

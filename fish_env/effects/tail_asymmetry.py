@@ -1,52 +1,65 @@
 """Tail asymmetry: the tail swings further to one side.
 
-The two half strokes meet with a jump of the tail's rate. Both angle and rate go over from one
-to the other within a phase of about KINK, so that a physics step of 10 ms does not miss the jump;
-the acceleration, which only the water's inertia sees, holds the whole jump as a wider pulse.
+The angle is exact: the half strokes meet with a jump of the tail's rate where the stroke changes
+sign. Within half a step of that instant the jump is spread as its mean over one step around the
+present. Such means add up to exactly what the angle gains, wherever in a step the rate jumps.
+The acceleration, which only the water's inertia sees, holds the whole jump as a wider pulse.
 """
 
 from __future__ import annotations
 
-import math
-
+from fish_env.model.corners import UNTOLD_STEP
 from fish_env.model.effect import Effect, EffectParameter
 from fish_env.model.jit import kernel
 from fish_env.model.records import Tail
 from fish_env.model.tail import TWO_PI
 from fish_env.model.trigonometry import sincos
 
-KINK = 0.03
-"""rad of the tail's phase over which one half stroke goes over into the other."""
 PULSE_AREA = 0.6169605345437128  # integral of cos^16 over half a turn, pi C(16, 8) / 2^16
 
 
 @kernel
-def stretch_half_strokes(tail, inputs, phase, time, fish, e):
-    """Adds ratio A1 |sin(phi_t)|, with |sin| rounded to (sin^2 + KINK^2 / 2) / root.
+def swing_at(amplitude, amplitude_rate, frequency, frequency_rate, phase, ahead):
+    """A1 sin(phi_t) a time ``ahead`` (s) of a phase (rad)."""
+    turned = ahead * (frequency + 0.5 * ahead * frequency_rate)
+    sine, _ = sincos(phase + TWO_PI * turned)
+    return (amplitude + ahead * amplitude_rate) * sine
 
-    The root is sqrt(sin^2 + KINK^2). Alone it would do, but it nears |sin| slowly: the swing would
-    be larger throughout, by enough that a fitted ratio is seen to be off.
-    """
+
+@kernel
+def stretch_half_strokes(tail, inputs, phase, time, fish, e, memory, since):
+    """Adds ratio A1 |sin(phi_t)| to the angle, and its derivatives."""
+    (step,) = memory
     sine, cosine = sincos(phase)
-    omega = TWO_PI * inputs.tail_frequency
     amplitude, amplitude_rate = inputs.tail_amplitude, inputs.tail_amplitude_rate
-    square = sine * sine + KINK * KINK
-    root = math.sqrt(square)
-    size = (square - 0.5 * KINK * KINK) / root
-    slope = sine * (square + 0.5 * KINK * KINK) / (square * root)
+    frequency, frequency_rate = inputs.tail_frequency, inputs.tail_frequency_rate
+    omega = TWO_PI * frequency
     side = 1.0 if sine > 0.0 else -1.0
+    swing = omega * amplitude
+    smooth = side * (swing * cosine + amplitude_rate * sine)
+    motion = (amplitude, amplitude_rate, frequency, frequency_rate)
+    early = swing_at(*motion, phase, -0.5 * step)
+    late = swing_at(*motion, phase, 0.5 * step)
+    jump = (abs(late) - abs(early)) - side * (late - early)  # zero away from the jump
+    rate = smooth + jump / step
     pulse = cosine * cosine
     pulse = pulse * pulse
     pulse = pulse * pulse
     pulse = pulse * pulse
-    bend = (2.0 / PULSE_AREA) * pulse - side * sine
-    swing = omega * amplitude
-    slewing = 2.0 * omega * amplitude_rate + TWO_PI * inputs.tail_frequency_rate * amplitude
-    return Tail(
-        tail.angle + e.ratio * (amplitude * size),
-        tail.rate + e.ratio * (swing * (slope * cosine) + amplitude_rate * size),
+    bend = (2.0 / PULSE_AREA) * pulse - abs(sine)
+    slewing = 2.0 * omega * amplitude_rate + TWO_PI * frequency_rate * amplitude
+    seen = Tail(
+        tail.angle + e.ratio * (amplitude * abs(sine)),
+        tail.rate + e.ratio * rate,
         tail.acceleration + e.ratio * (omega * swing * bend + side * (slewing * cosine)),
     )
+    return seen, (since if since > 0.0 else step,)
+
+
+@kernel
+def start_anywhere(inputs, tail, fish, e):
+    """Nothing is known of the length of the step before a run."""
+    return (UNTOLD_STEP,)
 
 
 EFFECT = Effect(
@@ -61,6 +74,8 @@ EFFECT = Effect(
         ),
     ),
     hooks={"tail": stretch_half_strokes},
+    memory={"tail": ("step",)},
+    initial_states=start_anywhere,
     order=1,
     confusable_with=(
         "com_offset",

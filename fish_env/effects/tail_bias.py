@@ -27,6 +27,7 @@ EFFECT = Effect(
     confusable_with=(
         "com_offset",
         "gyro_bias",
+        "offset_gain",
         "tail_asymmetry",
     ),
 )

@@ -32,14 +32,17 @@ EFFECT = Effect(
     ),
     hooks={"inputs": scale_amplitude},
     confusable_with=(
+        "angle_limit",
         "frequency_scale",
         "linear_drag",
         "position_scale",
         "servo_backlash",
         "servo_lag",
         "servo_rate_limit",
+        "swing_loss",
         "tail_flexibility",
         "tail_reactive",
+        "tail_stall",
         "wake_fraction",
     ),
 )

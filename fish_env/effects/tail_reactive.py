@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from fish_env.model.body import flow_drift
 from fish_env.model.effect import Effect, EffectParameter
 from fish_env.model.frames import cross
 from fish_env.model.jit import kernel
@@ -74,12 +75,11 @@ def reactive_wrench(motion, tail, inputs, centre, fish, e):
     length, half, third = s.length, 0.5 * s.length * s.length, s.length**3 / 3.0
     omega = Vector(motion.p, motion.q, motion.r)
     velocity = Vector(motion.u, motion.v, motion.w)
-    water = Vector(motion.water_u, motion.water_v, motion.water_w)
     turning = cross(omega, s.root)
     at_root = Vector(velocity.x + turning.x, velocity.y + turning.y, velocity.z + turning.z)
     g0 = dot(s.normal, at_root)
     g1 = -(motion.r + tail.rate)
-    g0_rate = tail.rate * dot(s.aft, at_root) + dot(s.normal, cross(omega, water))
+    g0_rate = tail.rate * dot(s.aft, at_root) + dot(s.normal, flow_drift(motion))
     g1_rate = -tail.acceleration
     impulse = s.mass * (length * g0 + half * g1)
     impulse_rate = s.mass * (length * g0_rate + half * g1_rate)
@@ -132,6 +132,7 @@ EFFECT = Effect(
         "added_mass",
         "tail_flexibility",
         "tail_gain",
+        "tail_stall",
         "wake_memory",
     ),
 )

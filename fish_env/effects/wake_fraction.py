@@ -30,5 +30,6 @@ EFFECT = Effect(
     confusable_with=(
         "linear_drag",
         "tail_gain",
+        "tail_stall",
     ),
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -56,6 +56,10 @@ class EnvConfig:
     def bottom(self) -> float:
         """Deepest depth allowed (m)."""
         return float(self.tree["tank"]["depth"]) - self.top
+
+    def divided(self, parts: int) -> EnvConfig:
+        """The same settings with every physics step divided into so many."""
+        return replace(self, dt=self.dt / parts, substeps=self.substeps * parts)
 
     def setup(self) -> FloatArray:
         """The numbers that the compiled step shares between all fish (see layout.Setup)."""

@@ -23,6 +23,8 @@ from fish_env.params.io import as_fish
 from fish_env.params.schema import FishParams
 from fish_env.reading import is_number, shown
 
+MOST_SUBSTEPS = 50
+"""Parts into which a physics step is divided for an effect that is faster."""
 NOISE_GROUPS = {
     "depth": ("depth",),
     "depth_rate": ("depth_rate",),
@@ -94,12 +96,10 @@ def env_options(
     loaded = as_fish(fish, trust_effects)
     whole = _names_effects(randomization, loaded)
     model = build_model(loaded, _water(effects, current, wave), whole_catalogue=whole)
-    model.check_step(settings.dt)
     _check_effects({} if effects is None else effects, model)
     _check_reach(settings, loaded)
     random = build_randomization(randomization, loaded, model)
-    if random is not None:
-        random.check_step(model, settings.dt)
+    settings = _resolving(settings, model, random)
     return EnvOptions(
         settings,
         model,
@@ -110,6 +110,24 @@ def env_options(
         _lag("action_delay_s", action_delay_s, settings.dt),
         _lag("observation_delay_s", observation_delay_s, settings.dt),
     )
+
+
+def _resolving(
+    settings: EnvConfig, model: ExtendedModel, random: Randomization | None
+) -> EnvConfig:
+    """The settings with physics steps that the fastest effect allows.
+
+    Raises:
+        EffectError: it would take more than :data:`MOST_SUBSTEPS`.
+    """
+    parts = model.substeps(settings.dt)
+    if random is not None:
+        parts = max(parts, random.substeps(model, settings.dt))
+    finer = settings.divided(min(parts, MOST_SUBSTEPS))
+    model.check_step(finer.dt)
+    if random is not None:
+        random.check_step(model, finer.dt)
+    return finer
 
 
 def _water(

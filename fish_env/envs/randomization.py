@@ -22,6 +22,8 @@ MOST_SD = 1e6
 """Largest standard deviation, absolute or relative; more would overflow."""
 QUANTILES = 65
 """Points of each distribution at which a step that is too long is looked for."""
+RARE = 1e-3
+"""Share of the draws beyond the outermost of these points but the ends."""
 
 
 @dataclass(frozen=True)
@@ -67,12 +69,23 @@ class Randomization:
         Raises:
             EffectError: says the longest step.
         """
+        for drawn in self._extremes(model):
+            drawn.check_step(dt)
+
+    def substeps(self, model: ExtendedModel, dt: float) -> int:
+        """Equal parts of a physics step (s) that resolve the fastest draw."""
+        return max((drawn.substeps(dt) for drawn in self._extremes(model)), default=1)
+
+    def _extremes(self, model: ExtendedModel) -> list[ExtendedModel]:
+        """The model with draws all over the distributions; none where no effect is drawn."""
         if not any(path.startswith(PREFIX) for path in self.paths):
-            return
-        levels = np.linspace(0.0, 1.0, QUANTILES)
+            return []
+        levels = np.concatenate([np.linspace(0.0, 1.0, QUANTILES), [RARE, 1.0 - RARE]])
         drawn = self.draw(np.tile(levels, (len(self.paths), 1)))
-        for i in range(QUANTILES):
-            with_effects(model, {path: float(v[i]) for path, v in drawn.items()}).check_step(dt)
+        return [
+            with_effects(model, {path: float(v[i]) for path, v in drawn.items()})
+            for i in range(len(levels))
+        ]
 
 
 def with_effects(model: ExtendedModel, values: Mapping[str, float]) -> ExtendedModel:

@@ -137,8 +137,8 @@ class RoboticFish3DEnv(Watched, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.
         cruise_speed: goal speed (m/s) or range; default 0.10, 0 is allowed.
         effects: effects to switch on: name -> parameters (fish_env.effects).
         current: steady flow towards (north, east, down) (m/s).
-        wave: parameters of the wave effect: ``amplitude`` (m/s), ``frequency`` (Hz), ``decay``
-            (1/m), and ``phase`` (rad) at the start of each episode.
+        wave: parameters of the wave effect: ``amplitude`` (m/s), ``frequency`` (Hz), ``heading``
+            (rad), ``tank_depth`` (m), and ``phase`` (rad) at the start of each episode.
         observation_noise: standard deviations (SI) for ``depth``, ``depth_rate``, ``attitude``,
             ``heading``, ``velocity``, ``rates``, or single sensors.
         observation_delay_s: age of what the sensors show (s); commands are known at once.

@@ -7,6 +7,7 @@ after a minute; one that is off differently in every run is no effect of any cat
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -181,6 +182,6 @@ def with_measured_beats(dataset: Dataset, fish: FishParams) -> Dataset:
 
 def own_ratio(fish: FishParams) -> float:
     """Recorded over commanded frequency by the fish's own tail and its recorder's clock."""
-    pace = fish.effects.get("frequency_scale", {}).get("scale", 1.0)
-    # Recorded time is true time over the clock's scale.
-    return float(pace * fish.effects.get("clock_scale", {}).get("scale", 1.0))
+    # Recorded time is true time over the clocks' scales.
+    names = ("frequency_scale", "clock_scale", "clock_skew")
+    return math.prod(float(fish.effects.get(name, {}).get("scale", 1.0)) for name in names)

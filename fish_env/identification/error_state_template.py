@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from fish_env.identification.filter_algebra import BASE, PHASE, angle, innovation
-from fish_env.identification.state_blocks import N_ERROR, PHASE_COLUMN
+from fish_env.identification.state_blocks import N_ERROR, PHASE_COLUMN, first_column
 
 # --- completed by compose ---
 from fish_env.model.composed import (
@@ -35,6 +35,9 @@ from fish_env.model.composed import (
 
 WRENCH = PAR + N_PARAMETERS - 6
 STATE, EULER, DRIVE = 0, 1, 2  # kinds of channels
+RATE = 10  # first row of the angular velocity
+ROTATION, RATES = first_column("rotation"), first_column("rate")
+MOUNT, MARKER, TILT, BENT, IRON = 0, 9, 12, 18, 20  # rows of a lens (see sensing.geometry)
 PERTURB = 1e-5
 DIVERGED = 1e4
 STEP_S = 0.01
@@ -44,11 +47,11 @@ SETTLING_S = STEP_S * SETTLING_STEPS
 
 
 @kernel
-def set_commands(work, width, times, values, at, start, length, pace, delay, shared):
-    """Mean command over each lane's own (true) time interval, so that switches act smoothly."""
+def set_commands(work, width, times, values, at, start, length, skew, delay, shared):
+    """Mean command over each lane's own interval on the commands' clock: switches act smoothly."""
     for k in range(1 if shared else width):
-        begin = pace[k] * start - delay[k]
-        end = begin + pace[k] * length
+        begin = skew[k] * start - delay[k]
+        end = begin + skew[k] * length
         row = at[k]
         while (row + 1 < times.shape[0]) and (times[row + 1] <= begin + 1e-9):
             row += 1
@@ -75,6 +78,8 @@ def set_commands(work, width, times, values, at, start, length, pace, delay, sha
 @kernel
 def step_lanes_once(work, width, elapsed, h, pace, late, history, tables):
     """One RK4 step of every lane, kept where it stays finite."""
+    for k in range(width):  # true time since the run began is `pace` times the recorded one
+        work[TIME * width + k] = (pace[k] - 1.0) * elapsed
     rk4_step(work, width, elapsed, h, tables, late, history, 0, width, pace)
     for k in range(width):
         qw, qx = work[(X + 3) * width + k], work[(X + 4) * width + k]
@@ -90,35 +95,96 @@ def step_lanes_once(work, width, elapsed, h, pace, late, history, tables):
 
 
 @kernel
-def innovations_of(work, width, measured, codes, gain, bias, e):
+def turn_of(work, width, k):
+    """Rotation matrix of a lane, body to inertial, row by row."""
+    qw = work[(X0 + 3) * width + k]
+    qx = work[(X0 + 4) * width + k]
+    qy = work[(X0 + 5) * width + k]
+    qz = work[(X0 + 6) * width + k]
+    return (
+        (1.0 - 2.0 * (qy * qy + qz * qz), 2.0 * (qx * qy - qw * qz), 2.0 * (qx * qz + qw * qy)),
+        (2.0 * (qx * qy + qw * qz), 1.0 - 2.0 * (qx * qx + qz * qz), 2.0 * (qy * qz - qw * qx)),
+        (2.0 * (qx * qz - qw * qy), 2.0 * (qy * qz + qw * qx), 1.0 - 2.0 * (qx * qx + qy * qy)),
+    )
+
+
+@kernel
+def mounted(row, lens, k, column):
+    """An element of R M: a row of R times a column of the sensor's mounting M."""
+    return (
+        row[0] * lens[MOUNT + column, k]
+        + row[1] * lens[MOUNT + 3 + column, k]
+        + row[2] * lens[MOUNT + 6 + column, k]
+    )
+
+
+@kernel
+def magnified(work, width, lens, k):
+    """How large a camera shows horizontal distances at the depth of a lane."""
+    depth = max(work[(X0 + 2) * width + k], 0.0)
+    return lens[BENT + 1, k] / (1.0 + lens[BENT, k] * depth)
+
+
+@kernel
+def seen_place(work, width, lens, k, axis):
+    """x or y of a lane's marker as a camera shows it (m)."""
+    turn = turn_of(work, width, k)
+    mx, my, mz = lens[MARKER, k], lens[MARKER + 1, k], lens[MARKER + 2, k]
+    x = work[X0 * width + k] + (turn[0][0] * mx + turn[0][1] * my + turn[0][2] * mz)
+    y = work[(X0 + 1) * width + k] + (turn[1][0] * mx + turn[1][1] * my + turn[1][2] * mz)
+    z = work[(X0 + 2) * width + k] + (turn[2][0] * mx + turn[2][1] * my + turn[2][2] * mz)
+    row = TILT + 3 * axis
+    shown = lens[row, k] * x + lens[row + 1, k] * y + lens[row + 2, k] * z
+    return shown * magnified(work, width, lens, k)
+
+
+@kernel
+def seen_rate(work, width, lens, k, axis):
+    """Component of M^T omega of a lane (rad/s)."""
+    return (
+        lens[MOUNT + axis, k] * work[(X0 + RATE) * width + k]
+        + lens[MOUNT + 3 + axis, k] * work[(X0 + RATE + 1) * width + k]
+        + lens[MOUNT + 6 + axis, k] * work[(X0 + RATE + 2) * width + k]
+    )
+
+
+@kernel
+def seen_angle(work, width, lens, k, index):
+    """Roll, pitch or yaw of R M of a lane, the yaw bent by iron (rad)."""
+    turn = turn_of(work, width, k)
+    if index == 0:
+        return angle(mounted(turn[2], lens, k, 1), mounted(turn[2], lens, k, 2))
+    if index == 1:
+        sine = min(max(-mounted(turn[2], lens, k, 0), -1.0), 1.0)
+        return angle(sine, np.sqrt(1.0 - sine * sine))
+    sine, cosine = mounted(turn[1], lens, k, 0), mounted(turn[0], lens, k, 0)
+    scale = 1.0 / max(sine * sine + cosine * cosine, 1e-12)
+    twice = lens[IRON, k] * (2.0 * sine * cosine)
+    twice += lens[IRON + 1, k] * (cosine * cosine - sine * sine)
+    return angle(sine, cosine) + scale * twice
+
+
+@kernel
+def innovations_of(work, width, measured, codes, gain, bias, lens, e):
     """Measured minus predicted channels of every lane, e (C, width).
 
     A channel's code is its kind, its index and its column (see ``channels``).
     """
     for i in range(codes.shape[0]):
         kind, index = codes[i, 0], codes[i, 1]
-        if kind != EULER:
-            row = X0 + index if kind == STATE else ANGLE
-            for k in range(width):
-                predicted = gain[i, k] * work[row * width + k] + bias[i, k]
-                e[i, k] = innovation(measured[i], predicted, False)
-        else:
-            for k in range(width):
-                qw = work[(X0 + 3) * width + k]
-                qx = work[(X0 + 4) * width + k]
-                qy = work[(X0 + 5) * width + k]
-                qz = work[(X0 + 6) * width + k]
-                if index == 0:
-                    sine = 2.0 * (qy * qz + qw * qx)
-                    cosine = 1.0 - 2.0 * (qx * qx + qy * qy)
-                elif index == 1:
-                    sine = min(max(2.0 * (qw * qy - qx * qz), -1.0), 1.0)
-                    cosine = np.sqrt(1.0 - sine * sine)
-                else:
-                    sine = 2.0 * (qx * qy + qw * qz)
-                    cosine = 1.0 - 2.0 * (qy * qy + qz * qz)
-                predicted = gain[i, k] * angle(sine, cosine) + bias[i, k]
-                e[i, k] = innovation(measured[i], predicted, index != 1)
+        for k in range(width):
+            if kind == EULER:
+                shown = seen_angle(work, width, lens, k, index)
+            elif kind == DRIVE:
+                shown = work[ANGLE * width + k]
+            elif index < 2:
+                shown = seen_place(work, width, lens, k, index)
+            elif index >= RATE:
+                shown = seen_rate(work, width, lens, k, index - RATE)
+            else:
+                shown = work[(X0 + index) * width + k]
+            predicted = gain[i, k] * shown + bias[i, k]
+            e[i, k] = innovation(measured[i], predicted, (kind == EULER) & (index != 1))
 
 
 @kernel
@@ -191,41 +257,66 @@ def difference(work, width, into):
 
 
 @kernel
-def observation_rows(work, width, codes, gain, measured, rows):
+def place_row(work, width, lens, size, axis, row):
+    """d(x or y as shown)/d(error state) of lane 0; the camera's scale is taken for constant."""
+    turn = turn_of(work, width, 0)
+    m = (lens[MARKER, 0], lens[MARKER + 1, 0], lens[MARKER + 2, 0])
+    for j in range(3):
+        part = size * magnified(work, width, lens, 0) * lens[TILT + 3 * axis + j, 0]
+        row[j] += part
+        # A small rotation a of the body moves its marker by R (a x m).
+        row[ROTATION] += part * (turn[j][2] * m[1] - turn[j][1] * m[2])
+        row[ROTATION + 1] += part * (turn[j][0] * m[2] - turn[j][2] * m[0])
+        row[ROTATION + 2] += part * (turn[j][1] * m[0] - turn[j][0] * m[1])
+
+
+@kernel
+def angle_row(work, width, lens, size, index, row):
+    """d(roll, pitch or yaw as shown)/d(error state) of lane 0."""
+    turn = turn_of(work, width, 0)
+    zx, zy = mounted(turn[2], lens, 0, 0), mounted(turn[2], lens, 0, 1)
+    zz = mounted(turn[2], lens, 0, 2)
+    cosine = np.sqrt(max(1.0 - zx * zx, 1e-6))
+    sin_roll, cos_roll, tan_pitch = zy / cosine, zz / cosine, -zx / cosine
+    if index == 0:
+        own = (size, size * sin_roll * tan_pitch, size * cos_roll * tan_pitch)
+    elif index == 1:
+        own = (0.0, size * cos_roll, -size * sin_roll)
+    else:
+        xx, yx = mounted(turn[0], lens, 0, 0), mounted(turn[1], lens, 0, 0)
+        level = 1.0 / max(xx * xx + yx * yx, 1e-12)
+        twice = lens[IRON, 0] * (xx * xx - yx * yx) - lens[IRON + 1, 0] * (2.0 * xx * yx)
+        bent = size * (1.0 + 2.0 * level * twice)
+        own = (0.0, bent * sin_roll / cosine, bent * cos_roll / cosine)
+    for j in range(3):  # the sensor turns with the body: a' = M^T a
+        for axis in range(3):
+            row[ROTATION + j] += lens[MOUNT + 3 * j + axis, 0] * own[axis]
+
+
+@kernel
+def observation_rows(work, width, codes, gain, lens, measured, rows):
     """d(channel)/d(error state) of lane 0, (C, 19); zero for a missing sample.
 
     What drives the fish shows its phase alone. That stays as it is over an interval, so the lane
     that began with another phase shows the slope, that of what follows the phase included.
     """
-    qw = work[(X0 + 3) * width]
-    qx = work[(X0 + 4) * width]
-    qy = work[(X0 + 5) * width]
-    qz = work[(X0 + 6) * width]
-    zx = 2.0 * (qx * qz - qw * qy)
-    zy = 2.0 * (qy * qz + qw * qx)
-    zz = 1.0 - 2.0 * (qx * qx + qy * qy)
-    cosine = np.sqrt(max(1.0 - zx * zx, 1e-6))
-    sin_roll, cos_roll, tan_pitch = zy / cosine, zz / cosine, -zx / cosine
     for i in range(codes.shape[0]):
         for j in range(N_ERROR):
             rows[i, j] = 0.0
         kind, index, column = codes[i, 0], codes[i, 1], codes[i, 2]
         size = gain[i] if measured[i] == measured[i] else 0.0
-        if kind == STATE:
-            rows[i, column] = size
-        elif kind == DRIVE:
+        if kind == DRIVE:
             gap = work[ANGLE * width + column + 1] - work[ANGLE * width]
             rows[i, column] = size * gap * (1.0 / PERTURB)
-        elif index == 0:
-            rows[i, column] = size
-            rows[i, column + 1] = size * sin_roll * tan_pitch
-            rows[i, column + 2] = size * cos_roll * tan_pitch
-        elif index == 1:
-            rows[i, column + 1] = size * cos_roll
-            rows[i, column + 2] = -size * sin_roll
+        elif kind == EULER:
+            angle_row(work, width, lens, size, index, rows[i])
+        elif index < 2:
+            place_row(work, width, lens, size, index, rows[i])
+        elif index >= RATE:
+            for j in range(3):
+                rows[i, RATES + j] = size * lens[MOUNT + 3 * j + index - RATE, 0]
         else:
-            rows[i, column + 1] = size * sin_roll / cosine
-            rows[i, column + 2] = size * cos_roll / cosine
+            rows[i, column] = size
 
 
 @kernel

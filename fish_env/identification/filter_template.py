@@ -49,8 +49,8 @@ EKF_LANES = 24  # the estimate and 19 neighbours, rounded up to whole vector reg
 
 @kernel
 def slopes_of_interval(
-    work, width, steps, h, begin, times, values, at, pace, delay, late, history, tables, error, gap,
-    f,
+    work, width, steps, h, begin, times, values, at, pace, skew, delay, late, history, tables,
+    error, gap, f,
 ):  # fmt: skip
     """Advance the estimate by one sample interval; f (12, 19) becomes its slopes."""
     for j in range(N_STATES):
@@ -66,7 +66,7 @@ def slopes_of_interval(
     move(work, width, error)
     for i in range(steps):
         start = begin + i * h
-        set_commands(work, width, times, values, at, start, h, pace, delay, True)
+        set_commands(work, width, times, values, at, start, h, skew, delay, True)
         step_lanes_once(work, width, start, h, pace, late, history, tables)
     difference(work, width, gap)
     for j in range(N_MOVING):
@@ -85,9 +85,9 @@ def carry(work, width, known, sample, sign, count):
 
 @entry_point
 def ekf_run(
-    state0, swimming, par, pace_one, delay_one, gain, bias, clock, substeps, times, values,
-    measured, codes, noise_variance, covariance0, wrench_variance, wrench_decay_s, wander,
-    history_rows, known, tables, k_out, w_out, e_out, x_out, d_out, f_out, h_out, raw_out,
+    state0, swimming, par, pace_one, skew_one, delay_one, gain, bias, lens_one, clock, substeps,
+    times, values, measured, codes, noise_variance, covariance0, wrench_variance, wrench_decay_s,
+    wander, history_rows, known, tables, k_out, w_out, e_out, x_out, d_out, f_out, h_out, raw_out,
 ):  # fmt: skip
     """Extended Kalman filter over one run, relinearised at every sample.
 
@@ -96,9 +96,11 @@ def ekf_run(
         swimming: whether the tail was beating before it.
         par: (parameters, 1) record, the wrench last.
         pace_one: true seconds per recorded second.
-        delay_one: age of the measurements (s).
+        skew_one: seconds of the commands' clock per recorded second.
+        delay_one: age of the measurements, on the commands' clock (s).
         gain: (C,) factor of each measured channel.
         bias: (C,) offset of each measured channel.
+        lens_one: (rows, 1) how sensors sit and look (see ``sensing.geometry``).
         clock: (T,) recorded sample times, the first is 0 (s).
         substeps: (T,) RK4 steps up to each sample.
         times: (m,) command times (s).
@@ -127,8 +129,11 @@ def ekf_run(
     """
     width = EKF_LANES
     work = np.zeros(WORK_ROWS * width)
-    pace = np.full(width, pace_one)
+    pace, skew = np.full(width, pace_one), np.full(width, skew_one)
     delay = np.full(width, delay_one)
+    lens = np.zeros((lens_one.shape[0], width))
+    for i in range(lens.shape[0]):
+        lens[i, :] = lens_one[i, 0]
     at = np.zeros(width, np.int64)
     for k in range(width):
         load_lane(work, width, k, state0, par, 0, values[0])
@@ -155,15 +160,15 @@ def ekf_run(
             carry(work, width, known, sample - 1, 1.0, 1)
             slopes_of_interval(
                 work, width, substeps[sample], span / substeps[sample], begin, times, values, at,
-                pace, delay, late, history, tables, error, gap, f,
+                pace, skew, delay, late, history, tables, error, gap, f,
             )  # fmt: skip
             carry(work, width, known, sample - 1, -1.0, 1)
             keep = math.exp(-span / wrench_decay_s)
             for j in range(6):
                 work[(WRENCH + j) * width] *= keep
             predict_covariance(p, f, keep, wrench_variance, wander * span, scratch, turned)
-        observation_rows(work, width, codes, gain, measured[sample], rows)
-        innovations_of(work, width, measured[sample], codes, gains, biases, e)
+        observation_rows(work, width, codes, gain, lens, measured[sample], rows)
+        innovations_of(work, width, measured[sample], codes, gains, biases, lens, e)
         log_det = update_covariance(
             p, rows, measured[sample], noise_variance, s, w, seen, k_gain
         )  # fmt: skip
@@ -203,10 +208,10 @@ def push(work, width, basis, sample, column, size, sign, first, count):
 
 
 @kernel
-def take_sample(work, width, measured, codes, gain, bias, k_in, w_in, e, error, white):
+def take_sample(work, width, measured, codes, gain, bias, lens, k_in, w_in, e, error, white):
     """Innovations of all lanes at one sample, whitened into white (C, width); states corrected."""
     channels = codes.shape[0]
-    innovations_of(work, width, measured, codes, gain, bias, e)
+    innovations_of(work, width, measured, codes, gain, bias, lens, e)
     for i in range(channels):
         for k in range(width):
             white[i, k] = w_in[i, 0] * e[0, k]
@@ -226,23 +231,26 @@ def take_sample(work, width, measured, codes, gain, bias, k_in, w_in, e, error, 
 
 @kernel
 def filter_block(
-    states0, swimming, par, pace_all, delay_all, gain_all, bias_all, clock, substeps, times, values,
-    measured, codes, k_in, w_in, wrench_decay_s, history_rows, known, push_basis, push_column,
-    push_size, tables, out, place, first, count,
+    states0, swimming, par, pace_all, skew_all, delay_all, gain_all, bias_all, lens_all, clock,
+    substeps, times, values, measured, codes, k_in, w_in, wrench_decay_s, history_rows, known,
+    push_basis, push_column, push_size, tables, out, place, first, count,
 ):  # fmt: skip
     """Lanes first..first+count through a run with given gains (see :func:`filter_lanes`)."""
     width = FILTER_LANES
     channels = codes.shape[0]
     work = np.zeros(WORK_ROWS * width)
-    pace, delay = np.ones(width), np.zeros(width)
+    pace, skew, delay = np.ones(width), np.ones(width), np.zeros(width)
+    lens = np.zeros((lens_all.shape[0], width))
     gain, bias = np.ones((channels, width)), np.zeros((channels, width))
     at = np.zeros(width, np.int64)
     shared = True
     for k in range(width):
         lane = first + min(k, count - 1)
         load_lane(work, width, k, states0[:, lane], par, lane, values[0])
-        pace[k], delay[k] = pace_all[lane], delay_all[lane]
-        shared &= (pace[k] == pace[0]) & (delay[k] == delay[0])
+        pace[k], skew[k], delay[k] = pace_all[lane], skew_all[lane], delay_all[lane]
+        shared &= (skew[k] == skew[0]) & (delay[k] == delay[0])
+        for i in range(lens.shape[0]):
+            lens[i, k] = lens_all[i, lane]
         for i in range(channels):
             gain[i, k], bias[i, k] = gain_all[i, lane], bias_all[i, lane]
     late = LATE_TAIL & (history_rows > 0)
@@ -261,7 +269,7 @@ def filter_block(
                 push(work, width, push_basis, sample - 1, push_column, push_size, 1.0, first, count)
             for i in range(substeps[sample]):
                 begin = clock[sample - 1] + i * h
-                set_commands(work, width, times, values, at, begin, h, pace, delay, shared)
+                set_commands(work, width, times, values, at, begin, h, skew, delay, shared)
                 step_lanes_once(work, width, begin, h, pace, late, history, tables)
             if pushed:
                 push(
@@ -272,8 +280,8 @@ def filter_block(
             for n in range(WRENCH * width, (WRENCH + 6) * width):
                 work[n] *= keep
         take_sample(
-            work, width, measured[sample], codes, gain, bias, k_in[sample], w_in[sample], e, error,
-            white,
+            work, width, measured[sample], codes, gain, bias, lens, k_in[sample], w_in[sample], e,
+            error, white,
         )  # fmt: skip
         for k in range(count):
             for i in range(channels):
@@ -282,9 +290,9 @@ def filter_block(
 
 @entry_point
 def filter_lanes(
-    states0, swimming, par, pace, delay, gain, bias, clock, substeps, times, values, measured,
-    codes, k_in, w_in, wrench_decay_s, history_rows, known, push_basis, push_column, push_size,
-    tables, out, place, first, last,
+    states0, swimming, par, pace, skew, delay, gain, bias, lens, clock, substeps, times, values,
+    measured, codes, k_in, w_in, wrench_decay_s, history_rows, known, push_basis, push_column,
+    push_size, tables, out, place, first, last,
 ):  # fmt: skip
     """Whitened innovations of many parameter sets on one run, with the gains of one of them.
 
@@ -293,9 +301,11 @@ def filter_lanes(
         swimming: whether the tail was beating before the run.
         par: (parameters, N) records, the wrench last (zero).
         pace: (N,) true seconds per recorded second.
-        delay: (N,) age of the measurements (s).
+        skew: (N,) seconds of the commands' clock per recorded second.
+        delay: (N,) age of the measurements, on the commands' clock (s).
         gain: (C, N) factor of each measured channel.
         bias: (C, N) offset of each measured channel.
+        lens: (rows, N) how sensors sit and look (see ``sensing.geometry``).
         clock: (T,) sample times.
         substeps: (T,) RK4 steps up to each sample.
         times: (m,) command times (s).
@@ -319,8 +329,8 @@ def filter_lanes(
     """
     for block in range(first, last, FILTER_LANES):
         filter_block(
-            states0, swimming, par, pace, delay, gain, bias, clock, substeps, times, values,
-            measured, codes, k_in, w_in, wrench_decay_s, history_rows, known, push_basis,
+            states0, swimming, par, pace, skew, delay, gain, bias, lens, clock, substeps, times,
+            values, measured, codes, k_in, w_in, wrench_decay_s, history_rows, known, push_basis,
             push_column, push_size, tables, out, place, block, min(FILTER_LANES, last - block),
         )  # fmt: skip
     return 0

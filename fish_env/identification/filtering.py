@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from threading import Lock
 
@@ -27,9 +27,13 @@ from fish_env.identification.variation import (
 from fish_env.model.history import history_rows
 from fish_env.model.runtime import Kernels, kernels
 from fish_env.model.state import BASE_STATES
+from fish_env.sensing.channels import channels_from_states
+from fish_env.sensing.geometry import lens_of, through_geometry
 from fish_env.threads import default_threads
 
 POSITIONS = {"x": 0, "y": 1, "z": 2}
+CORRECTIONS = 4
+"""Each leaves a tenth or less of the error of a start."""
 TEMPLATES = tuple(
     Path(__file__).with_name(f"{name}_template.py") for name in ("error_state", "filter", "replay")
 )
@@ -119,24 +123,44 @@ class Slopes:
 
 @dataclass(frozen=True, eq=False)
 class Measurement:
-    """How channels show the true state: recorded time and affine distortion, per lane.
+    """How channels show the true state: recorded time, geometry, affine distortion, per lane.
 
     Attributes:
-        pace: (N,) true seconds per recorded second.
-        delay: (N,) age of the samples (s).
+        pace: (N,) true seconds per recorded second of the measurements' clock.
+        skew: (N,) seconds of the commands' clock per second of the measurements' clock.
+        delay: (N,) age of the samples, in seconds of the commands' clock.
         gain: (C, N).
         bias: (C, N).
+        geometry: fields of :mod:`fish_env.sensing.geometry`, each (N,); none for none.
     """
 
     pace: FloatArray
+    skew: FloatArray
     delay: FloatArray
     gain: FloatArray
     bias: FloatArray
+    geometry: Mapping[str, FloatArray] = field(default_factory=dict)
+
+    @cached_property
+    def lens(self) -> FloatArray:
+        """(LENS_ROWS, N) geometry as kernels read it."""
+        return np.ascontiguousarray(lens_of(self.geometry, len(self.pace)))
+
+    def take(self, lanes: IntArray) -> Measurement:
+        """That of some of the lanes."""
+        return Measurement(
+            self.pace[lanes],
+            self.skew[lanes],
+            self.delay[lanes],
+            np.ascontiguousarray(self.gain[:, lanes]),
+            np.ascontiguousarray(self.bias[:, lanes]),
+            {name: values[lanes] for name, values in self.geometry.items()},
+        )
 
     def of_run(self, own: FloatArray, channels: Sequence[str]) -> Measurement:
         """The same for a run with numbers of its own (K, N or 1)."""
         bias = np.ascontiguousarray(varied_bias(self.bias, own, channels))
-        return Measurement(self.pace, varied_delay(self.delay, own), self.gain, bias)
+        return replace(self, delay=varied_delay(self.delay, own), bias=bias)
 
 
 Job = tuple[RunData, "Filtered", int, FloatArray, FloatArray, Measurement, FloatArray, int, int]
@@ -178,7 +202,20 @@ class RunFilter:
                 states[POSITIONS[name]] = (states[POSITIONS[name]] - bias) / gain
             elif name == "yaw":
                 states[3:7] = turned(states[3:7], -bias)
+        if data.as_measured and measurement.geometry:
+            self._undo_geometry(states, measurement.geometry)
         return states
+
+    def _undo_geometry(self, states: FloatArray, geometry: Mapping[str, FloatArray]) -> None:
+        """Turn place and heading that sensors of a geometry show into true ones, in place."""
+        told = channels_from_states(states.copy())
+        for _ in range(CORRECTIONS):
+            seen = through_geometry(channels_from_states(states), geometry)
+            for name, row in POSITIONS.items():
+                if name in self.channels:
+                    states[row] += told[name] - seen[name]
+            if "yaw" in self.channels:
+                states[3:7] = turned(states[3:7], told["yaw"] - seen["yaw"])
 
     def _of_run(
         self,
@@ -230,8 +267,9 @@ class RunFilter:
             )
             state0 = self._starts(data, measurement)[:, 0].copy()
             value = entry(
-                state0, data.swimming, record, measurement.pace[0], measurement.delay[0],
-                measurement.gain[:, 0], measurement.bias[:, 0], data.clock,
+                state0, data.swimming, record, measurement.pace[0], measurement.skew[0],
+                measurement.delay[0], measurement.gain[:, 0], measurement.bias[:, 0],
+                measurement.lens, data.clock,
                 steps_of(data, corners), data.command_times, data.command_values,
                 data.measured, self.codes, noise.sensor_sd**2,
                 data.covariance0, noise.wrench_variance, noise.correlation_s, noise.phase_sd**2,
@@ -315,8 +353,8 @@ class RunFilter:
         def one(job: Job) -> None:
             data, gains, place, basis, record, sensors, state0, first, last = job
             entry(
-                state0, data.swimming, record, sensors.pace, sensors.delay,
-                sensors.gain, sensors.bias, data.clock,
+                state0, data.swimming, record, sensors.pace, sensors.skew, sensors.delay,
+                sensors.gain, sensors.bias, sensors.lens, data.clock,
                 steps_of(data, gains.corners), data.command_times, data.command_values,
                 data.measured, self.codes, gains.gains, gains.whitening,
                 noise.correlation_s, self._history_rows(record, data), data.known_wrench, basis,

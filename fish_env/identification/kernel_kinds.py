@@ -10,7 +10,10 @@ LEAN = frozenset[str]()
 KERNELS = (
     LEAN,
     frozenset({"inputs", "tail"}),
-    frozenset({"barycentre", "water", "tail_inflow", "tail_force", "body_drag", "wrench"}),
+    frozenset(
+        {"barycentre", "water", "water_rate", "tail_inflow", "tail_lift", "tail_force"}
+        | {"body_drag", "wrench"}
+    ),
     frozenset(STAGES),
 )
 """Stages that are compiled together. An effect costs a little where it is neutral too, so one of

@@ -122,7 +122,8 @@ def measurement_of(
 ) -> Measurement:
     """What measurement effects do to clock and channels, for each of ``count`` lanes.
 
-    Their functions are affine in time and channels, so two probes give factor and offset.
+    Their functions are affine in time and channels, so two probes give factor and offset; what
+    mixes channels is their geometry.
 
     Args:
         model: unused effects of the model keep their own values.
@@ -131,7 +132,8 @@ def measurement_of(
         channels: measured channels.
         count: number of lanes.
     """
-    pace, delay = np.ones(count), np.zeros(count)
+    pace, delay, by_commands = np.ones(count), np.zeros(count), np.ones(count)
+    geometry: dict[str, FloatArray] = {}
     gain, bias = np.ones((len(channels), count)), np.zeros((len(channels), count))
     for effect in effects:
         base = model.effects.get(effect.name, effect.neutral)
@@ -144,6 +146,10 @@ def measurement_of(
             one = effect.sample_time(np.ones(count), own)
             slope = one - zero
             pace, delay = pace * slope, delay * slope - zero
+        if effect.command_time is not None:
+            by_commands = by_commands * effect.command_time(np.ones(count), own)
+        if effect.geometry is not None:
+            geometry |= effect.geometry(own)
         if effect.measure is not None:
             zeros = {name: np.zeros(count) for name in channels}
             ones = {name: np.ones(count) for name in channels}
@@ -152,4 +158,11 @@ def measurement_of(
                 factor = high[name] - low[name]
                 gain[i] = gain[i] * factor
                 bias[i] = bias[i] * factor + low[name]
-    return Measurement(pace, delay, np.ascontiguousarray(gain), np.ascontiguousarray(bias))
+    return Measurement(
+        pace,
+        pace / by_commands,
+        delay / by_commands,
+        np.ascontiguousarray(gain),
+        np.ascontiguousarray(bias),
+        geometry,
+    )

@@ -108,9 +108,14 @@ class RunData:
         """Of the steps for motion with corners (s)."""
         return float(np.min(np.diff(self.clock) / self.corner_substeps[1:]))
 
-    def in_long_steps(self) -> RunData:
-        """The same run, simulated no finer than a comparison needs."""
-        longest = np.where(self.fresh, LONG_STEP_S / FINER, LONG_STEP_S)
+    def in_long_steps(self, fastest: float = np.inf) -> RunData:
+        """The same run, simulated no finer than a comparison needs.
+
+        Args:
+            fastest: time constant that the fish has anyhow (s).
+        """
+        long = min(LONG_STEP_S, fastest)
+        longest = np.where(self.fresh, long / FINER, long)
         return replace(self, substeps=np.minimum(self.substeps, _steps(self.clock, longest)))
 
     def in_finer_steps(self) -> RunData:

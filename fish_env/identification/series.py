@@ -68,11 +68,11 @@ class SeriesProblem(Problem):
         effects: names of effects whose parameters are free.
         user_effects: effects of the caller's own, among ``effects`` or not.
         dt: longest RK4 step (s), but for a moment after each switch of the commands and for
-            effects that make the tail's rate jump, which get finer ones.
+            effects that make the tail's rate jump, or are faster in the fish's file.
     """
 
     known: dict[str, Effect]
-    out_of_step = ("frequency_scale", "battery_sag", "clock_scale")
+    out_of_step = ("frequency_scale", "battery_sag", "clock_scale", "clock_skew")
     interchangeable = ALIKE
     variations = (*VARIATIONS, *SENSOR_ERRORS)
 
@@ -87,13 +87,13 @@ class SeriesProblem(Problem):
         dt: float = 0.01,
     ) -> None:
         self.dataset = dataset
-        self.dt = dt
         self.fish = fish or load_fish(dataset.fish)
         self.known = {**catalogue(), **{e.name: e for e in user_effects}}
         own = tuple(effect for effect in self.known.values() if effect.name not in catalogue())
         self.model: ExtendedModel = build_model(
             self.fish, user_effects=(*own, APPLIED_WRENCH), whole_catalogue=True
         )
+        self.dt = dt = dt / self.model.substeps(dt)
         self.channels = usable_channels(dataset.channels)
         self.sensor_sd = np.array(
             [dataset.noise.get(n) or white_noise_sd(dataset, n) for n in self.channels]
@@ -386,7 +386,7 @@ class SeriesProblem(Problem):
 
     def with_long_steps(self) -> SeriesProblem:
         """The same problem in steps that will do to compare causes, with the same freedoms."""
-        return self.with_runs([run.in_long_steps() for run in self.runs])
+        return self.with_runs([run.in_long_steps(self.model.longest_step()) for run in self.runs])
 
     def refined(self) -> tuple[SeriesProblem, int]:
         """The same problem in finer steps, to tell what those of motion with corners get wrong."""

@@ -20,6 +20,7 @@ class EffectParameter:
         plausible: range (low, high) that a real vehicle of this size may show.
         description: what it is.
         shapes: it only says where, when or how the effect acts; other parameters switch it on.
+        probed: whether a search starts from several values of one that shapes; else from neutral.
     """
 
     name: str
@@ -30,6 +31,7 @@ class EffectParameter:
     plausible: tuple[float, float] = (-1.0, 1.0)
     description: str = ""
     shapes: bool = False
+    probed: bool = True
 
 
 class Switched:
@@ -59,6 +61,7 @@ class DeclaredEffect(Switched):
         equals: baseline coefficients (paths) other values of which do exactly the same.
         step_error: share of its effect that the simulation gets wrong.
         drifts_in_phase: whether a periodic drive gets ever further out of phase.
+        diagnosed: whether a diagnosis looks for it; else it is only simulated, and fitted if asked.
     """
 
     name: str
@@ -67,6 +70,7 @@ class DeclaredEffect(Switched):
     equals: tuple[str, ...] = ()
     step_error: float = 0.0
     drifts_in_phase: bool = False
+    diagnosed: bool = True
 
     def is_followed(self, values: Mapping[str, float], step: float) -> bool:
         """Whether simulation steps (s) follow it at these values: they do, at any."""

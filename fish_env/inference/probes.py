@@ -134,6 +134,7 @@ def causes_of(problem: Problem) -> tuple[Cause, ...]:
     effects = [
         Cause(effect.name, each_alone(probes_of(effect, step, length)))
         for effect in problem.known.values()
+        if effect.diagnosed
     ]
     named = {path for effect in problem.known.values() for path in effect.equals}
     paths = [path for path in problem.baseline.paths if path not in named]
@@ -225,6 +226,8 @@ def _frequencies(parameter: EffectParameter, length: float) -> tuple[float, ...]
 
 
 def _middle(parameter: EffectParameter) -> tuple[float, ...]:
+    if not parameter.probed:
+        return (parameter.neutral,)
     low, high = parameter.plausible
     return (float(np.sqrt(low * high)) if low > 0.0 else 0.5 * (low + high),)
 
@@ -310,9 +313,13 @@ def finer(effect: Effect, probe: Probe, length: float) -> tuple[tuple[Probe, ...
 
 
 def _around(parameter: EffectParameter, value: float, length: float) -> tuple[float, ...]:
+    if not parameter.probed:
+        return (value,)
     low, high = parameter.plausible
     if parameter.unit == "Hz":
         values = value + np.linspace(-0.7, 0.7, 15) / max(length, 1.0)
+    elif parameter.unit == "rad":  # a direction: all four quarters
+        values = value + np.array([-0.5, 0.0, 0.5, 1.0]) * np.pi
     else:
         values = value * np.array([0.4, 1.0, 2.5])
     return tuple(np.unique(np.clip(values, low, high)).tolist())
@@ -326,6 +333,8 @@ def _alternative(
 
 
 def _shape_values(parameter: EffectParameter) -> tuple[float, ...]:
+    if not parameter.probed:
+        return (parameter.neutral,)
     low, high = parameter.plausible
     if low > 0 and high / low > 4:
         return tuple(np.geomspace(low, high, 3).tolist())
@@ -344,7 +353,8 @@ def _ends(p: EffectParameter) -> tuple[float, float]:
     """A small and a large departure from neutral; where neutral is infinite, low is large."""
     low, high = p.plausible
     if np.isinf(p.neutral):
-        return high, float(np.sqrt(low * high))
+        mild = high if p.neutral > 0.0 else low
+        return mild, float(np.copysign(np.sqrt(low * high), mild))
     far = high if abs(high - p.neutral) >= abs(low - p.neutral) else low
     return _small(p), p.neutral + 0.6 * (far - p.neutral)
 

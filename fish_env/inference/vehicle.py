@@ -48,6 +48,11 @@ class Effect(Protocol):
         ...
 
     @property
+    def diagnosed(self) -> bool:
+        """Whether a diagnosis looks for it."""
+        ...
+
+    @property
     def equals(self) -> tuple[str, ...]:
         """Coefficients (paths) other values of which do exactly the same."""
         ...
@@ -119,7 +124,7 @@ def finite_values(known: Mapping[str, Effect], values: Mapping[str, float]) -> d
     No derivative leads away from an infinite rate limit.
     """
     mildest = {
-        parameter_path(name, p.name): p.plausible[1]
+        parameter_path(name, p.name): p.plausible[1 if p.neutral > 0.0 else 0]
         for name in effects_of(values)
         for p in known[name].parameters
     }

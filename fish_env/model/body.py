@@ -29,7 +29,7 @@ def plane_flow(axial, normal, area_axial, area_normal, density):
 
 
 @kernel
-def relative_motion(time, place, velocity, omega, attitude, water):
+def relative_motion(time, place, velocity, omega, attitude, water, water_rate):
     """Motion against ground and water; V_rel = V_b - R^T water (m/s, body)."""
     return Motion(
         time,
@@ -48,6 +48,9 @@ def relative_motion(time, place, velocity, omega, attitude, water):
         water.x,
         water.y,
         water.z,
+        water_rate.x,
+        water_rate.y,
+        water_rate.z,
         attitude,
     )
 
@@ -72,7 +75,25 @@ def with_surge(motion, surge):
         motion.water_u,
         motion.water_v,
         motion.water_w,
+        motion.water_rate_u,
+        motion.water_rate_v,
+        motion.water_rate_w,
         motion.attitude,
+    )
+
+
+@kernel
+def flow_drift(motion):
+    """d(V_rel)/dt - dV_b/dt = omega x V_water - R^T DU/Dt (m/s^2, body).
+
+    V_rel = V_b - R^T U, and d(R^T U)/dt = R^T dU/dt - omega x R^T U. The acceleration of the water
+    is that along its own path, as in the force on a small body in an unsteady, non-uniform flow
+    (Maxey and Riley, Physics of Fluids 26, 1983; Auton, Hunt and Prud'homme, JFM 197, 1988).
+    """
+    return Vector(
+        motion.q * motion.water_w - motion.r * motion.water_v - motion.water_rate_u,
+        motion.r * motion.water_u - motion.p * motion.water_w - motion.water_rate_v,
+        motion.p * motion.water_v - motion.q * motion.water_u - motion.water_rate_w,
     )
 
 

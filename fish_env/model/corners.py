@@ -52,6 +52,23 @@ def window(tail, since, step, told, told_rate):
 
 
 @kernel
+def rate_against_stops(tail, lower, upper, held, step):
+    """Rate of a tail between stops, its jumps spread as means over one step (rad/s).
+
+    Args:
+        tail: the tail without the stops.
+        lower: stop (rad).
+        upper: stop (rad).
+        held: whether a stop holds it now.
+        step: length of a step (s).
+    """
+    early, late = angle_at(tail, 0.0, -0.5 * step), angle_at(tail, 0.0, 0.5 * step)
+    gained = min(max(late, lower), upper) - min(max(early, lower), upper)
+    jump = gained - (0.0 if held else late - early)  # zero away from the stops
+    return (0.0 if held else tail.rate) + jump / step
+
+
+@kernel
 def follow(ahead_of, limit, tail, since, memory):
     """How a tail follows its command, however its rate jumps.
 

@@ -10,14 +10,18 @@ stage           hook                                                     value
 ``tail``        (tail, inputs, phase, time, fish, e)                     Tail
 ``barycentre``  (centre, place, inputs, time, fish, e)                   Barycentre
 ``water``       (water, place, time, e)                                  Vector, inertial
+``water_rate``  (rate, water, place, time, e)                            Vector, inertial
 ``tail_inflow`` (motion, fish, e)                                        Motion
+``tail_lift``   (coefficient, sine, fish, e)                             float
 ``tail_force``  (force, motion, tail, fish, e)                           Vector, body
 ``body_drag``   (factor, motion, fish, e)                                float
 ``wrench``      (motion, tail, inputs, centre, fish, e)                  Wrench, body
 ``inertia``     (inertia, tail, fish, e)                                 Inertia
 =============== ======================================================== =================
 
-``e`` is the named tuple of the effect's parameters. At neutral parameters a hook must return its
+``water`` is the velocity of the water (m/s), ``water_rate`` its acceleration along its own path,
+DU/Dt (m/s^2); ``sine`` that of the tail's incidence. ``e`` is the named tuple of the effect's
+parameters. At neutral parameters a hook must return its
 value unchanged to the last bit.
 
 A hook may carry numbers of its own through time. *States* obey a differential equation: the hook
@@ -51,7 +55,9 @@ STAGES = (
     "tail",
     "barycentre",
     "water",
+    "water_rate",
     "tail_inflow",
+    "tail_lift",
     "tail_force",
     "body_drag",
     "wrench",
@@ -88,12 +94,17 @@ class Effect(Switched):
         command_delay: name of the parameter (s) by which the tail's command is late.
         order: place among the effects of its section, low ones first.
         sample_time: (recorded time array, parameters) -> true time array (measurement).
-        measure: (channel arrays by name, parameters) -> channel arrays (measurement).
-        time_scale: parameters -> its fastest time constant (s); a physics step must not be longer.
+        command_time: (recorded time array, parameters) -> true time array, of commands.
+        geometry: parameters -> how sensors sit and look, by the names of
+            :data:`fish_env.sensing.geometry.FIELDS` (measurement).
+        measure: (channel arrays by name, parameters) -> channel arrays, an affine function of each
+            channel by itself (measurement).
+        time_scale: parameters -> its fastest time constant (s); longer physics steps are divided.
         step_error: share of its effect that the identification gets wrong, in its finer steps and
             extrapolated, for an effect that makes the tail's rate jump. Above zero, it takes those.
         drifts_in_phase: whether the tail runs ever further out of step with its command, so that
             what a large size does says little of what a small one does.
+        diagnosed: whether a diagnosis looks for it; else it is only simulated, and fitted if asked.
         equals: baseline coefficients (paths) other values of which do exactly the same.
         confusable_with: names of effects with a similar signature.
         file: source file, for effects that users bring.
@@ -112,10 +123,13 @@ class Effect(Switched):
     command_delay: str | None = None
     order: int = 0
     sample_time: Callable[..., Any] | None = None
+    command_time: Callable[..., Any] | None = None
+    geometry: Callable[..., Any] | None = None
     measure: Callable[..., Any] | None = None
     time_scale: Callable[[Mapping[str, float]], float] | None = None
     step_error: float = 0.0
     drifts_in_phase: bool = False
+    diagnosed: bool = True
     equals: tuple[str, ...] = ()
     confusable_with: tuple[str, ...] = ()
     file: Path | None = None
@@ -149,6 +163,11 @@ class Effect(Switched):
     def record_type(self) -> type:
         """Named tuple that hooks receive as ``e``."""
         return namedtuple(f"{self.name}_parameters", [p.name for p in self.parameters])
+
+    @property
+    def acts_on_record(self) -> bool:
+        """Whether it changes what is recorded of a motion."""
+        return any((self.sample_time, self.command_time, self.geometry, self.measure))
 
     @property
     def acts_on_motion(self) -> bool:

@@ -175,17 +175,10 @@ class Emitter:
 
     def command_lines(self, recalled: str) -> list[str]:
         """The commanded tail: of now, or of what was recalled for a lane whose command is late."""
-        if not self.composition.delays:
-            return [
-                "tail_inputs = inputs",
-                "tail_phase = phase",
-                "tail = commanded_tail(tail_inputs, tail_phase)",
-            ]
-        return [
-            f"late = {self.delay()}",
-            f"tail_inputs, tail_phase = {recalled}",
-            "tail = commanded_tail(tail_inputs, tail_phase)",
-        ]
+        lines = ["tail_inputs, tail_phase = inputs, phase"]
+        if self.composition.delays:
+            lines = [f"late = {self.delay()}", f"tail_inputs, tail_phase = {recalled}"]
+        return [*lines, "tail = commanded_tail(tail_inputs, tail_phase)"]
 
     def rows_of(self, effect: Effect) -> list[int]:
         """Rows of an effect's states, then of its memory."""
@@ -270,7 +263,10 @@ class Emitter:
             "water = Vector(0.0, 0.0, 0.0)",
             *self.apply("water", "water", "place, time"),
             "flow = to_body(attitude, water)" if self.has("water") else "flow = water",
-            "motion = relative_motion(time, place, velocity, omega, attitude, flow)",
+            "rate = Vector(0.0, 0.0, 0.0)",
+            *self.apply("water_rate", "rate", "water, place, time"),
+            "flow_rate = to_body(attitude, rate)" if self.has("water_rate") else "flow_rate = rate",
+            "motion = relative_motion(time, place, velocity, omega, attitude, flow, flow_rate)",
             *self.tail_lines(),
             *self.body_lines(),
             "gravity = gravity_wrench(attitude, centre, fish)",
@@ -296,8 +292,10 @@ class Emitter:
             "speed_tail, inverse_tail = speed_and_inverse(v_tail.x, v_tail.y, v_tail.z)",
             "s_tail = (normal.x * v_tail.x + normal.y * v_tail.y) * inverse_tail",
             "scale_tail = 0.5 * fish.density * fish.tail_area",
+            f"lift_tail = {lift}",
+            *self.apply("tail_lift", "lift_tail", "s_tail, fish"),
             f"f_drag = drag_force(v_tail, speed_tail, scale_tail, {drag})",
-            f"f_lift = lift_force(v_tail, normal, speed_tail, s_tail, scale_tail, {lift})",
+            "f_lift = lift_force(v_tail, normal, speed_tail, s_tail, scale_tail, lift_tail)",
             "force = Vector(f_drag.x + f_lift.x, f_drag.y + f_lift.y, f_drag.z + f_lift.z)",
             "tail_drag = tail_wrench(arm, f_drag, fish)",
             "tail_lift = tail_wrench(arm, f_lift, fish)",

@@ -83,6 +83,32 @@ def with_buoyancy(centre, buoyancy_mass):
 
 
 @kernel
+def with_load(centre, load, x, on):
+    """The same mass properties with a point mass at (x, 0, 0), if it is there.
+
+    Args:
+        centre: mass properties without it.
+        load: its mass (kg).
+        x: its place ahead of O_b (m, body).
+        on: whether it is there; else the mass properties are left as they are, to the last bit.
+    """
+    mass = centre.mass + load
+    inverse = 1.0 / mass
+    across = load * x * x
+    return Barycentre(
+        mass if on else centre.mass,
+        inverse if on else centre.inverse_mass,
+        centre.buoyancy_mass,
+        (centre.mass * centre.x + load * x) * inverse if on else centre.x,
+        centre.mass * centre.y * inverse if on else centre.y,
+        centre.mass * centre.z * inverse if on else centre.z,
+        centre.jx,
+        centre.jy + across if on else centre.jy,
+        centre.jz + across if on else centre.jz,
+    )
+
+
+@kernel
 def with_offset(centre, x, y, z):
     """The same mass properties with the barycentre displaced (m, body)."""
     return Barycentre(

@@ -87,7 +87,8 @@ class Motion(NamedTuple):
     """Where the fish is and how it moves, against the ground and against the water.
 
     ``u, v, w``: velocity of O_b relative to the water, body frame. ``ground_*``: relative to the
-    ground. ``water_*``: velocity of the water, body frame. ``x, y, z``: position, inertial frame.
+    ground. ``water_*``: velocity of the water, body frame; ``water_rate_*``: its acceleration
+    along its own path (m/s^2, body frame). ``x, y, z``: position, inertial frame.
     """
 
     time: float
@@ -106,6 +107,9 @@ class Motion(NamedTuple):
     water_u: float
     water_v: float
     water_w: float
+    water_rate_u: float
+    water_rate_v: float
+    water_rate_w: float
     attitude: Rotation
 
 

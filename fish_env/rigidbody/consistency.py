@@ -26,6 +26,7 @@ NEEDS: dict[str, tuple[tuple[str, ...], ...]] = {
     "gyro_bias": (_TURNING,),
     "attitude_misalignment": (_TURNING, _MOVING),
     "clock_scale": (_TURNING,),
+    "clock_skew": (),
     "position_scale": (_MOVING,),
     "sensor_delay": (),
     "depth_bias": (),
@@ -33,11 +34,12 @@ NEEDS: dict[str, tuple[tuple[str, ...], ...]] = {
 """Sets of channels, each of which lets kinematics show an effect; none for what it never shows."""
 
 NEVER = {
+    "clock_skew": "without the commands it looks like a clock_scale",
     "sensor_delay": "all channels share the delay, so only the commands can tell it",
     "depth_bias": "a shifted depth is a depth like any other",
 }
 LOOKS_ALIKE = {
-    "clock_scale": "a gyro with a wrong gain",
+    "clock_scale": "`clock_skew`, or a gyro with a wrong gain (`gyro_scale`)",
     "attitude_misalignment": "a gyro that is mounted askew",
     "position_scale": "velocities with a wrong gain",
 }

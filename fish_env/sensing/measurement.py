@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from fish_env.arrays import FloatArray
 from fish_env.effects.extended import ExtendedModel
+from fish_env.sensing.geometry import through_geometry
 
 
 def true_times(model: ExtendedModel, recorded_s: npt.ArrayLike) -> FloatArray:
@@ -20,11 +21,26 @@ def true_times(model: ExtendedModel, recorded_s: npt.ArrayLike) -> FloatArray:
     return times
 
 
+def true_command_times(model: ExtendedModel, recorded_s: npt.ArrayLike) -> FloatArray:
+    """True times (s) at which commands were given that a recording gives these time stamps."""
+    times = np.asarray(recorded_s, float)
+    for effect in model.measurement:
+        if effect.command_time is not None:
+            times = effect.command_time(times, model.effects[effect.name])
+    return times
+
+
 def measured_channels(
     model: ExtendedModel, channels: Mapping[str, FloatArray]
 ) -> dict[str, FloatArray]:
-    """True channels (SI) as the model's sensors report them."""
+    """True channels (SI) as the model's sensors report them: their geometry, then their scales."""
     measured = dict(channels)
+    geometry: dict[str, float] = {}
+    for effect in model.measurement:
+        if effect.geometry is not None:
+            geometry |= effect.geometry(model.effects[effect.name])
+    if geometry:
+        measured = through_geometry(measured, geometry)
     for effect in model.measurement:
         if effect.measure is not None:
             measured = effect.measure(measured, model.effects[effect.name])

@@ -14,7 +14,7 @@ RICH: dict[str, Any] = {
     "cruise_speed": (0.05, 0.15),
     "effects": {"servo_lag": {"time_constant": 0.06}, "servo_delay": {"delay": 0.03}},
     "current": (0.05, -0.08, 0.02),
-    "wave": {"amplitude": 0.03, "frequency": 0.8, "phase": 0.5, "decay": 1.2},
+    "wave": {"amplitude": 0.03, "frequency": 0.8, "phase": 0.5, "heading": 0.7},
     "observation_noise": {"depth": 0.01, "heading": 0.02, "velocity": 0.01, "rates": 0.02},
     "observation_delay_s": 0.13,
     "action_delay_s": 0.07,

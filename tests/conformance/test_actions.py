@@ -67,7 +67,7 @@ def test_a_ramp_within_a_control_step_is_met_substep_by_substep():
 WATER = {
     "effects": {"servo_lag": {"time_constant": 0.06}, "servo_delay": {"delay": 0.08}},
     "current": (0.05, -0.08, 0.02),
-    "wave": {"amplitude": 0.03, "frequency": 0.8, "phase": 0.5, "decay": 1.2},
+    "wave": {"amplitude": 0.03, "frequency": 0.8, "phase": 0.5, "heading": 0.7},
 }
 
 

@@ -139,14 +139,9 @@ def extra_drag(velocity, offset, e):
 
 
 @helper
-def weight(down, depth, t, mass, centre, fish, e):
+def weight(down, depth, mass, centre, fish, e):
     """Force and moment of gravity and buoyancy; `down` is g in the body frame."""
-    displaced = (
-        fish.buoyancy
-        + e.buoyancy_offset_mass
-        - e.hull_compression_rate * depth
-        - e.water_ingress_rate * t
-    )
+    displaced = fish.buoyancy + e.buoyancy_offset_mass - e.hull_compression_rate * depth
     if e.thermocline_mass != 0.0:
         below = math.tanh((depth - e.thermocline_depth) / e.thermocline_width)
         displaced += e.thermocline_mass * below

@@ -30,7 +30,6 @@ from tests.hidden.servo import (
     FREQUENCY,
     HINGE,
     OFFSET,
-    TWO_PI,
     block_motion,
     tail_motion,
 )
@@ -60,22 +59,18 @@ def put(wrench, force, moment):
 def water_flow(t, y, rise, e):
     """Flow at the fish and its rate of change along the fish's path, inertial."""
     z = y[2]
-    turn = TWO_PI * e.wave_frequency
-    angle = turn * t + e.wave_phase
-    height = e.wave_amplitude * math.exp(-e.wave_decay * z)
     shear = e.shear_current_rate
     along = (math.cos(e.shear_current_heading), math.sin(e.shear_current_heading), 0.0)
     flow = add(
         (
             e.current_north,
             e.current_east,
-            e.current_down + height * math.sin(angle),
+            e.current_down,
         ),
         scale(shear * (z - e.shear_current_depth), along),
     )
-    wave_rate = height * (turn * math.cos(angle) - e.wave_decay * rise * math.sin(angle))
-    rate = add((0.0, 0.0, wave_rate), scale(shear * rise, along))
-    if e.orbital_wave_amplitude != 0.0:
+    rate = scale(shear * rise, along)
+    if e.wave_amplitude != 0.0:
         return orbital_wave(t, y, flow, rate, e)
     return flow, rate
 
@@ -176,7 +171,7 @@ def derivative(t, y, dy, row, late, fish, e, table, push, drive, matrix, wrench)
     centre = centre_of_mass(place, fish, e)
     inertia = inertia_about_origin(place, fish)
     mass = fish.mass
-    if e.flooding_rate != 0.0:
+    if e.water_ingress_rate != 0.0:
         mass, centre, inertia = flooded(t, mass, centre, inertia, e)
     flow, flow_rate = water_flow(t, y, path[2], e)
     stream = to_body(y, flow)
@@ -188,14 +183,11 @@ def derivative(t, y, dy, row, late, fish, e, table, push, drive, matrix, wrench)
     wrench[:] = 0.0
     water_wrench(y, dy, velocity, spin, angle, rate, row, fish, e, table, drive, wrench)
     down = to_body(y, (0.0, 0.0, fish.gravity))
-    force, moment = weight(down, y[2], t, mass, centre, fish, e)
+    force, moment = weight(down, y[2], mass, centre, fish, e)
     put(wrench, force, moment)
     surroundings(y, down, to_body(y, flow_rate), fish, e, wrench)
     foreign_plants(y, dy, velocity, spin, fish, e, wrench)
     disturbance(t, y, e, push, wrench)
-    k = -e.tether_stiffness
-    pull = (k * (y[0] - e.tether_x), k * (y[1] - e.tether_y), k * (y[2] - e.tether_z))
-    put(wrench, to_body(y, pull), (0.0, 0.0, 0.0))
     added_mass(velocity, spin, drift, e, matrix, wrench)
     if e.tail_reactive_scale != 0.0:
         reactive(velocity, spin, drift, angle, rate, bend, fish, e, matrix, wrench)

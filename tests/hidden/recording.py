@@ -14,7 +14,7 @@ from fish_env.params import FishParams
 from tests.hidden.controller import Controller, draw_program
 from tests.hidden.disturbances import draw_push
 from tests.hidden.excitation import POOR, exciting, merged
-from tests.hidden.measurement import channels_of, distorted, true_times
+from tests.hidden.measurement import channels_of, clock, distorted, true_times
 from tests.hidden.plans import Plan
 from tests.hidden.servo import PHASE, TIME
 from tests.hidden.simulate import Push, Start, Swim
@@ -147,9 +147,11 @@ def schedule(plan: Plan, index: int, rng: np.random.Generator) -> np.ndarray:
 def swim_open_loop(case: Experiment, draw: Draw, rng: np.random.Generator) -> Recording:
     """A run whose commands were chosen beforehand."""
     commands = schedule(case.plan, draw.index, rng)
-    when = np.maximum(true_times(draw.times, case.effects), commands[0, 0])
+    given = commands.copy()
+    given[:, 0] *= clock(case.effects)
+    when = np.maximum(true_times(draw.times, case.effects), given[0, 0])
     fish = Swim(case.fish.values(), case.effects, draw.start, draw.push)
-    fish.command(commands)
+    fish.command(given)
     unique, back = np.unique(when, return_inverse=True)
     states = fish.run(float(unique[-1]), unique)[back]
     channels = noisy(distorted(channels_of(states), case.effects), draw.noise)
@@ -158,6 +160,7 @@ def swim_open_loop(case: Experiment, draw: Draw, rng: np.random.Generator) -> Re
 
 def swim_closed_loop(case: Experiment, draw: Draw, rng: np.random.Generator) -> Recording:
     """A run whose commands follow the measurements, one control period at a time."""
+    scale = clock(case.effects)
     program = draw_program(case.plan.rate, case.plan.duration, rng)
     fish = Swim(case.fish.values(), case.effects, draw.start, draw.push)
     when = np.maximum(true_times(draw.times, case.effects), 0.0)
@@ -168,7 +171,7 @@ def swim_closed_loop(case: Experiment, draw: Draw, rng: np.random.Generator) -> 
     for k, (begin, end) in enumerate(zip(program.grid, ends, strict=True)):
         # The newest record that the controller can have read by now.
         latest = max(int(np.searchsorted(when, begin + 1e-9, "right")) - 1, 0)
-        latest = min(latest, int(np.searchsorted(draw.times, begin + 1e-9, "right")) - 1)
+        latest = min(latest, int(np.searchsorted(scale * draw.times, begin + 1e-9, "right")) - 1)
         seen = measured_at(case, draw, states, latest)
         controller = controller or Controller(program, seen)
         fish.command(controller.commands(k, seen)[None])
@@ -178,7 +181,9 @@ def swim_closed_loop(case: Experiment, draw: Draw, rng: np.random.Generator) -> 
         unique, back = np.unique(when[due], return_inverse=True)
         states[due] = fish.run(float(end), unique)[back]
     channels = noisy(distorted(channels_of(states), case.effects), draw.noise)
-    return Recording(draw.times, channels, merged(fish.table[:, :6]), 0.0, states)
+    told = merged(fish.table[:, :6])
+    told[:, 0] /= scale
+    return Recording(draw.times, channels, told, 0.0, states)
 
 
 def measured_at(case: Experiment, draw: Draw, states: np.ndarray, k: int) -> dict[str, float]:

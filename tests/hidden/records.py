@@ -66,13 +66,14 @@ LIBRARY: dict[str, dict[str, float]] = {
     "offset_drag": {"coefficient": 0.0},
     "buoyancy_offset": {"mass": 0.0},
     "hull_compression": {"rate": 0.0},
-    "water_ingress": {"rate": 0.0},
+    "water_ingress": {"rate": 0.0, "x": 0.0},
     "com_offset": dict.fromkeys(AXES, 0.0),
     "current": dict.fromkeys(("north", "east", "down"), 0.0),
-    "wave": {"amplitude": 0.0, "frequency": 0.5, "phase": 0.0, "decay": 1.0},
+    "wave": {"amplitude": 0.0, "frequency": 0.5, "phase": 0.0, "heading": 0.0, "tank_depth": INF},
     "surface_drag": {"gain": 0.0, "depth": 0.2},
-    "tether": {"stiffness": 0.0, "x": 0.0, "y": 0.0, "z": 0.0},
+    "tether": {"stiffness": 0.0, "x": 0.0, "y": 0.0, "z": 0.0, "slack": 0.0, "attach_x": 0.0},
     "clock_scale": {"scale": 1.0},
+    "clock_skew": {"scale": 1.0},
     "sensor_delay": {"delay": 0.0},
     "gyro_bias": dict.fromkeys("pqr", 0.0),
     "attitude_misalignment": dict.fromkeys(("roll", "pitch", "yaw"), 0.0),
@@ -84,7 +85,6 @@ LIBRARY: dict[str, dict[str, float]] = {
 FOREIGN: dict[str, dict[str, float]] = {
     "floor_suction": {"gain": 0.0, "depth": 1.5, "range": 0.2},
     "sloshing": {"mass": 0.0, "frequency": 1.6, "damping": 0.08},
-    "tail_stall": {"loss": 0.0, "onset": 0.5, "width": 0.06},
     "thrust_loss": {"per_speed": 0.0},
     "pump": {"force": 0.0, "period": 6.0, "moment": 0.0},
     "thermocline": {"mass": 0.0, "depth": 0.7, "width": 0.05},
@@ -105,21 +105,16 @@ REAL: dict[str, dict[str, float]] = {
     "offset_gain": {"gain": 1.0},
     "swing_loss": {"per_radian": 0.0},
     "angle_limit": {"lower": -INF, "upper": INF},
-    "beat_slowing": {"offset": 0.0, "load": 0.0},
+    "beat_load": {"offset": 0.0, "load": 0.0},
+    "tail_stall": {"loss": 0.0, "onset": 0.5, "width": 0.06},
     "servo_torque_limit": {"torque": INF},
     "body_flexibility": {"stiffness": INF},
     "wall_effect": {"gain": 0.0, "distance": 1.0, "heading": 0.0, "range": 0.3},
     "floor_effect": {"gain": 0.0, "depth": 1.5, "range": 0.2},
     "surface_piercing": {"height": 0.0},
     "bubbles": {"mass": 0.0, "x": 0.0},
-    "orbital_wave": {
-        "amplitude": 0.0, "frequency": 0.5, "phase": 0.0, "heading": 0.0, "number": 1.0,
-        "mirror": 0.0,
-    },
-    "flooding": {"rate": 0.0, "x": 0.0},
-    "cable": {"stiffness": 0.0, "x": 0.0, "y": 0.0, "z": 0.0, "slack": 0.0, "attach_x": 0.0},
-}  # fmt: skip
-"""Further physics of real robots, off. The last three correct a wave, a leak and a tether."""
+}
+"""Further physics of real robots, off."""
 
 PLANTS: dict[str, dict[str, float]] = {
     "linked_tail": {"share": 0.0, "stiffness": 0.05},
@@ -129,12 +124,23 @@ PLANTS: dict[str, dict[str, float]] = {
 }
 """Water and bodies of another kind than the model's, off."""
 
+GRAVITY = 9.81
 PUSH = {"push_start": 0.0, "push_step": 1.0, "push_inertial": 0.0}
 ADDED = {**LIBRARY, **FOREIGN, **REAL, **PLANTS}
 EXTRA = np.dtype(
     [(f"{name}_{key}", np.float64) for name, values in ADDED.items() for key in values]
-    + [(name, np.float64) for name in PUSH]
+    + [(name, np.float64) for name in ("wave_number", "wave_mirror", *PUSH)]
 )
+
+
+def wave_number(frequency: float, tank_depth: float) -> float:
+    """Wave number of a frequency in water of this depth, 1/m: (2 pi f)^2 = g k tanh(k h)."""
+    turn = 2.0 * math.pi * frequency
+    number = turn**2 / GRAVITY
+    if number > 0.0 and math.isfinite(tank_depth):
+        for _ in range(100):  # a contraction: k = w^2 / (g tanh(k h)), averaged
+            number = 0.5 * (number + turn**2 / (GRAVITY * math.tanh(number * tank_depth)))
+    return number
 
 
 def fish_record(values: Mapping[str, float]) -> np.void:
@@ -156,4 +162,8 @@ def extra_record(effects: Mapping[str, Mapping[str, float]]) -> np.void:
             record[f"{name}_{key}"] = effects.get(name, {}).get(key, neutral)
     for name, value in PUSH.items():
         record[name] = value
+    wave = {**ADDED["wave"], **effects.get("wave", {})}
+    number = wave_number(wave["frequency"], wave["tank_depth"])
+    record["wave_number"] = number
+    record["wave_mirror"] = math.exp(-2.0 * number * wave["tank_depth"]) if number > 0.0 else 0.0
     return record[0]

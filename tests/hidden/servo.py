@@ -30,8 +30,8 @@ FREE_SPEED, STALLED = 9.0, 0.05
 def slowed(row, e, table):
     """Share of the commanded frequency that is left under offset and stroke speed."""
     stroke = TWO_PI * table[row, AMPLITUDE] * table[row, FREQUENCY]
-    by_offset = 1.0 - e.beat_slowing_offset * abs(table[row, OFFSET])
-    return by_offset * (1.0 - e.beat_slowing_load * stroke)
+    by_offset = 1.0 - e.beat_load_offset * abs(table[row, OFFSET])
+    return by_offset * (1.0 - e.beat_load_load * stroke)
 
 
 @helper

@@ -159,8 +159,8 @@ class Swim:
     def _slowed(self, rows: np.ndarray) -> np.ndarray:
         """Share of the commanded frequency that is left in rows of the commands."""
         stroke = 2.0 * np.pi * rows[:, AMPLITUDE] * rows[:, FREQUENCY]
-        by_offset = 1.0 - float(self.extra["beat_slowing_offset"]) * np.abs(rows[:, OFFSET])
-        return by_offset * (1.0 - float(self.extra["beat_slowing_load"]) * stroke)
+        by_offset = 1.0 - float(self.extra["beat_load_offset"]) * np.abs(rows[:, OFFSET])
+        return by_offset * (1.0 - float(self.extra["beat_load_load"]) * stroke)
 
 
 def simulate(

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tests.hidden.records import FOREIGN, LIBRARY
+from tests.hidden.records import FOREIGN, LIBRARY, PLANTS
 
 Draw = Callable[[np.random.Generator, float], dict[str, float]]
 
@@ -73,15 +73,29 @@ SIZES: dict[str, Size] = {
     "offset_drag": Size({"coefficient": 10.0}),
     "buoyancy_offset": Size({"mass": 0.004}, signed=True),
     "hull_compression": Size({"rate": 0.003}),
-    "water_ingress": Size({"rate": 2e-4}),
+    "water_ingress": Size({"rate": 2e-4}, shape={"x": (-0.06, 0.06)}),
     "com_offset": Size({"x": 0.0009, "y": 0.0009, "z": 0.0009}, signed=True),
     "current": Size({"north": 0.04, "east": 0.04, "down": 0.01}, signed=True),
     "wave": Size(
-        {"amplitude": 0.08},
-        shape={"frequency": (0.25, 0.5), "phase": (-3.0, 3.0), "decay": (0.6, 1.5)},
+        {"amplitude": 0.03},
+        shape={
+            "frequency": (0.3, 0.8),
+            "phase": (-3.0, 3.0),
+            "heading": (-3.0, 3.0),
+            "tank_depth": (0.8, 3.0),
+        },
     ),
     "surface_drag": Size({"gain": 2.8}, shape={"depth": (0.2, 0.3)}),
-    "tether": Size({"stiffness": 0.02}, shape={"x": (-1.0, 1.0), "y": (-1.0, 1.0), "z": (0, 0.5)}),
+    "tether": Size(
+        {"stiffness": 0.02},
+        shape={
+            "x": (-1.0, 1.0),
+            "y": (-1.0, 1.0),
+            "z": (0, 0.5),
+            "slack": (0.0, 0.5),
+            "attach_x": (-0.1, 0.1),
+        },
+    ),
     "clock_scale": Size({"scale": 1.01}, signed=True),
     "sensor_delay": Size({"delay": 0.08}),
     "gyro_bias": Size({"p": 0.025, "q": 0.025, "r": 0.025}, signed=True),
@@ -89,12 +103,10 @@ SIZES: dict[str, Size] = {
     "depth_bias": Size({"offset": 0.08}, signed=True),
     "position_scale": Size({"scale": 1.04}, signed=True),
 }
-# A tail stalls within the incidences that it meets (median 1 rad); one that is always beyond its
-# onset has a smaller lift coefficient, and that would be the right answer.
 FOREIGN_SIZES: dict[str, Size] = {
     "floor_suction": Size({"gain": 5.0}, shape={"depth": (0.9, 1.3), "range": (0.15, 0.3)}),
     "sloshing": Size({"mass": 0.03}, shape={"frequency": (1.4, 1.9), "damping": (0.05, 0.12)}),
-    "tail_stall": Size({"loss": 0.6}, shape={"onset": (0.9, 1.2), "width": (0.05, 0.08)}),
+    "strip_hull": Size({"coefficient": 8.0}, shape={"onset": (0.3, 0.5)}),
     "thrust_loss": Size({"per_speed": 3.5}),
     "pump": Size({"force": 0.04, "moment": 0.001}, shape={"period": (4.0, 8.0)}),
     "thermocline": Size({"mass": 0.004}, shape={"depth": (0.5, 0.8), "width": (0.04, 0.08)}),
@@ -129,7 +141,7 @@ def draw_effect(
 ) -> dict[str, float]:
     """Parameters of an effect at a strength, each within `spread` of typical, any sign allowed."""
     size = {**SIZES, **FOREIGN_SIZES}[name]
-    return draw_values(size, {**LIBRARY, **FOREIGN}[name], strength, rng, spread)
+    return draw_values(size, {**LIBRARY, **FOREIGN, **PLANTS}[name], strength, rng, spread)
 
 
 def draw_values(

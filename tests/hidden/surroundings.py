@@ -24,13 +24,13 @@ AIR = 10.3
 @helper
 def orbital_wave(t, y, flow, rate, e):
     """Flow with the wave's, and the acceleration of the water there, inertial."""
-    north, east = math.cos(e.orbital_wave_heading), math.sin(e.orbital_wave_heading)
-    k, turn = e.orbital_wave_number, TWO_PI * e.orbital_wave_frequency
+    north, east = math.cos(e.wave_heading), math.sin(e.wave_heading)
+    k, turn = e.wave_number, TWO_PI * e.wave_frequency
     depth = max(y[2], 0.0)
-    falling, mirrored = math.exp(-k * depth), e.orbital_wave_mirror * math.exp(k * depth)
-    size = e.orbital_wave_amplitude / (1.0 - e.orbital_wave_mirror)
+    falling, mirrored = math.exp(-k * depth), e.wave_mirror * math.exp(k * depth)
+    size = e.wave_amplitude / (1.0 - e.wave_mirror)
     level, deep = size * (falling + mirrored), size * (falling - mirrored)
-    theta = turn * t - k * (north * y[0] + east * y[1]) + e.orbital_wave_phase
+    theta = turn * t - k * (north * y[0] + east * y[1]) + e.wave_phase
     s, c = math.sin(theta), math.cos(theta)
     water = add(flow, (north * level * c, east * level * c, deep * s))
     # D/Dt of the phase and of the depth, along the water's own path.
@@ -44,11 +44,11 @@ def orbital_wave(t, y, flow, rate, e):
 @helper
 def flooded(t, mass, centre, inertia, e):
     """Mass, centre of mass and inertia with the water that has come in."""
-    water = e.flooding_rate * t
+    water = e.water_ingress_rate * t
     total = mass + water
-    place = (e.flooding_x, 0.0, 0.0)
+    place = (e.water_ingress_x, 0.0, 0.0)
     both = scale(1.0 / total, add(scale(mass, centre), scale(water, place)))
-    across = water * e.flooding_x * e.flooding_x
+    across = water * e.water_ingress_x * e.water_ingress_x
     return total, both, (inertia[0], inertia[1] + across, inertia[2] + across)
 
 
@@ -79,7 +79,7 @@ def drag_near_walls(y, e):
 @helper
 def surroundings(y, down, water_rate, fish, e, wrench):
     """Adds what the surroundings do; `down` is g and `water_rate` DU/Dt, both in the body frame."""
-    if e.orbital_wave_amplitude != 0.0:
+    if e.wave_amplitude != 0.0:
         for i in range(3):
             wrench[i] += fish.buoyancy * water_rate[i]
     if e.surface_piercing_height != 0.0:
@@ -92,7 +92,7 @@ def surroundings(y, down, water_rate, fish, e, wrench):
     if e.bubbles_mass != 0.0:
         lift = scale(-e.bubbles_mass / (1.0 + max(y[2], 0.0) / AIR), down)
         push(wrench, lift, (e.bubbles_x, 0.0, TOP))
-    if e.cable_stiffness != 0.0:
+    if e.tether_stiffness != 0.0:
         cable(y, e, wrench)
 
 
@@ -108,10 +108,10 @@ def push(wrench, force, place):
 @helper
 def cable(y, e, wrench):
     """Adds the pull of a cable that is longer than its slack."""
-    place = (e.cable_attach_x, 0.0, 0.0)
+    place = (e.tether_attach_x, 0.0, 0.0)
     end = to_inertial(y, place)
-    reach = (y[0] + end[0] - e.cable_x, y[1] + end[1] - e.cable_y, y[2] + end[2] - e.cable_z)
+    reach = (y[0] + end[0] - e.tether_x, y[1] + end[1] - e.tether_y, y[2] + end[2] - e.tether_z)
     length = math.sqrt(reach[0] ** 2 + reach[1] ** 2 + reach[2] ** 2)
-    if length > e.cable_slack and length > 0.0:
-        pull = -e.cable_stiffness * (length - e.cable_slack) / length
+    if length > e.tether_slack and length > 0.0:
+        pull = -e.tether_stiffness * (length - e.tether_slack) / length
         push(wrench, to_body(y, scale(pull, reach)), place)

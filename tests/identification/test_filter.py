@@ -5,12 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fish_env.data import CommandSteps, Run
+from fish_env.effects import catalogue
+from fish_env.effects.extended import build_model
 from fish_env.identification import SeriesProblem
+from fish_env.identification.open_loop import errors
 from fish_env.identification.phases import settle_phases
 from fish_env.inference.estimate import products
 from fish_env.inference.estimate.free import Free, linearise
 from fish_env.inference.problem import Point
+from fish_env.params import load_fish
+from fish_env.sensing import measured_channels
 from fish_env.sensing.channels import channels_from_states
+from fish_env.sensing.geometry import through_geometry
 from tests.identification.synthetic import PATHS, Setup, simulate
 
 
@@ -254,6 +261,12 @@ def test_one_thread_or_two_give_the_same_bits(monkeypatch):
         ("effects.position_scale.scale", 1.4),
         ("effects.sensor_delay.delay", 0.06),
         ("effects.clock_scale.scale", 1.01),
+        ("effects.clock_skew.scale", 1.01),
+        ("effects.attitude_misalignment.pitch", 0.08),
+        ("effects.marker_offset.x", 0.06),
+        ("effects.camera_tilt.roll", 0.4),
+        ("effects.soft_iron.amplitude", 0.1),
+        ("effects.gyro_scale.r", 0.8),
     ],
 )
 def test_measurement_effects_reach_the_lanes(path, value):
@@ -267,3 +280,106 @@ def test_measurement_effects_reach_the_lanes(path, value):
     assert lane @ lane > own @ own + 20.0
     (distorted,) = problem.filtered(Point(zero[:, 0], {path: value}), setup.noise)
     assert distorted.log_likelihood < filtered[0].log_likelihood - 10.0
+
+
+ASKEW = {
+    "attitude_misalignment": {"roll": 0.08, "pitch": -0.06, "yaw": 0.1},
+    "marker_offset": {"x": 0.06, "y": 0.03, "z": -0.08},
+    "camera_tilt": {"roll": 0.4, "pitch": 0.3},
+    "refraction": {"height": 1.0},
+    "soft_iron": {"amplitude": 0.1, "angle": 0.3},
+    "gyro_scale": {"p": 0.9, "q": 1.1, "r": 0.8},
+}
+
+
+def seen_by(data, effects):
+    """The data as sensors with these effects would have shown them."""
+    model = build_model(load_fish("zheng-2021-a"), effects)
+    runs = [replace(r, channels=measured_channels(model, r.channels)) for r in data.runs]
+    return replace(data, runs=tuple(runs))
+
+
+@pytest.mark.parametrize("name", ASKEW)
+def test_the_filter_sees_through_the_sensors_geometry(name):
+    """With the effect, distorted data are as likely as the true ones; without it, hardly."""
+    setup = Setup(runs=1, duration=4.0)
+    data = simulate(setup)
+    zero = np.zeros(len(PATHS))
+    values = {f"effects.{name}.{key}": value for key, value in ASKEW[name].items()}
+    plain, distorted = (
+        SeriesProblem(d, paths=PATHS) for d in (data, seen_by(data, {name: ASKEW[name]}))
+    )
+    (true,) = plain.filtered(Point(zero, {}), setup.noise)
+    (undone,) = distorted.filtered(Point(zero, values), setup.noise)
+    (blind,) = distorted.filtered(Point(zero, {}), setup.noise)
+    assert undone.log_likelihood > true.log_likelihood - 25.0
+    if name not in ("refraction", "camera_tilt"):  # at one depth a scale, hardly seen so soon
+        assert blind.log_likelihood < true.log_likelihood - 60.0
+
+
+@pytest.mark.parametrize(
+    ("name", "values"),
+    [
+        ("marker_offset", ASKEW["marker_offset"]),
+        ("camera_tilt", ASKEW["camera_tilt"]),
+        ("refraction", ASKEW["refraction"]),
+        ("attitude_misalignment", {"roll": 0.08, "pitch": -0.06}),
+    ],
+)
+def test_lanes_show_what_the_sensors_geometry_says(name, values):
+    """Place, angles and rates as :func:`through_geometry` has them, but for the start's place."""
+    setup = Setup(runs=1, duration=2.0)
+    problem = SeriesProblem(simulate(setup), paths=PATHS)
+
+    def shown(effects):
+        point = Point(np.zeros(len(PATHS)), effects)
+        (run,) = problem.runs
+        seen = run.measured - errors(problem, point, setup.noise)[0]
+        return dict(zip(problem.channels, seen.T, strict=True))
+
+    geometry = catalogue()[name].geometry({**catalogue()[name].neutral, **values})
+    expected = through_geometry(shown({}), geometry)
+    found = shown({f"effects.{name}.{key}": value for key, value in values.items()})
+    scale = {"x": 1.0, "y": 1.0}
+    for channel in problem.channels:
+        offset = (found[channel] - expected[channel])[np.isfinite(found[channel])]
+        offset = offset - offset[0] * scale.get(channel, 0.0)
+        np.testing.assert_allclose(offset, 0.0, atol=2e-6, err_msg=channel)
+
+
+@pytest.mark.parametrize(
+    ("name", "moves_commands", "scale"),
+    [
+        ("clock_scale", 1, 0.5),
+        ("clock_scale", 1, 1.02),
+        ("clock_scale", 1, 2.0),
+        ("clock_skew", 0, 0.5),
+        ("clock_skew", 0, 1.02),
+    ],
+)
+def test_the_filter_sees_through_a_clock(name, moves_commands, scale):
+    """One clock stamps commands and samples alike; the skew of two leaves the commands."""
+    setup = Setup(runs=1, duration=4.0)
+    data = simulate(setup)
+    (run,) = data.runs
+    told = run.commands.times_s / (scale if moves_commands else 1.0)
+    commands = CommandSteps(told, run.commands.values)
+    stamped = Run.from_steps(
+        run.id,
+        run.time_s / scale,
+        run.channels,
+        commands,
+        start=run.start,
+        tail_phase=run.tail_phase,
+    )
+    zero = np.zeros(len(PATHS))
+    true_problem = SeriesProblem(data, paths=PATHS)
+    other = SeriesProblem(replace(data, runs=(stamped,)), paths=PATHS)
+    (true,) = true_problem.filtered(Point(zero, {}), setup.noise)
+    point = Point(zero, {f"effects.{name}.scale": scale})
+    noise = replace(setup.noise, correlation_s=setup.noise.correlation_s / scale)
+    (undone,) = other.filtered(point, noise)
+    (blind,) = other.filtered(Point(zero, {}), noise)
+    # Steps of the recorded time are longer or shorter than those of the true one.
+    assert undone.log_likelihood > true.log_likelihood - (25.0 if scale < 2.0 else 250.0)
+    assert blind.log_likelihood < true.log_likelihood - (60.0 if scale == 1.02 else 1000.0)

@@ -42,7 +42,7 @@ ALL_EFFECTS = {
     "tail_reactive": {"scale": 0.8},
     "buoyancy_offset": {"mass": 0.004},
     "current": {"north": 0.05, "east": -0.08, "down": 0.02},
-    "wave": {"amplitude": 0.03, "frequency": 0.8, "phase": 0.5, "decay": 1.2},
+    "wave": {"amplitude": 0.03, "frequency": 0.8, "phase": 0.5, "heading": 0.7, "tank_depth": 2.0},
 }
 WATER_EFFECTS = {name: ALL_EFFECTS[name] for name in ("added_mass", "tail_reactive", "servo_lag")}
 

@@ -15,8 +15,7 @@ from tests.hidden.excitation import exciting, merged
 from tests.hidden.forces import added_accelerations, rows_of
 from tests.hidden.measurement import channels_of
 from tests.hidden.realistic.catalogue import NEUTRAL, PLANT_SIZES
-from tests.hidden.realistic.swimming import GRAVITY, wave
-from tests.hidden.records import REAL
+from tests.hidden.records import GRAVITY, REAL, wave_number
 from tests.hidden.servo import FREQUENCY, PHASE, TIME
 from tests.hidden.simulate import DECIDED, Start, Swim, simulate
 from tests.hidden.sizes import draw_effect, draw_values
@@ -109,7 +108,7 @@ def test_swing_loss_is_another_amplitude():
 
 
 def test_a_slowed_beat_is_another_frequency():
-    slowing = {"beat_slowing": {"offset": 0.25, "load": 0.02}}
+    slowing = {"beat_load": {"offset": 0.25, "load": 0.02}}
     left = (1 - 0.25 * 0.4) * (1 - 0.02 * 2 * math.pi * 0.3 * 1.5)
     slower = moved({}, commands(0.4, frequency=1.5 * left))
     assert difference(moved(slowing, commands(0.4)), slower) < 1e-6
@@ -164,7 +163,7 @@ def test_a_bubble_lifts_by_its_volume():
 
 
 def test_a_flooded_fish_is_heavier_and_trimmed():
-    leak = {"flooding": {"rate": 2e-4, "x": 0.05}}
+    leak = {"water_ingress": {"rate": 2e-4, "x": 0.05}}
     states, plain = moved(leak), moved({})
     assert states[-1, 2] > plain[-1, 2] + 0.02
     assert states[-1, 9] > plain[-1, 9] + 1e-3  # nose down
@@ -172,24 +171,23 @@ def test_a_flooded_fish_is_heavier_and_trimmed():
 
 def test_a_cable_is_slack_until_it_is_taut():
     cable = {"stiffness": 0.05, "x": 0.0, "y": 0.0, "z": 0.7, "slack": 5.0, "attach_x": -0.1}
-    assert difference(moved({"cable": cable}), moved({})) == 0.0
+    assert difference(moved({"tether": cable}), moved({})) == 0.0
     taut = cable | {"slack": 0.0, "attach_x": 0.0}
-    assert moved({"cable": taut})[-1, 0] < moved({})[-1, 0] - 0.02
+    assert moved({"tether": taut})[-1, 0] < moved({})[-1, 0] - 0.02
     beside = {"slack": 0.0, "y": 1.0}
-    turned = moved({"cable": cable | beside})[100, 6]
-    assert abs(turned - moved({"cable": taut | beside})[100, 6]) > 0.05  # sine of the yaw
+    turned = moved({"tether": cable | beside})[100, 6]
+    assert abs(turned - moved({"tether": taut | beside})[100, 6]) > 0.05  # sine of the yaw
 
 
 def test_water_that_neither_lifts_nor_drags_still_pushes_by_its_pressure():
     """A neutrally buoyant sphere without drag follows the water: here rho V DU/Dt on mass m_b."""
     fish = {f"body.rotational_damping[{i}]": 0.0 for i in range(3)}
     still = {f"body.area[{i}]": 0.0 for i in range(3)} | {"tail.area": 0.0}
-    about = wave({"amplitude": 0.03, "frequency": 0.4, "phase": 0.5, "heading": 0.0,
-                  "tank_depth": math.inf})  # fmt: skip
-    states = moved({"orbital_wave": about}, commands(amplitude=0.0), **fish, **still)
+    about = {"amplitude": 0.03, "frequency": 0.4, "phase": 0.5, "tank_depth": math.inf}
+    states = moved({"wave": about}, commands(amplitude=0.0), **fish, **still)
     calm = moved({}, commands(amplitude=0.0), **fish, **still)
     turn, t = 2 * math.pi * 0.4, TIMES[:251]
-    fade = 0.03 * math.exp(-about["number"] * 0.7)
+    fade = 0.03 * math.exp(-wave_number(0.4, math.inf) * 0.7)
     # m z'' = m_b d/dt(fade sin(turn t + phase)), from rest.
     heave = fade * (np.sin(turn * t + 0.5) - math.sin(0.5)) * FISH["mass.buoyancy"]
     seen = np.gradient(states[:, 2] - calm[:, 2], t)
@@ -198,8 +196,6 @@ def test_water_that_neither_lifts_nor_drags_still_pushes_by_its_pressure():
 
 @pytest.mark.parametrize("depth", [0.8, 3.0, math.inf])
 def test_a_wave_obeys_dispersion(depth):
-    about = wave({"amplitude": 0.03, "frequency": 0.5, "phase": 0.0, "heading": 0.0,
-                  "tank_depth": depth})  # fmt: skip
-    k = about["number"]
+    k = wave_number(0.5, depth)
     tanh = math.tanh(k * depth) if math.isfinite(depth) else 1.0
     assert (2 * math.pi * 0.5) ** 2 == pytest.approx(GRAVITY * k * tanh, rel=1e-9)

@@ -93,7 +93,7 @@ def test_an_effect_declares_what_reports_need(effect):
     assert effect.summary
     assert effect.equation
     assert effect.source
-    assert effect.acts_on_motion or effect.sample_time or effect.measure
+    assert effect.acts_on_motion or effect.acts_on_record
     for parameter in effect.parameters:
         assert parameter.unit
         assert parameter.description
@@ -121,6 +121,10 @@ def test_the_catalogue_is_that_of_the_specification():
         "tail_bias": {"offset": 0},
         "tail_gain": {"gain": 1},
         "tail_asymmetry": {"ratio": 0},
+        "offset_gain": {"gain": 1},
+        "swing_loss": {"per_radian": 0},
+        "angle_limit": {"lower": -np.inf, "upper": np.inf},
+        "beat_load": {"offset": 0, "load": 0},
         "servo_lag": {"time_constant": 0},
         "servo_rate_limit": {"rate": np.inf},
         "servo_delay": {"delay": 0},
@@ -136,18 +140,31 @@ def test_the_catalogue_is_that_of_the_specification():
         "quadratic_damping": dict.fromkeys(("roll", "pitch", "yaw"), 0),
         "cross_flow_drag": dict.fromkeys(("sway", "heave"), 0),
         "tail_reactive": {"scale": 0},
+        "tail_stall": {"loss": 0, "onset": None, "width": None},
         "wake_fraction": {"fraction": 0},
         "wake_memory": {"time_constant": 0},
         "offset_drag": {"coefficient": 0},
         "buoyancy_offset": {"mass": 0},
         "hull_compression": {"rate": 0},
-        "water_ingress": {"rate": 0},
+        "water_ingress": {"rate": 0, "x": None},
         "com_offset": dict.fromkeys("xyz", 0),
         "current": dict.fromkeys(("north", "east", "down"), 0),
-        "wave": {"amplitude": 0, "frequency": None, "phase": None, "decay": None},
+        "wave": {
+            "amplitude": 0,
+            "frequency": None,
+            "phase": None,
+            "heading": 0,
+            "tank_depth": np.inf,
+        },
         "surface_drag": {"gain": 0, "depth": None},
-        "tether": dict.fromkeys(("stiffness", "x", "y", "z"), 0),
+        "tether": dict.fromkeys(("stiffness", "x", "y", "z", "slack", "attach_x"), 0),
         "clock_scale": {"scale": 1},
+        "clock_skew": {"scale": 1},
+        "gyro_scale": dict.fromkeys("pqr", 1),
+        "marker_offset": dict.fromkeys("xyz", 0),
+        "camera_tilt": {"roll": 0, "pitch": 0},
+        "refraction": {"height": np.inf},
+        "soft_iron": {"amplitude": 0, "angle": None},
         "sensor_delay": {"delay": 0},
         "gyro_bias": dict.fromkeys("pqr", 0),
         "attitude_misalignment": dict.fromkeys(("roll", "pitch", "yaw"), 0),
@@ -165,9 +182,9 @@ def test_the_catalogue_is_that_of_the_specification():
 
 
 def test_the_drive_acts_in_the_order_from_command_to_water():
-    """Amplitude and bias, delay, the servo's limits, the play behind it, the soft tail."""
+    """Amplitude and bias, end stops, delay, the servo's limits, its play, the soft tail."""
     order = [name for name, effect in catalogue().items() if effect.section == "actuation"]
-    chain = ("tail_asymmetry", "tail_bias", "servo_delay", "servo_rate_limit", "servo_lag")
+    chain = ("tail_asymmetry", "tail_bias", "angle_limit", "servo_rate_limit", "servo_lag")
     chain = (*chain, "servo_backlash", "tail_flexibility")
     assert [name for name in order if name in chain] == list(chain)
     assert order.index("block_scale") < order.index("block_lag")

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from fish_env.effects.extended import build_model
-from fish_env.errors import EffectError
 from fish_env.simulator import Simulator
 from tests.physics.cases import swimmer
 
@@ -61,12 +60,18 @@ def test_a_short_lag_tends_to_the_ideal_servo():
     assert far / near == pytest.approx(2.0, rel=0.1)
 
 
-def test_a_step_longer_than_the_lag_is_refused_with_the_longest_step():
-    """The integrator could not resolve it; the message says what would do."""
-    with pytest.raises(EffectError, match=r"time constant of 0\.004 s.*use dt <= 0\.004"):
-        Simulator(swimmer(), 0.01, {"servo_lag": {"time_constant": 0.004}})
-    Simulator(swimmer(), 0.004, {"servo_lag": {"time_constant": 0.004}})
-    Simulator(swimmer(), 0.01, {"servo_lag": {"time_constant": 0.0}})
+@pytest.mark.parametrize("lag", [0.004, 0.0007])
+def test_a_lag_shorter_than_the_step_is_followed(lag):
+    """The step is divided until it resolves the lag; one as long as the lag alone would not do."""
+    short = {"servo_lag": {"time_constant": lag}}
+    commands = [{"t": 0.0, "tail_amplitude": 0.3, "tail_frequency": 2.0}]
+    coarse, fine, ideal = (
+        Simulator(swimmer(), dt, effects).run(commands, duration_s=2.0).states[-1, 7:13]
+        for dt, effects in ((0.01, short), (0.0002, short), (0.0002, None))
+    )
+    assert np.linalg.norm(coarse - fine) < 0.02 * np.linalg.norm(fine - ideal)
+    assert Simulator(swimmer(), 0.01, short).dt <= lag
+    assert Simulator(swimmer(), 0.01, {"servo_lag": {"time_constant": 0.0}}).dt == 0.01
 
 
 def test_the_longest_step_is_that_of_the_effects_that_are_on():

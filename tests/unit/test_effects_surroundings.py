@@ -1,10 +1,10 @@
-"""Buoyancy offset, current, wave and the recorder's clock."""
+"""Buoyancy offset, current and the recorders' clocks."""
 
 import numpy as np
 import pytest
 
 from fish_env.effects.extended import build_model
-from fish_env.sensing import measured_channels, true_times
+from fish_env.sensing import measured_channels, true_command_times, true_times
 from fish_env.simulator import InitialState, Simulator
 from tests.physics.cases import rotation, swimmer
 
@@ -42,41 +42,27 @@ def test_the_velocity_through_the_water_is_reported():
     np.testing.assert_allclose(through["surge_through_water"], run["u"] - flow, atol=1e-15)
 
 
-def test_a_wave_oscillates_with_its_frequency_and_decays_with_depth():
-    """amplitude exp(-decay z) sin(2 pi f t + phase), downward, at the fish's own depth."""
-    wave = {"amplitude": 0.05, "frequency": 0.8, "phase": 0.6, "decay": 1.5}
-    simulator = Simulator(swimmer(), effects={"wave": wave})
-    for depth in (0.0, 0.3, 2.0):
-        for time in (0.0, 0.37, 12.5):
-            state = np.array([0, 0, depth, 1, 0, 0, 0, 0.3, 0, 0, 0, 0, 0])
-            flow = 0.05 * np.exp(-1.5 * depth) * np.sin(2 * np.pi * 0.8 * time + 0.6)
-            same = state.copy()
-            same[9] = -flow
-            here = simulator.wrench_by_term(state, time_s=time)
-            still = Simulator(swimmer()).wrench_by_term(same)
-            for name in ("xz_drag", "xz_lift", "tail_drag"):
-                np.testing.assert_allclose(here[name], still[name], atol=1e-12)
-
-
-def test_a_wave_heaves_a_drifting_fish_at_its_frequency():
-    """The response of a fish at rest holds the wave's frequency and little else."""
-    wave = {"amplitude": 0.05, "frequency": 0.5, "phase": 0.0, "decay": 0.0}
-    run = Simulator(swimmer(), 0.01, {"wave": wave}).run(STILL, duration_s=60.0, rate_hz=20)
-    w = run["w"][run.time_s >= 20.0][:-1]
-    spectrum = np.abs(np.fft.rfft(w - w.mean()))
-    assert np.argmax(spectrum) / 40.0 == pytest.approx(0.5)
-
-
-def test_a_clock_scale_scales_the_times_of_samples_and_nothing_else():
-    """Recorded t shows the state at scale t; channels pass unchanged, the motion too."""
+def test_a_clock_scale_stretches_the_whole_log_and_nothing_else():
+    """Recorded t is scale t of samples and commands; channels pass unchanged, the motion too."""
     model = build_model(swimmer(), {"clock_scale": {"scale": 1.02}})
     np.testing.assert_allclose(true_times(model, [0.0, 1.0, 10.0]), [0.0, 1.02, 10.2])
+    np.testing.assert_allclose(true_command_times(model, [0.0, 10.0]), [0.0, 10.2])
     channels = {"x": np.arange(3.0)}
     assert measured_channels(model, channels)["x"] is channels["x"]
     plain = Simulator(swimmer()).run(STILL, duration_s=1.0).states
     scaled = Simulator(swimmer(), effects={"clock_scale": {"scale": 1.02}})
     assert scaled.run(STILL, duration_s=1.0).states.tobytes() == plain.tobytes()
     assert scaled.model.declared == ()
+
+
+def test_a_clock_skew_leaves_the_commands_where_they_are():
+    """Two recorders: what one stamps is true, what the other stamps is stretched."""
+    both = {"clock_skew": {"scale": 1.1}, "clock_scale": {"scale": 0.5}}
+    model = build_model(swimmer(), both)
+    np.testing.assert_allclose(true_times(model, [0.0, 10.0]), [0.0, 5.5])
+    np.testing.assert_allclose(true_command_times(model, [0.0, 10.0]), [0.0, 5.0])
+    skewed = build_model(swimmer(), {"clock_skew": {"scale": 1.1}})
+    np.testing.assert_array_equal(true_command_times(skewed, [0.0, 10.0]), [0.0, 10.0])
 
 
 def test_a_swimming_fish_drifts_off_its_path_by_the_current_alone():

@@ -17,7 +17,7 @@ REFUSED = [
     ({"cruise_speed": (0.2, 0.1)}, ConfigError, "cruise_speed"),
     ({"effects": {"curent": {}}}, EffectError, "did you mean 'current'"),
     ({"effects": {"current": {"west": 1}}}, EffectError, "no parameter 'west'"),
-    ({"effects": {"servo_lag": {"time_constant": 0.001}}}, EffectError, "use dt <= 0.001"),
+    ({"effects": {"servo_lag": {"time_constant": 1e-5}}}, EffectError, "use dt <= 1e-05"),
     ({"current": (0.1, 0.2)}, ConfigError, "current .*: three speeds"),
     ({"current": "abc"}, ConfigError, "three speeds"),
     ({"current": (np.nan, 0, 0)}, ConfigError, "three speeds"),
@@ -111,6 +111,19 @@ def test_wrong_reset_options_are_refused_by_name(options, error, message):
     for env in (RoboticFish3DEnv(), RoboticFish3DVectorEnv(2)):
         with pytest.raises(error, match=message):
             env.reset(seed=0, options=options)
+
+
+def test_an_effect_faster_than_a_physics_step_divides_it():
+    """An extended model loads whatever its lag; delays and control steps stay as they are."""
+    env = RoboticFish3DEnv(
+        effects={"servo_lag": {"time_constant": 0.004}}, observation_delay_s=0.02
+    )
+    env.reset(seed=0)
+    for _ in range(5):
+        assert np.isfinite(env.step(env.action_space.sample())[0]).all()
+    options = env_options(effects={"servo_lag": {"time_constant": 0.004}})
+    assert options.config.dt <= 0.004
+    assert options.config.control_period == pytest.approx(env_options().config.control_period)
 
 
 def test_effect_parameters_given_to_reset_are_checked():

@@ -31,7 +31,7 @@ ORDINARY_BEAT = 0.15
 `frequency_scale` describes it, and runs of a real robot differ as much. Beyond, a command or a
 clock is wrong."""
 TIMES = ("clock", "clock_skew", "beat")
-PACES = ("frequency_scale", "clock_scale")
+PACES = ("frequency_scale", "clock_scale", "clock_skew")
 """Effects by which a fish makes another frequency of the commanded one."""
 
 

@@ -15,7 +15,6 @@ from fish_env.diagnosis.extended_file import extended_fish
 from fish_env.diagnosis.gain import ANGLES
 from fish_env.diagnosis.regimes import Localisation
 from fish_env.effects import catalogue
-from fish_env.effects.extended import build_model
 from fish_env.errors import SimulationDiverged
 from fish_env.identification import open_loop
 from fish_env.identification.filtering import Filtered
@@ -28,7 +27,7 @@ from fish_env.inference.policy import POLICY
 from fish_env.params.schema import FishParams
 from fish_env.replay import Motion, motion_from_channels, motion_from_trajectory
 from fish_env.replay.motion import Role
-from fish_env.sensing import measured_channels, true_times
+from fish_env.sensing import measured_channels, true_command_times, true_times
 from fish_env.simulator import InitialState, Simulator
 
 SETTLED_S = 1.0
@@ -221,11 +220,10 @@ def _series(
 
 
 def _simulator(fit: Fit, dataset: Dataset) -> Simulator:
-    """The fish of a fit, swimming alone, with a step that its fastest effect allows."""
+    """The fish of a fit, swimming alone."""
     fish = extended_fish(fit, dataset)
     own = [effect for name, effect in series_of(fit).known.items() if name not in catalogue()]
-    longest = build_model(fish, user_effects=own).longest_step()
-    return Simulator(fish, min(LONGEST_STEP_S, longest), user_effects=own)
+    return Simulator(fish, LONGEST_STEP_S, user_effects=own)
 
 
 def _whole_run(
@@ -240,7 +238,8 @@ def _whole_run(
     first = int(settled)
     times = true_times(simulator.model, run.clock[first:])
     start = _initial(filtered.states[first])
-    trajectory = simulator.run(steps, initial=start, sample_times_s=times)
+    commands = CommandSteps(true_command_times(simulator.model, steps.times_s), steps.values)
+    trajectory = simulator.run(commands, initial=start, sample_times_s=times)
     tail = simulator.outputs(trajectory)["tail_angle"]
     seen = measured_channels(simulator.model, trajectory.channels)
     for name in ANGLES:

@@ -164,7 +164,8 @@ def refitted(problem: TableProblem) -> Fit:
 
 def untold(problem: TableProblem, baseline: Fit) -> set[str]:
     """Effects that these averages can tell nothing of, were they as strong as is plausible."""
-    settings = {name: plausible_sizes(effect) for name, effect in problem.known.items()}
+    searched = {name: effect for name, effect in problem.known.items() if effect.diagnosed}
+    settings = {name: plausible_sizes(effect) for name, effect in searched.items()}
     return problem.untold(baseline.point, baseline.noise, settings)
 
 

@@ -8,6 +8,7 @@ import numpy.typing as npt
 from fish_env.arrays import FloatArray
 from fish_env.identification.filtering import Measurement
 from fish_env.sensing import channels_from_states
+from fish_env.sensing.geometry import through_geometry
 
 SENSED = ("x", "y", "z", "roll", "pitch", "yaw")
 """Channels that the averages are derived from, in the order of the measurement's rows."""
@@ -23,7 +24,8 @@ def beat_means(
     Args:
         samples: states, shape (samples, rows, n), evenly spaced, the first a beat before the last.
         period: of the beat, s of true time.
-        measurement: what sensors and recorder do; rows as `SENSED`.
+        measurement: what sensors and recorder do; rows as `SENSED`. Of the geometry, how the
+            attitude sensor is mounted; a camera's geometry does not enter averages.
         lanes: which of the measurement's fish these are, shape (n,).
 
     Returns:
@@ -34,7 +36,8 @@ def beat_means(
     gain = {name: measurement.gain[i, lanes] for i, name in enumerate(SENSED)}
     bias = {name: measurement.bias[i, lanes] for i, name in enumerate(SENSED)}
     pace = measurement.pace[lanes]
-    angles = {n: channels[n][1:] * gain[n] + bias[n] for n in ("roll", "pitch", "yaw")}
+    mounted = through_geometry(channels, measurement.take(lanes).geometry)
+    angles = {n: mounted[n][1:] * gain[n] + bias[n] for n in ("roll", "pitch", "yaw")}
     body = np.stack([channels[name][1:] for name in "uvw"])
     true = to_inertial({n: channels[n][1:] for n in angles}, body)
     seen = true * np.stack([gain[name] for name in "xyz"])[:, None] * pace

@@ -238,7 +238,7 @@ class OrbitFinder:
         elsewhere: bool = False,
     ) -> tuple[FloatArray, FloatArray]:
         """One or more beats of some of the fish (see :meth:`Swimmer.beat`)."""
-        part, records = _some(self.measurement, lanes), self.records[:, lanes]
+        part, records = self.measurement.take(lanes), self.records[:, lanes]
         return self.swimmer.beat(
             states, self.commands[lanes], records, part, self.pace[lanes], beats, elsewhere
         )
@@ -331,15 +331,6 @@ def _repeats(before: FloatArray, after: FloatArray) -> BoolArray:
     """Whether the states that effects add have settled, too."""
     rows = slice(len(BASE_STATES), None)
     return np.asarray(np.all(np.abs(after[rows] - before[rows]) < 1e-4, axis=0))
-
-
-def _some(measurement: Measurement, lanes: IntArray) -> Measurement:
-    return Measurement(
-        measurement.pace[lanes],
-        measurement.delay[lanes],
-        np.ascontiguousarray(measurement.gain[:, lanes]),
-        np.ascontiguousarray(measurement.bias[:, lanes]),
-    )
 
 
 def dies_out(slopes: FloatArray) -> BoolArray:

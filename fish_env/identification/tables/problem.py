@@ -15,7 +15,6 @@ from fish_env.effects.extended import PREFIX, build_model
 from fish_env.effects.registry import catalogue
 from fish_env.errors import DatasetError
 from fish_env.identification.applied_wrench import EFFECT as APPLIED_WRENCH
-from fish_env.identification.filtering import Measurement
 from fish_env.identification.parameters import ALIKE, Baseline, changes_of, neutral_values
 from fish_env.identification.tables.means import MEANS, SENSED
 from fish_env.identification.tables.orbit import (
@@ -91,11 +90,12 @@ class TableProblem(Problem):
         user_effects: Iterable[Effect] = (),
         dt: float = DT_S,
     ) -> None:
-        self.table, self.fish, self.dt = table, fish, dt
+        self.table, self.fish = table, fish
         own = tuple(user_effects)
         self.known = {**catalogue(), **{e.name: e for e in own}}
         self.model = build_model(fish, user_effects=(*own, APPLIED_WRENCH), whole_catalogue=True)
         self.baseline = Baseline(fish, paths)
+        self.dt = dt = dt / self.model.substeps(dt)
         self._swimmer = Swimmer(self.model, dt)
 
     def on(self, conditions: IntArray) -> TableProblem:
@@ -338,10 +338,7 @@ class TableProblem(Problem):
         known = {**self.known, APPLIED_WRENCH.name: APPLIED_WRENCH}
         changes, seen = changes_of(self.model, known, self.baseline, z, effects, SENSED)
         each = np.repeat(np.arange(z.shape[1]), self.run_count)
-        measurement = Measurement(
-            seen.pace[each], seen.delay[each],
-            np.ascontiguousarray(seen.gain[:, each]), np.ascontiguousarray(seen.bias[:, each]),
-        )  # fmt: skip
+        measurement = seen.take(each)
         records = np.ascontiguousarray(self.model.records(changes)[:, each])
         commands = np.tile(self.table.commands, (z.shape[1], 1))
         finder = OrbitFinder(self._swimmer, commands, records, measurement, np.ones(len(each)))

@@ -13,14 +13,9 @@ from tests.hidden.sizes import ABSORBED, EQUIVALENT, INVISIBLE, SIZES, Size, sof
 
 DEGREE = math.radians(1.0)
 CORRECTED: dict[str, dict[str, float]] = {
-    "wave": {"amplitude": 0.0, "frequency": 0.5, "phase": 0.0, "heading": 0.0, "tank_depth": INF},
-    "water_ingress": {"rate": 0.0, "x": 0.0},
-    "tether": {"stiffness": 0.0, "x": 0.0, "y": 0.0, "z": 0.0, "slack": 0.0, "attach_x": 0.0},
     "sensor_delay": {"camera": 0.0, "imu": 0.0, "depth": 0.0},
 }
 """Effects of the catalogue that real robots have in a fuller form."""
-RECORDED_AS = {"wave": "orbital_wave", "water_ingress": "flooding", "tether": "cable"}
-"""What the compiled physics calls the fuller form."""
 
 SENSED: dict[str, dict[str, float]] = {
     "outliers": {"share": 0.0, "size": 20.0},
@@ -40,8 +35,7 @@ SENSED: dict[str, dict[str, float]] = {
 }
 """Sensors. Steps of quantisation and sizes of outliers are in units of the sensor's noise."""
 OTHER = {"water_density": {"scale": 1.0}, "tail_phase": {"offset": 0.0}}
-STALL = {"tail_stall": {"loss": 0.0, "onset": 0.5, "width": 0.06}}
-PHYSICAL = {**LIBRARY, **REAL, **PLANTS, **STALL, **CORRECTED, **OTHER}
+PHYSICAL = {**LIBRARY, **REAL, **PLANTS, **CORRECTED, **OTHER}
 NEUTRAL: dict[str, dict[str, float]] = {**PHYSICAL, **SENSED}
 
 BY_SENSORS = {
@@ -61,18 +55,6 @@ def flatter(value: float, strength: float) -> float:
 
 
 FULLER: dict[str, Size] = {
-    "wave": Size(
-        {"amplitude": 0.03},
-        shape={"frequency": (0.3, 0.8), "heading": (-3.0, 3.0), "tank_depth": (0.8, 3.0)},
-    ),
-    "water_ingress": Size({"rate": 2e-4}, shape={"x": (-0.06, 0.06)}),
-    "tether": Size(
-        {"stiffness": 0.02},
-        shape={
-            "x": (-1.0, 1.0), "y": (-1.0, 1.0), "z": (0, 0.5), "slack": (0.0, 0.5),
-            "attach_x": (-0.1, 0.1),
-        },
-    ),
     "sensor_delay": Size({"camera": 0.08, "imu": 0.03, "depth": 0.05}),
 }  # fmt: skip
 MAIN_SIZES = {
@@ -135,7 +117,7 @@ ALONE: dict[str, Size] = {
     "offset_gain": Size({"gain": 0.75}, signed=True),
     "swing_loss": Size({"per_radian": 0.5}),
     "angle_limit": Size({}, shape={"lower": (-0.45, -0.3), "upper": (0.3, 0.45)}),
-    "beat_slowing": Size({"offset": 0.25, "load": 0.012}),
+    "beat_load": Size({"offset": 0.25, "load": 0.012}),
     "servo_torque_limit": Size({"torque": 0.02}, strengthen=flatter),
     "tail_stall": Size({"loss": 0.6}, shape={"onset": (0.9, 1.2), "width": (0.05, 0.08)}),
     "body_flexibility": Size({"stiffness": 0.1}, strengthen=flatter),
@@ -165,6 +147,7 @@ SAME: dict[str, tuple[str, ...]] = {
     "marker_offset": ("lever_arm", "marker_lever_arm"),
     "swing_loss": ("offset_swing_loss",),
     "angle_limit": ("angle_saturation", "tail_saturation"),
+    "beat_load": ("beat_slowing",),
     "body_flexibility": ("flexible_body",),
     "wall_effect": ("wall", "wall_and_floor"),
     "floor_effect": ("floor", "wall_and_floor"),

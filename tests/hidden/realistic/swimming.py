@@ -12,7 +12,7 @@ from fish_env.data import CommandSteps, Run
 from fish_env.params import FishParams
 from tests.hidden.disturbances import draw_push
 from tests.hidden.excitation import exciting, merged
-from tests.hidden.realistic.catalogue import BY_SENSORS, RECORDED_AS
+from tests.hidden.realistic.catalogue import BY_SENSORS
 from tests.hidden.realistic.faults import FAULTS
 from tests.hidden.realistic.hidden import Piece, Values, added
 from tests.hidden.realistic.plans import DEPTH, DURATION, SHALLOW
@@ -27,7 +27,6 @@ from tests.hidden.realistic.sensors import (
 from tests.hidden.recording import ATTEMPTS, better_depth, upright, within_tank
 from tests.hidden.simulate import Push, Start, Swim
 
-GRAVITY = 9.81
 OWN = ("water_density", "tail_phase")
 """Pieces that change the fish or its start instead of the equations."""
 FISH, PUSHES = "coefficients", "disturbance"
@@ -146,20 +145,8 @@ def physics(values: Values) -> Values:
     for name, given in values.items():
         if name in BY_SENSORS or name in OWN:
             continue
-        out[RECORDED_AS.get(name, name)] = wave(given) if name == "wave" else dict(given)
+        out[name] = dict(given)
     return out
-
-
-def wave(given: Mapping[str, float]) -> dict[str, float]:
-    """A wave with the number that its frequency has in water of this depth."""
-    turn = 2.0 * math.pi * given["frequency"]
-    number, depth = turn**2 / GRAVITY, given["tank_depth"]
-    if math.isfinite(depth):
-        for _ in range(100):  # a contraction: k = w^2 / (g tanh(k h)), averaged
-            number = 0.5 * (number + turn**2 / (GRAVITY * math.tanh(number * depth)))
-    mirror = math.exp(-2.0 * number * depth) if math.isfinite(depth) else 0.0
-    kept = {key: given[key] for key in ("amplitude", "frequency", "phase", "heading")}
-    return kept | {"number": number, "mirror": mirror}
 
 
 def draw_run(case: Case, run: int, rng: np.random.Generator) -> Drawn:

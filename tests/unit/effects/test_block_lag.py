@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from fish_env.errors import EffectError
 from fish_env.simulator import Simulator
 from tests.physics.cases import swimmer
 from tests.unit.effects.support import run
@@ -34,6 +33,8 @@ def test_behind_a_scale_it_lags_the_scaled_command():
     assert moved["block_lag.position"][-1] == pytest.approx(0.006, abs=1e-7)
 
 
-def test_a_step_longer_than_the_lag_is_refused():
-    with pytest.raises(EffectError, match=r"use dt <= 0\.005"):
-        Simulator(swimmer(), 0.01, {"block_lag": {"time_constant": 0.005}})
+def test_a_step_longer_than_the_lag_is_divided():
+    quick = {"block_lag": {"time_constant": 0.0005}}
+    moved = run(quick, STEP, 1.0)
+    np.testing.assert_allclose(moved["block_lag.position"][-1], 0.012, atol=1e-9)
+    assert Simulator(swimmer(), 0.01, quick).dt <= 0.0005

@@ -2,11 +2,13 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from fish_env.effects.extended import build_model
 from fish_env.sensing import measured_channels, true_times
 from tests.physics.cases import swimmer
 
+ANGLES = ("roll", "pitch", "yaw")
 CHANNELS = {
     name: np.array([0.1, -0.2, 0.3]) + i
     for i, name in enumerate(
@@ -32,7 +34,6 @@ def changes(effects):
     ("name", "added"),
     [
         ("gyro_bias", {"p": 0.01, "q": -0.02, "r": 0.005}),
-        ("attitude_misalignment", {"roll": 0.01, "pitch": -0.02, "yaw": 0.05}),
     ],
 )
 def test_a_bias_is_added_to_its_channels_and_no_others(name, added):
@@ -54,6 +55,82 @@ def test_a_position_scale_multiplies_all_of_the_position():
     for name in CHANNELS:
         factor = 1.04 if name in ("x", "y", "z") else 1.0
         np.testing.assert_allclose(scaled[name], factor * CHANNELS[name], rtol=1e-15)
+
+
+def turn(angles):
+    """Body to inertial, one matrix for each sample."""
+    return Rotation.from_euler("xyz", np.column_stack(angles))
+
+
+def rows(channels, names):
+    return np.column_stack([channels[name] for name in names])
+
+
+def test_a_sensor_mounted_askew_shows_its_own_attitude_and_rates():
+    """R M and M^T omega; position and speed are not its business."""
+    askew = {"roll": 0.05, "pitch": -0.04, "yaw": 0.07}
+    seen = measured({"attitude_misalignment": askew})
+    mount = turn([[angle] for angle in askew.values()])
+    body = turn([CHANNELS[name] for name in ANGLES])
+    shown = turn([seen[name] for name in ANGLES])
+    np.testing.assert_allclose(shown.as_matrix(), (body * mount).as_matrix(), atol=1e-12)
+    np.testing.assert_allclose(rows(seen, "pqr"), mount.inv().apply(rows(CHANNELS, "pqr")))
+    for name in ("x", "y", "z", "u", "v", "w"):
+        assert seen[name] is CHANNELS[name]
+
+
+def test_a_level_fish_shows_the_angles_of_the_mounting_themselves():
+    level = {name: np.zeros(1) for name in CHANNELS} | {"yaw": np.full(1, 9.0)}
+    seen = measured({"attitude_misalignment": {"roll": 0.05, "pitch": -0.04, "yaw": 0.07}}, level)
+    assert [float(seen[name][0]) for name in ANGLES] == pytest.approx([0.05, -0.04, 9.07])
+
+
+def test_a_marker_beside_the_origin_swings_with_the_attitude():
+    """C_I + R r in x and y; the depth comes from another sensor."""
+    seen = measured({"marker_offset": {"x": 0.06, "y": 0.03, "z": -0.08}})
+    place = rows(CHANNELS, "xyz") + turn([CHANNELS[n] for n in ANGLES]).apply([0.06, 0.03, -0.08])
+    np.testing.assert_allclose(rows(seen, "xy"), place[:, :2], atol=1e-12)
+    np.testing.assert_array_equal(seen["z"], CHANNELS["z"])
+
+
+def test_a_tilted_camera_sees_depth_as_distance():
+    """T^T C_I: a pitch by a looks x cos a - z sin a."""
+    seen = measured({"camera_tilt": {"pitch": 0.07}})
+    expected = CHANNELS["x"] * np.cos(0.07) - CHANNELS["z"] * np.sin(0.07)
+    np.testing.assert_allclose(seen["x"], expected, atol=1e-12)
+    np.testing.assert_allclose(seen["y"], CHANNELS["y"], atol=1e-12)
+
+
+def test_refraction_shrinks_what_is_deep():
+    """(h + d0/n) / (h + z/n): right at d0 = 0.5 m, smaller below, larger above."""
+    depth = {"x": np.ones(3), "y": -np.ones(3), "z": np.array([0.0, 0.5, 2.0])}
+    seen = measured({"refraction": {"height": 2.0}}, {**{n: np.zeros(3) for n in ANGLES}, **depth})
+    expected = (2.0 + 0.5 / 1.333) / (2.0 + depth["z"] / 1.333)
+    np.testing.assert_allclose(seen["x"], expected, rtol=1e-12)
+    np.testing.assert_allclose(seen["y"], -expected, rtol=1e-12)
+
+
+def test_soft_iron_bends_the_heading_twice_in_a_turn():
+    heading = {n: np.zeros(5) for n in ANGLES} | {"yaw": np.linspace(0.0, 2 * np.pi, 5)}
+    seen = measured({"soft_iron": {"amplitude": 0.1, "angle": 0.4}}, heading)
+    np.testing.assert_allclose(
+        seen["yaw"] - heading["yaw"], 0.1 * np.sin(2 * heading["yaw"] + 0.4), atol=1e-12
+    )
+
+
+def test_a_gyro_scale_comes_before_the_bias():
+    both = {"gyro_bias": {"r": 0.02}, "gyro_scale": {"p": 0.9, "r": 1.1}}
+    seen = measured(both)
+    np.testing.assert_allclose(seen["p"], 0.9 * CHANNELS["p"])
+    np.testing.assert_allclose(seen["r"], 1.1 * CHANNELS["r"] + 0.02)
+    np.testing.assert_array_equal(seen["q"], CHANNELS["q"])
+
+
+def test_a_marker_follows_the_hull_and_not_the_sensor():
+    """Together, the camera still sees the true attitude."""
+    marker = {"marker_offset": {"x": 0.06}}
+    both = {**marker, "attitude_misalignment": {"yaw": 0.3}}
+    np.testing.assert_array_equal(measured(both)["x"], measured(marker)["x"])
 
 
 def test_scale_and_bias_of_the_depth_compose_in_one_order():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -186,8 +186,8 @@ def _diagnose_runs(
     every = SeriesProblem(dataset, fish, dt=effort.step_s)
     if effort.retries:
         every = with_own_beats(every, own_beats(every))
-    problem = every.named(fitted).subset(effort.runs).until(effort.seconds)
-    judging = every.named(final) if final else None
+    problem = _named(every, fitted).subset(effort.runs).until(effort.seconds)
+    judging = _named(every, final) if final else None
     progress("comparing the channels with each other")
     progress("refitting the baseline")
     compare = partial(_compared, dataset, seed)
@@ -213,6 +213,10 @@ def _diagnose_runs(
         misfit=misfit_of(problem, judged), gain=gain, residual=residual, next_experiment=proposal,
         budget=found.budget, seed=seed, quick=quick, runtime_s=time.perf_counter() - begin,
     )  # fmt: skip
+
+
+def _named(problem: SeriesProblem, ids: Sequence[str]) -> SeriesProblem:
+    return problem.some([problem.run_ids.index(id) for id in ids])
 
 
 def _compared(dataset: Dataset, seed: int) -> tuple[tuple[Floor, ...], Consistency]:

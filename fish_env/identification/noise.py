@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 from math import comb
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.optimize import minimize
@@ -13,7 +14,11 @@ from scipy.optimize import minimize
 from fish_env.arrays import FloatArray
 from fish_env.data.schema import Dataset
 from fish_env.identification.filtering import NoiseModel
+from fish_env.inference.problem import Point
 from fish_env.params.schema import FishParams
+
+if TYPE_CHECKING:
+    from fish_env.identification.series import SeriesProblem
 
 ORDER = 4
 WINDOW = 30
@@ -108,6 +113,36 @@ def disturbance_range(fish: FishParams) -> DisturbanceRange:
 def small_disturbance(sensor_sd: FloatArray) -> NoiseModel:
     """A disturbance of a few millinewton beside sensor noise (C,)."""
     return NoiseModel(sensor_sd, 3e-3, 1e-4, 1.0)
+
+
+def fitted_noise(
+    problem: SeriesProblem, point: Point, noise: NoiseModel, largest_sensor_sd: FloatArray | None
+) -> NoiseModel:
+    """Noise model of largest likelihood at a point.
+
+    The search starts from the present one and from a small disturbance, so that a disturbance
+    which once stood in for a misfit does not stay.
+
+    Args:
+        problem: the runs, few of them.
+        point: values of the parameters.
+        noise: the present noise model.
+        largest_sensor_sd: as :func:`fit_noise` takes it.
+    """
+    within = disturbance_range(problem.fish)
+    found = noise
+    for _ in range(3):
+        runs, made_with = problem.filtered(point, found, keep_slopes=True), found
+        # The lean filter will do: covariances are replayed, and no effect is computed again.
+        replay = partial(problem.lean_filter.replay, runs, made_with)
+        small = replace(
+            small_disturbance(found.sensor_sd), phase_sd=found.phase_sd, spread=found.spread
+        )
+        start = max((found, small), key=replay)
+        found = fit_noise(replay, start, within, 45, largest_sensor_sd)
+        if made_with.is_close(found, 0.4):
+            break
+    return found
 
 
 def fit_noise(

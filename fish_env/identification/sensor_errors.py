@@ -16,6 +16,7 @@ import numpy as np
 from fish_env.arrays import FloatArray
 from fish_env.identification.channels import BY_NAME
 from fish_env.identification.filtering import Filtered, Slopes
+from fish_env.identification.runs import RunData
 from fish_env.identification.state_blocks import N_ERROR, N_MOVING, columns
 from fish_env.inference.estimate.run_variation import RunVariation
 from fish_env.model.frames import euler_from_quaternion
@@ -132,6 +133,29 @@ def _slopes(filtered: Filtered) -> Slopes:
     if filtered.slopes is None:
         raise ValueError("filter the run with keep_slopes=True")
     return filtered.slopes
+
+
+def slopes_of_runs(
+    runs: Sequence[RunData],
+    filtered: Sequence[Filtered],
+    channels: Sequence[str],
+    correlation_s: float,
+) -> FloatArray:
+    """Change of whitened innovations by each run's own sensor errors, shape (D, K).
+
+    Args:
+        runs: prepared runs.
+        filtered: each of them filtered, with its slopes.
+        channels: names of their channels.
+        correlation_s: of the disturbance that they were filtered with (s).
+    """
+    parts = [
+        innovation_slopes(
+            run.clock, run.measured, one, correlation_s, sensor_slopes(run.clock, one, channels)
+        )
+        for run, one in zip(runs, filtered, strict=True)
+    ]
+    return np.concatenate(parts)
 
 
 def _put(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -28,7 +28,7 @@ from fish_env.identification.generic_forces import BoundForces, generic_forces
 from fish_env.identification.kernel_kinds import LEAN, quickest
 from fish_env.identification.noise import (
     disturbance_range,
-    fit_noise,
+    fitted_noise,
     small_disturbance,
     white_noise_sd,
 )
@@ -36,11 +36,7 @@ from fish_env.identification.open_loop import windows, without_feedback
 from fish_env.identification.parameters import ALIKE, Baseline, changes_of, neutral_values
 from fish_env.identification.phases import settle_phases
 from fish_env.identification.runs import FINER, RunData, prepare_run
-from fish_env.identification.sensor_errors import (
-    SENSOR_ERRORS,
-    innovation_slopes,
-    sensor_slopes,
-)
+from fish_env.identification.sensor_errors import SENSOR_ERRORS, slopes_of_runs
 from fish_env.identification.sensors import largest_noise
 from fish_env.identification.variation import VARIATIONS
 from fish_env.inference.estimate.fit import Fit
@@ -208,10 +204,6 @@ class SeriesProblem(Problem):
         """The same problem on some of its runs."""
         return self.with_runs([self.runs[i] for i in runs])
 
-    def named(self, ids: Sequence[str]) -> SeriesProblem:
-        """The same problem on the runs with these ids, in their order."""
-        return self.some([self.run_ids.index(id) for id in ids])
-
     def default_noise(self) -> NoiseModel:
         """Sensor noise from differences of the data, and a disturbance of a few millinewton."""
         return small_disturbance(self.sensor_sd)
@@ -224,26 +216,9 @@ class SeriesProblem(Problem):
         filtered: Sequence[Filtered] = (),
         leverage: Callable[[], FloatArray] | None = None,
     ) -> NoiseModel:
-        """Noise model of largest likelihood at a point, from at most four runs.
-
-        The search starts from the present one and from a small disturbance, so that a disturbance
-        which once stood in for a misfit does not stay.
-        """
-        few = self.subset(4)
-        within = disturbance_range(self.fish)
-        found = noise
-        for _ in range(3):
-            runs, made_with = few.filtered(point, found, keep_slopes=True), found
-            # The lean filter will do: covariances are replayed, and no effect is computed again.
-            replay = partial(few.lean_filter.replay, runs, made_with)
-            small = replace(
-                small_disturbance(found.sensor_sd), phase_sd=found.phase_sd, spread=found.spread
-            )
-            start = max((found, small), key=replay)
-            found = fit_noise(replay, start, within, 45, self.largest_sensor_sd if final else None)
-            if made_with.is_close(found, 0.4):
-                break
-        return found
+        """Noise model of largest likelihood at a point, from at most four runs."""
+        largest = self.largest_sensor_sd if final else None
+        return fitted_noise(self.subset(4), point, noise, largest)
 
     def disturbance_at_limit(self, noise: NoiseModel) -> tuple[str, ...]:
         """How the disturbance leaves what is plausible: a misfit with another name."""
@@ -297,25 +272,21 @@ class SeriesProblem(Problem):
 
         By differences (K,) where the fish has to swim again, else through the filter's slopes.
         """
-        steps = steps[: len(VARIATIONS)]
+        own = steps[: len(VARIATIONS)]
+        swum = self._swum_slopes(point, noise, filtered, own)
+        again = self.filtered(point, noise, keep_slopes=True)
+        seen = slopes_of_runs(self.runs, again, self.channels, noise.correlation_s)
+        return np.hstack([swum, seen])
+
+    def _swum_slopes(
+        self, point: Point, noise: NoiseModel, filtered: Sequence[Filtered], steps: FloatArray
+    ) -> FloatArray:
         count = 1 + len(steps)
         more = np.column_stack([np.zeros(len(steps)), np.diag(steps)])
         effects = {path: np.full(count, value) for path, value in point.effects.items()}
-        z = np.repeat(point.z[:, None], count, axis=1)
-        records, measurement = self.lanes(z, effects)
-        rows = self.filter_for(effects).innovations(
-            records, measurement, noise, filtered, variation=more
-        )
-        own = (rows[1:] - rows[0]).T / steps
-        again = self.filtered(point, noise, keep_slopes=True)
-        sensors = [
-            innovation_slopes(
-                run.clock, run.measured, f, noise.correlation_s,
-                sensor_slopes(run.clock, f, self.channels),
-            )
-            for run, f in zip(self.runs, again, strict=True)
-        ]  # fmt: skip
-        return np.hstack([own, np.concatenate(sensors)])
+        lanes = self.lanes(np.repeat(point.z[:, None], count, axis=1), effects)
+        rows = self.filter_for(effects).innovations(*lanes, noise, filtered, variation=more)
+        return np.asarray((rows[1:] - rows[0]).T / steps)
 
     def generic_terms(self, fit: Any) -> BoundForces:
         """Forces and moments that depend on motion, attitude, depth, time, beat or commands."""

@@ -292,8 +292,7 @@ def with_run_variation(own: Fit) -> Fit:
     """The fit, made again where its runs differ by more, or less, than it allows for.
 
     Where the disturbance stays at its limit nevertheless, what the runs seem to differ in stands in
-    for something else that is missing: then it is taken to be no more than usual. A few runs tell
-    no spread.
+    for something else that is missing: the fit then is as it was. A few runs tell no spread.
     """
     if not own.problem.variations or own.problem.run_count < POLICY.fewest_runs_for_spread:
         return own
@@ -301,18 +300,9 @@ def with_run_variation(own: Fit) -> Fit:
     if not found.sd.any() and not own.noise.spread.any():
         return own
     problem = own.problem.with_variation(np.where(found.sd > 0.0, found.values, 0.0))
-    varied = _with_spread(problem, own, found.sd)
-    if not problem.disturbance_at_limit(varied.noise):
-        return varied
-    usual = np.array([variation.usual for variation in problem.variations])
-    least = np.minimum(found.sd, usual)
-    return varied if (least == found.sd).all() else _with_spread(own.problem, varied, least)
-
-
-def _with_spread(problem: Problem, own: Fit, sd: FloatArray) -> Fit:
-    """A fit made again with other spreads (K,) over runs."""
-    noise = replace(own.noise, spread=sd)
-    return fit(problem, own.effects, own.point, noise, own.released, rounds=2)
+    noise = replace(own.noise, spread=found.sd)
+    varied = fit(problem, own.effects, own.point, noise, own.released, rounds=2)
+    return own if problem.disturbance_at_limit(varied.noise) else varied
 
 
 def _extrapolated(own: Fit) -> Fit:

@@ -1,8 +1,7 @@
 """`robofish`, the command line. Thin: every command lives in :mod:`fish_env.commands`.
 
-Only typer and rich are imported here; what a command needs is imported when it runs. Packages that
-build on this one add commands of their own as entry points of the group ``robofish.commands``:
-functions that take the typer app.
+Only typer and rich are imported here; what a command needs is imported when it runs. Packages add
+commands as entry points of the group ``robofish.commands``: functions that take the typer app.
 """
 
 from __future__ import annotations
@@ -394,8 +393,8 @@ def _run() -> None:
 def _complain(colour: str, text: str) -> None:
     from fish_env.reading import printable
 
-    line = printable(text)
-    Console(stderr=True, soft_wrap=True).print(f"[{colour}]{escape(line)}[/{colour}]")
+    line = f"[{colour}]{escape(printable(text))}[/{colour}]"
+    Console(stderr=True, soft_wrap=True).print(line)
 
 
 if __name__ == "__main__":

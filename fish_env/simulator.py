@@ -133,6 +133,7 @@ class Simulator:
 
     Raises:
         EffectError: an unknown effect, a bad value, or an effect file that is not trusted.
+        ScheduleError: no physics step from 1e-6 to 0.1 s.
     """
 
     def __init__(

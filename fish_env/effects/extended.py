@@ -120,11 +120,7 @@ class ExtendedModel:
             ScheduleError: no number from 1e-6 to 0.1 s.
             EffectError: too long for an effect's time constant; says the longest step.
         """
-        if not is_number(dt) or not SHORTEST_STEP_S <= dt <= LONGEST_STEP_S:
-            raise ScheduleError(
-                f"dt = {shown(dt)} s: choose a physics step from {SHORTEST_STEP_S:g} to "
-                f"{LONGEST_STEP_S:g} s"
-            )
+        _check_range(dt)
         longest = self.longest_step()
         if dt > longest * (1 + 1e-9):
             raise EffectError(
@@ -133,8 +129,21 @@ class ExtendedModel:
             )
 
     def substeps(self, dt: float) -> int:
-        """Equal parts of a physics step (s) that resolve the fastest effect; one if it does."""
+        """Equal parts of a physics step (s) that resolve the fastest effect; one if it does.
+
+        Raises:
+            ScheduleError: no number from 1e-6 to 0.1 s.
+        """
+        _check_range(dt)
         return max(1, int(np.ceil(dt / self.longest_step() * (1.0 - 1e-9))))
+
+
+def _check_range(dt: float) -> None:
+    if not is_number(dt) or not SHORTEST_STEP_S <= dt <= LONGEST_STEP_S:
+        raise ScheduleError(
+            f"dt = {shown(dt)} s: choose a physics step from {SHORTEST_STEP_S:g} to "
+            f"{LONGEST_STEP_S:g} s"
+        )
 
 
 def build_model(

@@ -18,12 +18,7 @@ from fish_env.identification.applied_wrench import EFFECT as APPLIED_WRENCH
 from fish_env.identification.channels import codes_of
 from fish_env.identification.runs import RunData
 from fish_env.identification.state_blocks import N_ERROR, N_MOVING
-from fish_env.identification.variation import (
-    COUNT,
-    varied_bias,
-    varied_delay,
-    varied_records,
-)
+from fish_env.identification.variation import EVERY, varied_bias, varied_delay, varied_records
 from fish_env.model.history import history_rows
 from fish_env.model.runtime import Kernels, kernels
 from fish_env.model.state import BASE_STATES
@@ -59,7 +54,7 @@ class NoiseModel:
     moment_sd: float
     correlation_s: float
     phase_sd: float = 0.0
-    spread: FloatArray = field(default_factory=lambda: np.zeros(COUNT))
+    spread: FloatArray = field(default_factory=lambda: np.zeros(len(EVERY)))
 
     def is_close(self, other: NoiseModel, share: float) -> bool:
         """Whether the disturbance of another noise model differs by less than a share of this."""
@@ -270,7 +265,7 @@ class RunFilter:
                 state0, data.swimming, record, measurement.pace[0], measurement.skew[0],
                 measurement.delay[0], measurement.gain[:, 0], measurement.bias[:, 0],
                 measurement.lens, data.clock,
-                steps_of(data, corners), data.command_times, data.command_values,
+                data.steps(corners), data.command_times, data.command_values,
                 data.measured, self.codes, noise.sensor_sd**2,
                 data.covariance0, noise.wrench_variance, noise.correlation_s, noise.phase_sd**2,
                 self._history_rows(record, data), data.known_wrench, self.model.tables,
@@ -355,7 +350,7 @@ class RunFilter:
             entry(
                 state0, data.swimming, record, sensors.pace, sensors.skew, sensors.delay,
                 sensors.gain, sensors.bias, sensors.lens, data.clock,
-                steps_of(data, gains.corners), data.command_times, data.command_values,
+                data.steps(gains.corners), data.command_times, data.command_values,
                 data.measured, self.codes, gains.gains, gains.whitening,
                 noise.correlation_s, self._history_rows(record, data), data.known_wrench, basis,
                 column, size, self.model.tables, out, place, first, last,
@@ -385,11 +380,6 @@ def turned(quaternion: FloatArray, angle: FloatArray) -> FloatArray:
     w, x, y, z = quaternion
     c, s = np.cos(0.5 * angle), np.sin(0.5 * angle)
     return np.array([c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w])
-
-
-def steps_of(data: RunData, corners: bool) -> IntArray:
-    """(T,) RK4 steps up to each sample."""
-    return data.corner_substeps if corners else data.substeps
 
 
 @cache

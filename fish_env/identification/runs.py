@@ -98,6 +98,10 @@ class RunData:
         """(T, 6) known wrench, or no rows."""
         return self.wrench if self.wrench is not None else np.zeros((0, 6))
 
+    def steps(self, corners: bool) -> IntArray:
+        """(T,) RK4 steps up to each sample, finer for motion with corners."""
+        return self.corner_substeps if corners else self.substeps
+
     @property
     def corner_substeps(self) -> IntArray:
         """(T,) steps for motion with corners: finer everywhere."""

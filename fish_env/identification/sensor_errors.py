@@ -18,34 +18,10 @@ from fish_env.identification.channels import BY_NAME
 from fish_env.identification.filtering import Filtered, Slopes
 from fish_env.identification.runs import RunData
 from fish_env.identification.state_blocks import N_ERROR, N_MOVING, columns
-from fish_env.inference.estimate.run_variation import RunVariation
+from fish_env.identification.variation import SENSOR_ERRORS
 from fish_env.model.frames import euler_from_quaternion
 from fish_env.rigidbody.kinematics import euler_rates, rotations
 
-DEGREE = float(np.deg2rad(1.0))
-SENSOR_ERRORS = (
-    RunVariation("marker_x", "m", 0.01, shared=True),
-    RunVariation("marker_y", "m", 0.01, shared=True),
-    RunVariation("marker_z", "m", 0.01, shared=True),
-    RunVariation("mounting_roll", "rad", DEGREE, shared=True),
-    RunVariation("mounting_pitch", "rad", DEGREE, shared=True),
-    RunVariation("mounting_yaw", "rad", DEGREE, shared=True),
-    RunVariation("gyro_gain_p", "1", 0.01, shared=True),
-    RunVariation("gyro_gain_q", "1", 0.01, shared=True),
-    RunVariation("gyro_gain_r", "1", 0.01, shared=True),
-    RunVariation("compass_sin_yaw", "rad", DEGREE, shared=True),
-    RunVariation("compass_cos_yaw", "rad", DEGREE, shared=True),
-    RunVariation("compass_sin_2_yaw", "rad", DEGREE, shared=True),
-    RunVariation("compass_cos_2_yaw", "rad", DEGREE, shared=True),
-    RunVariation("camera_roll", "rad", DEGREE, shared=True),
-    RunVariation("camera_pitch", "rad", DEGREE, shared=True),
-    RunVariation("camera_scale_per_depth", "1/m", 0.15, shared=True),
-    RunVariation("camera_delay", "s", 0.02, shared=True),
-    RunVariation("inertial_delay", "s", 0.02, shared=True),
-    RunVariation("depth_delay", "s", 0.02, shared=True),
-)
-"""Usual sizes: a centimetre, a degree, one per cent, a frame of a camera; the picture of a camera
-some metres above the water shrinks with depth, by the refractive index and its height."""
 _INDEX = {error.name: i for i, error in enumerate(SENSOR_ERRORS)}
 _DEVICE = {
     **dict.fromkeys(("x", "y", "u", "v", "w"), "camera_delay"),

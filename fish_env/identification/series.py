@@ -36,9 +36,9 @@ from fish_env.identification.open_loop import windows, without_feedback
 from fish_env.identification.parameters import ALIKE, Baseline, changes_of, neutral_values
 from fish_env.identification.phases import settle_phases
 from fish_env.identification.runs import FINER, RunData, prepare_run
-from fish_env.identification.sensor_errors import SENSOR_ERRORS, slopes_of_runs
+from fish_env.identification.sensor_errors import slopes_of_runs
 from fish_env.identification.sensors import largest_noise
-from fish_env.identification.variation import VARIATIONS
+from fish_env.identification.variation import EVERY, SENSOR_ERRORS, VARIATIONS
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.hypotheses import effects_of
 from fish_env.inference.policy import POLICY
@@ -70,7 +70,7 @@ class SeriesProblem(Problem):
     known: dict[str, Effect]
     out_of_step = ("frequency_scale", "battery_sag", "clock_scale", "clock_skew")
     interchangeable = ALIKE
-    variations = (*VARIATIONS, *SENSOR_ERRORS)
+    variations = EVERY
 
     def __init__(
         self,

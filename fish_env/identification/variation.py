@@ -28,6 +28,31 @@ VARIATIONS = (
 )
 """Trim is how far the barycentre of the whole fish at rest is moved."""
 COUNT = len(VARIATIONS)
+DEGREE = float(np.deg2rad(1.0))
+SENSOR_ERRORS = (
+    RunVariation("marker_x", "m", 0.01, shared=True),
+    RunVariation("marker_y", "m", 0.01, shared=True),
+    RunVariation("marker_z", "m", 0.01, shared=True),
+    RunVariation("mounting_roll", "rad", DEGREE, shared=True),
+    RunVariation("mounting_pitch", "rad", DEGREE, shared=True),
+    RunVariation("mounting_yaw", "rad", DEGREE, shared=True),
+    RunVariation("gyro_gain_p", "1", 0.01, shared=True),
+    RunVariation("gyro_gain_q", "1", 0.01, shared=True),
+    RunVariation("gyro_gain_r", "1", 0.01, shared=True),
+    RunVariation("compass_sin_yaw", "rad", DEGREE, shared=True),
+    RunVariation("compass_cos_yaw", "rad", DEGREE, shared=True),
+    RunVariation("compass_sin_2_yaw", "rad", DEGREE, shared=True),
+    RunVariation("compass_cos_2_yaw", "rad", DEGREE, shared=True),
+    RunVariation("camera_roll", "rad", DEGREE, shared=True),
+    RunVariation("camera_pitch", "rad", DEGREE, shared=True),
+    RunVariation("camera_scale_per_depth", "1/m", 0.15, shared=True),
+    RunVariation("camera_delay", "s", 0.02, shared=True),
+    RunVariation("inertial_delay", "s", 0.02, shared=True),
+    RunVariation("depth_delay", "s", 0.02, shared=True),
+)
+"""Usual sizes: a centimetre, a degree, one per cent, a frame of a camera; the picture of a camera
+some metres above the water shrinks with depth, by the refractive index and its height."""
+EVERY = (*VARIATIONS, *SENSOR_ERRORS)
 _MASS, _BUOYANCY = RECORD_FIELDS.index("mass_total"), RECORD_FIELDS.index("mass_buoyancy")
 _STATIC = {f"trim_{axis}": RECORD_FIELDS.index(f"static_{axis}") for axis in "xyz"}
 _GYROS = {"gyro_zero_p": "p", "gyro_zero_q": "q", "gyro_zero_r": "r"}

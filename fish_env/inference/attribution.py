@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from scipy.special import chdtri, stdtrit
+from scipy.special import stdtrit
 
 from fish_env.arrays import FloatArray
 from fish_env.inference.adequacy import disturbance_at_limit, implausible_estimates
 from fish_env.inference.effort import FULL, Effort
+from fish_env.inference.elimination import backward_elimination
 from fish_env.inference.estimate.fit import Fit, finished, with_run_variation
 from fish_env.inference.explanation import Explanation, reached
-from fish_env.inference.hypotheses import PARAMETER, PREFIX
 from fish_env.inference.left_out import left_out_scores
 from fish_env.inference.parallel import both
 from fish_env.inference.policy import POLICY
@@ -22,7 +22,7 @@ from fish_env.inference.probes import Cause, same_causes
 from fish_env.inference.problem import Problem
 from fish_env.inference.projection import Projector, Signal
 from fish_env.inference.screening import Screen, screen
-from fish_env.inference.search import refits, restart_from_winner, swap_step, without
+from fish_env.inference.search import refits, restart_from_winner, swap_step
 
 
 @dataclass(frozen=True)
@@ -299,44 +299,6 @@ def _like(winner: str, before: Screen, chosen: Sequence[Signal], problem: Proble
     alike = set(problem.known[winner].confusable_with) if winner in problem.known else set()
     known = {winner, *(s.cause.name for s in chosen)}
     return [s for s in before.best() if s.cause.name in alike - known]
-
-
-def backward_elimination(current: Explanation) -> Explanation:
-    """The explanation without causes that later ones made unnecessary.
-
-    Also without any cause whose interval, beside the others, contains its neutral value: the
-    evidence takes the residuals for white, the interval does not. Of a single cause that is the
-    only question, for its evidence has just been found enough.
-    """
-    alone = len(current.causes) == 1
-    for name in current.causes:
-        doubtful = may_not_act(current.fit, name)
-        if alone and not doubtful:
-            return current
-        smaller = without(current, name)
-        if smaller and (doubtful or smaller.score < current.score + POLICY.evidence_doubt):
-            return backward_elimination(smaller)
-    return current
-
-
-def may_not_act(fit: Fit, name: str) -> bool:
-    """Whether the 95 % region of what switches a cause on holds the values at which it is off.
-
-    The region is corrected for coloured residuals. What is off at infinity acts at any finite
-    value.
-    """
-    if name in fit.effects:
-        switching = fit.problem.known[name].switching
-        off = {f"{PREFIX}{name}.{p.name}": p.neutral for p in switching}
-    else:
-        path = name.removeprefix(PARAMETER)
-        off = {path: float(fit.problem.baseline.mean[fit.problem.baseline.paths.index(path)])}
-    if not np.isfinite(list(off.values())).all():
-        return False
-    at = [fit.names.index(path) for path in off]
-    gap = fit.estimates[at] - np.array(list(off.values()))
-    distance = gap @ np.linalg.solve(fit.covariance[np.ix_(at, at)], gap)
-    return bool(distance < chdtri(len(at), 0.05))
 
 
 def shortlisted(

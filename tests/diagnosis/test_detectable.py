@@ -43,6 +43,8 @@ class Baseline:
 class Bending:
     """Residuals that an effect and the coefficients change as a function says."""
 
+    coefficient_step = 0.05
+
     def __init__(self, change: Callable, fastest: Callable | None = None) -> None:
         self.change, self.baseline = change, Baseline()
         parameter = EffectParameter("size", "-", 0.0, 0.0, 1e3)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from fish_env.effects import catalogue
-from fish_env.inference import attribution
-from fish_env.inference.attribution import backward_elimination, may_not_act
+from fish_env.inference import elimination
+from fish_env.inference.elimination import backward_elimination, may_not_act
 
 
 def fit_of(effect, values, sd, correlation=0.0):
@@ -30,7 +30,7 @@ def fit_of(effect, values, sd, correlation=0.0):
         (fit_of("current", [0.007, 0.007, -0.007], [0.005] * 3, 0.0), True),
         (fit_of("current", [0.007, -0.007, 0.0], [0.005] * 3, 0.9), False),
         (fit_of("servo_rate_limit", [6.0], [9.0]), False),
-        (fit_of("wave", [1e-3, 0.4, 1.0, 2.0], [1e-3, 1e-6, 1e-6, 1e-6]), True),
+        (fit_of("wave", [1e-3, 0.4, 1.0, 2.0, 1.5], [1e-3, 1e-6, 1e-6, 1e-6, 1e-6]), True),
     ],
     ids=["scale", "far", "current", "weak", "all weak", "together", "infinite", "shapes"],
 )
@@ -52,10 +52,10 @@ def test_a_coefficient_is_off_at_its_nominal_value():
 
 @pytest.mark.parametrize(("value", "kept"), [(0.989, ("current",)), (0.9, ("current", "scale"))])
 def test_an_idle_cause_is_dropped_whatever_its_evidence(monkeypatch, value, kept):
-    smaller = SimpleNamespace(causes=("current",), score=50.0)
+    smaller = SimpleNamespace(causes=("current",), score=50.0, fit=0.0)
     both = SimpleNamespace(causes=("current", "scale"), score=0.0, fit=value)
     monkeypatch.setattr(
-        attribution, "without", lambda e, name: smaller if name == "scale" else None
+        elimination, "without", lambda e, name: smaller if name == "scale" else None
     )
-    monkeypatch.setattr(attribution, "may_not_act", lambda fit, name: fit > 0.95)
+    monkeypatch.setattr(elimination, "may_not_act", lambda fit, name: fit > 0.95)
     assert backward_elimination(both).causes == kept

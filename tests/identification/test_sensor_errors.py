@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fish_env.identification.sensor_errors import SENSOR_ERRORS, innovation_slopes, sensor_slopes
+from fish_env.identification.sensor_errors import innovation_slopes, sensor_slopes
 from fish_env.identification.series import SeriesProblem
+from fish_env.identification.variation import SENSOR_ERRORS
 from fish_env.inference.problem import Point
 from tests.identification.synthetic import PATHS, Setup, simulate
 

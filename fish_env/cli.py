@@ -393,8 +393,7 @@ def _run() -> None:
 def _complain(colour: str, text: str) -> None:
     from fish_env.reading import printable
 
-    line = f"[{colour}]{escape(printable(text))}[/{colour}]"
-    Console(stderr=True, soft_wrap=True).print(line)
+    Console(stderr=True, soft_wrap=True).print(escape(printable(text)), style=colour)
 
 
 if __name__ == "__main__":

@@ -56,7 +56,7 @@ def test_swimming_in_a_current_is_swimming_in_a_moving_frame():
 
 def test_a_wave_heaves_the_fish_less_the_deeper_it_swims():
     """Up and down with its period, in phase with the episode's clock, decaying with depth."""
-    wave = {"amplitude": 0.2, "frequency": 0.5, "decay": 1.0}
+    wave = {"amplitude": 0.2, "frequency": 0.5}
     swings = []
     for depth in (0.5, 2.5):
         env = RoboticFish3DEnv(wave=wave, config=DEEP)

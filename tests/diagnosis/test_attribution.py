@@ -150,6 +150,7 @@ def test_relatives_of_an_accepted_cause_are_tried_along_with_what_shows_next(mon
     )
     accepted = SimpleNamespace(causes=("servo_delay",), fit=fit, score=0.0)
     begun = attribution.Attribution(accepted, (screens,), accepted, (), (), 0.0)
+    monkeypatch.setattr(attribution, "backward_elimination", lambda e: e)
     for shown, expected in (([echo], ["block_lag", "sensor_delay"]), ([], [])):
         monkeypatch.setattr(attribution, "shortlisted", lambda *a, shown=shown: [*shown])
         attribution.extended(begun, (), None)

@@ -15,7 +15,9 @@ from fish_env.inference.starts import starts
 from tests.identification.synthetic import Setup, simulate
 
 SCALE = "effects.frequency_scale.scale"
-DETUNING = sorted(name for name, effect in catalogue().items() if effect.drifts_in_phase)
+DETUNING = sorted(
+    name for name, effect in catalogue().items() if effect.drifts_in_phase and effect.diagnosed
+)
 
 
 def out_of_step(scale):

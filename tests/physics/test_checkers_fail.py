@@ -31,7 +31,9 @@ SKEWED = {"flow_xy.s, flow_xy.cosine": "abs(flow_xy.s), flow_xy.cosine"}
 TAIL_TO_ONE_SIDE = {"arm, normal = tail_arm(tail, fish)": (
     "arm, normal = tail_arm(tail, fish)\n    arm = arm._replace(y=abs(arm.y))"
 )}  # fmt: skip
-UNTURNED_FLOW = {"velocity, omega, attitude, flow)": "velocity, omega, attitude, water)"}
+UNTURNED_FLOW = {
+    "velocity, omega, attitude, flow, flow_rate)": "velocity, omega, attitude, water, flow_rate)"
+}
 FLOW_IN_INERTIA = {
     "inertial = inertial_wrench(motion, centre)": (
         "inertial = inertial_wrench(\n        motion._replace(ground_u=motion.u, "

@@ -7,7 +7,11 @@ from fish_env.simulator import InitialState, Simulator
 from tests.physics import checkers
 from tests.physics.cases import ALL_EFFECTS, SWIM, TUMBLE, WATER_EFFECTS, swimmer
 
-NO_CURRENT_ACROSS = {**ALL_EFFECTS, "current": {"down": 0.05}}
+NO_CURRENT_ACROSS = {
+    **ALL_EFFECTS,
+    "current": {"down": 0.05},
+    "wave": {**ALL_EFFECTS["wave"], "heading": 0.0},
+}
 
 
 @pytest.mark.parametrize("effects", [None, NO_CURRENT_ACROSS], ids=["baseline", "effects"])

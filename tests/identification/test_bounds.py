@@ -18,8 +18,9 @@ from fish_env.inference.estimate.bounds import (
 from fish_env.inference.estimate.fit import fit, gauss_newton
 from fish_env.inference.estimate.free import Free, objective
 from fish_env.inference.policy import POLICY
+from fish_env.inference.problem import Point
 from fish_env.params import load_fish
-from tests.identification.synthetic import Setup, simulate
+from tests.identification.synthetic import PATHS, Setup, simulate
 
 FISH = "msu-tail-fish"
 PAIR = ("mass.total", "mass.buoyancy")
@@ -126,3 +127,13 @@ def test_no_fit_goes_where_no_fish_can_be():
     assert objective(problem, free, impossible, noise) == (np.inf, [])
     with pytest.raises(np.linalg.LinAlgError):
         gauss_newton(problem, free, impossible, noise, 3, 0.1)
+
+
+def test_what_is_infinite_begins_at_its_mildest_plausible_value():
+    """No derivative leads away from infinity, and one infinite number spoils every bound."""
+    problem = SeriesProblem(simulate(Setup(runs=1, duration=2.0)), paths=PATHS)
+    free = Free(problem, ["wave"], ())
+    off = Point(np.zeros(len(PATHS)), problem.neutral(["wave"]))
+    assert np.isinf(list(off.effects.values())).any()
+    vector = free.bounds.clip(free.pack(off))
+    assert np.isfinite(vector).all()

@@ -17,6 +17,7 @@ from fish_env.inference.estimate.bounds import LinearBounds, parameter_bounds
 from fish_env.inference.estimate.information import prior_precision
 from fish_env.inference.estimate.run_variation import Marginal
 from fish_env.inference.problem import Evaluation, Point, Problem
+from fish_env.inference.vehicle import finite_values
 
 P = TypeVar("P", bound=Problem)
 SHORTEST = 0.02
@@ -82,8 +83,10 @@ class Free:
         self.nonsmooth = problem.refines_steps((*(f.path for f in self.freedoms), *self.held))
 
     def pack(self, point: Point) -> FloatArray:
-        """The vector (n,) of a point."""
-        return np.asarray(np.r_[point.z, [point.effects[f.path] for f in self.freedoms]], float)
+        """The vector (n,) of a point; of what is infinite, the mildest plausible value."""
+        own = {f.path: point.effects[f.path] for f in self.freedoms}
+        values = finite_values(self.problem.known, own)
+        return np.asarray(np.r_[point.z, [values[f.path] for f in self.freedoms]], float)
 
     def unpack(self, vector: FloatArray) -> Point:
         """The point of a vector (n,)."""

@@ -34,8 +34,8 @@ class Effort:
 
     @property
     def reduced(self) -> Effort:
-        """The same with fewer causes tried, and what was found not questioned."""
-        return replace(self, shortlist=3, finalists=2, retries=False)
+        """The same with fewer causes tried, one fitted, and what was found not questioned."""
+        return replace(self, shortlist=3, finalists=1, retries=False)
 
 
 PICTURES = "figures as PNG"

@@ -12,8 +12,10 @@ from fish_env.data import Dataset, load_dataset, write_dataset
 from fish_env.diagnosis.answer import words
 from fish_env.diagnosis.inputs import check as check_module
 from fish_env.diagnosis.inputs import search as search_module
+from fish_env.diagnosis.inputs.changes import Change
 from fish_env.diagnosis.inputs.check import check_inputs, refuse_wrong_inputs
 from fish_env.diagnosis.inputs.lines import Lines
+from fish_env.diagnosis.inputs.search import Found
 from fish_env.diagnosis.report.measurements import input_checks
 from fish_env.errors import DatasetError
 from fish_env.params import load_fish
@@ -70,6 +72,13 @@ def test_a_mistake_is_found_and_named_with_its_line(sensors, name):
     faults = told(mistake.applied(good))
     assert found_by(mistake, faults), [fault.said for fault in faults]
     assert all(fault.binds for fault in faults)
+
+
+@pytest.mark.parametrize(("after", "decisive"), [(0.32, False), (0.05, True)])
+def test_a_unit_that_leaves_most_of_the_disagreement_is_a_fish_of_another_speed(after, decisive):
+    """0.57 and 0.32 are those of a real fish that is slower than its file."""
+    change = Change("unit", "x", 0.1, "mm", "channels: {x: mm}", "x is in mm", channels={})
+    assert Found(change, 20.0, 1e-6, "speed", 0.57, after, ()).decisive is decisive
 
 
 def test_one_slow_clock_is_no_quick_tail():

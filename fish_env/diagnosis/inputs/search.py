@@ -20,6 +20,11 @@ FALLS = 0.2
 """By how much a mistake, put right, lowers the disagreement of some comparison.
 
 A wrong sign takes it from near 2 to near 0, a unit from 1 to near 0."""
+LEFT = 0.5
+"""Share of the disagreement of a column that may be left once it is read right.
+
+A fish whose file is wrong by a factor of two is no wrong unit: a unit that makes it better by chance
+leaves most of the disagreement."""
 LEVEL = 0.01
 """Probability by chance below which a finding is decisive."""
 RIVAL = 8.0
@@ -55,7 +60,8 @@ class Found:
     @property
     def decisive(self) -> bool:
         """Whether chance cannot have made it, and no other reading than it or its rivals can."""
-        return self.p < LEVEL and self.before - self.after > FALLS
+        enough = bool(self.change.clocks) or self.after < LEFT * self.before
+        return self.p < LEVEL and self.before - self.after > FALLS and enough
 
 
 def search(dataset: Dataset, scales: Scales) -> tuple[list[Found], Dataset]:

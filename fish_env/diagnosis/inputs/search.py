@@ -23,8 +23,8 @@ A wrong sign takes it from near 2 to near 0, a unit from 1 to near 0."""
 LEFT = 0.5
 """Share of the disagreement of a column that may be left once it is read right.
 
-A fish whose file is wrong by a factor of two is no wrong unit: a unit that makes it better by chance
-leaves most of the disagreement."""
+A fish whose file is wrong by a factor of two is no wrong unit: a unit that makes it better leaves
+most of the disagreement."""
 LEVEL = 0.01
 """Probability by chance below which a finding is decisive."""
 RIVAL = 8.0

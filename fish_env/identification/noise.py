@@ -14,6 +14,7 @@ from scipy.optimize import minimize
 from fish_env.arrays import FloatArray
 from fish_env.data.schema import Dataset
 from fish_env.identification.filtering import NoiseModel
+from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point
 from fish_env.params.schema import FishParams
 
@@ -88,6 +89,11 @@ class DisturbanceRange:
         pairs = ((force, self.force), (moment, self.moment), (correlation, self.correlation))
         return tuple(float(np.clip(value, *bounds)) for value, bounds in pairs)
 
+    def widened(self, times: float) -> DisturbanceRange:
+        """The same with a disturbance so many times as strong allowed."""
+        low, high = self.force[0], times * self.force[1]
+        return replace(self, force=(low, high), moment=(self.moment[0], times * self.moment[1]))
+
     def left_by(self, noise: NoiseModel) -> tuple[str, ...]:
         """How a noise model's disturbance is at the end of this range, in words."""
         found = []
@@ -129,7 +135,8 @@ def fitted_noise(
         noise: the present noise model.
         largest_sensor_sd: as :func:`fit_noise` takes it.
     """
-    within = disturbance_range(problem.fish)
+    # What is missing shows in whitened residuals only if the noise is as large as what is missing.
+    within = disturbance_range(problem.fish).widened(POLICY.largest_disturbance)
     found = noise
     for _ in range(3):
         runs, made_with = problem.filtered(point, found, keep_slopes=True), found

@@ -10,7 +10,7 @@ share is a cause, to be found and named.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -38,27 +38,41 @@ cent, for a hundred independent residuals a run."""
 FEWEST = 3
 
 
-def own_beats(problem: SeriesProblem) -> Mapping[str, float]:
-    """Tail frequency of runs over that of all of them, by id; runs that do not differ are left out.
+@dataclass(frozen=True)
+class OwnBeats:
+    """Tail frequencies that suit runs best.
+
+    Attributes:
+        common: frequency over the commanded one, of all runs together; 1 where none is clear.
+        own: frequency over that of all runs, by run id; runs that do not differ are left out.
+    """
+
+    common: float = 1.0
+    own: Mapping[str, float] = field(default_factory=dict)
+
+
+def own_beats(problem: SeriesProblem) -> OwnBeats:
+    """Tail frequencies of runs by a comb of them.
 
     Args:
         problem: all runs, those that are kept for judging too.
     """
     free = problem.with_runs([_with_free_phase(run) for run in problem.runs])
     if len(free.runs) < FEWEST or "frequency_scale" in free.model.effects:
-        return {}
+        return OwnBeats()
     coarse = _left(free.until(BEGINNING_S), COARSE)
     if coarse is None:
-        return {}
+        return OwnBeats()
     comb = COARSE[int(np.argmin(coarse.sum(axis=1)))] + COMB
     left = _left(free, comb)
     if left is None:
-        return {}
+        return OwnBeats()
     total = left.sum(axis=1)
     common = int(np.argmin(total))
     if not 0 < common < len(comb) - 1:
-        return {}
-    together, found = _minimum(total, comb, common), {}
+        return OwnBeats()
+    together = _minimum(total, comb, common)
+    found = {}
     for run, mine in zip(free.runs, left.T, strict=True):
         own = int(np.argmin(mine))
         if not 0 < own < len(comb) - 1 or mine[own] > (1.0 - CLEARLY) * mine[common]:
@@ -66,19 +80,20 @@ def own_beats(problem: SeriesProblem) -> Mapping[str, float]:
         beat = _minimum(mine, comb, own) / together
         if abs(beat - 1.0) >= LEAST:
             found[run.id] = beat
-    return found
+    return OwnBeats(together, found)
 
 
-def with_own_beats(problem: SeriesProblem, own: Mapping[str, float]) -> SeriesProblem:
+def with_own_beats(problem: SeriesProblem, beats: OwnBeats) -> SeriesProblem:
     """The problem with commands as each run's own tail follows them, and its starting phase free.
 
     Args:
         problem: some of the runs.
-        own: tail frequency over that of all runs, by run id.
+        beats: what runs beat at. What they share is told to the problem and left to its effects.
     """
-    if not own:
-        return problem
-    return problem.with_runs([_beating(run, own.get(run.id, 1.0)) for run in problem.runs])
+    if beats.own:
+        runs = [_beating(run, beats.own.get(run.id, 1.0)) for run in problem.runs]
+        problem = problem.with_runs(runs)
+    return problem.with_beat(beats.common)
 
 
 def _beating(run: RunData, beat: float) -> RunData:

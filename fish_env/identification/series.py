@@ -53,6 +53,11 @@ RANDOM_WALK_PHASE = 0.3
 """rad/s^0.5. Enough to stay in step with a beat that is a tenth off."""
 
 
+BESIDE_MEASURED = (-6e-3, -3e-3, 0.0, 3e-3, 6e-3)
+"""Departures from the measured beat that a fit begins from: less than a third of a cycle in a run
+of a minute."""
+
+
 class SeriesProblem(Problem):
     """Measured runs of a fish, the model that should explain them, and its freedom.
 
@@ -101,6 +106,7 @@ class SeriesProblem(Problem):
         self.baseline = Baseline(self.fish, paths)
         self.effects = tuple(effects)
         self.unrefined = False
+        self.beat = 1.0
         self._filters: dict[frozenset[str], RunFilter] = {}
         unknown = [name for name in self.effects if name not in self.known]
         if unknown:
@@ -247,8 +253,24 @@ class SeriesProblem(Problem):
         return noise.phase_sd > 0.0
 
     def starting_grid(self, name: str) -> tuple[Mapping[str, float], ...]:
-        """Sizes of an effect that drifts in phase, close enough to put it in step again."""
-        return phase_grid(self.known[name], max(run.beats for run in self.runs))
+        """Sizes of an effect that drifts in phase, close enough to put it in step again.
+
+        Where the phase at the start is unknown every size would have its own: then those around
+        the beat that was measured.
+        """
+        effect = self.known[name]
+        if self.starts_known:
+            return phase_grid(effect, max(run.beats for run in self.runs))
+        scales = [p for p in effect.switching if p.neutral == 1.0 and p.unit == "-"]
+        if not effect.drifts_in_phase or len(scales) != 1:
+            return ()
+        return tuple({scales[0].name: self.beat + off} for off in BESIDE_MEASURED)
+
+    def with_beat(self, beat: float) -> SeriesProblem:
+        """The same problem, told at what multiple of the commanded frequency all runs beat."""
+        other = copy(self)
+        other.beat = beat
+        return other
 
     def batch_key(self, effects: Iterable[str]) -> frozenset[str]:
         """Stages of the quickest kernel: settings of one kind pay for no effects of another."""
@@ -351,8 +373,15 @@ class SeriesProblem(Problem):
 
     def without_refinement(self) -> SeriesProblem:
         """The same problem without finer steps for effects that make the tail's rate jump."""
+        return self._refining(False)
+
+    def with_refinement(self) -> SeriesProblem:
+        """The same problem with finer steps for effects that make the tail's rate jump."""
+        return self._refining(True)
+
+    def _refining(self, refining: bool) -> SeriesProblem:
         other = copy(self)
-        other.unrefined = True
+        other.unrefined = not refining
         return other
 
     def with_long_steps(self) -> SeriesProblem:

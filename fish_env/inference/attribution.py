@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -13,16 +13,19 @@ from fish_env.arrays import FloatArray
 from fish_env.inference.adequacy import disturbance_at_limit, implausible_estimates
 from fish_env.inference.effort import FULL, Effort
 from fish_env.inference.elimination import backward_elimination
-from fish_env.inference.estimate.fit import Fit, finished, with_run_variation
+from fish_env.inference.estimate.fit import Fit, finished, refined
 from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.left_out import left_out_scores
+from fish_env.inference.many_causes import challenged, pursue
 from fish_env.inference.parallel import both
 from fish_env.inference.policy import POLICY
-from fish_env.inference.probes import Cause, same_causes
+from fish_env.inference.probes import Cause
 from fish_env.inference.problem import Problem
-from fish_env.inference.projection import Projector, Signal
+from fish_env.inference.projection import Signal
+from fish_env.inference.rivals import explained_away, rivals_of, tied
 from fish_env.inference.screening import Screen, screen
-from fish_env.inference.search import refits, restart_from_winner, swap_step
+from fish_env.inference.search import refits, restart_from_winner
+from fish_env.inference.shortlist import shortlisted
 
 
 @dataclass(frozen=True)
@@ -121,101 +124,142 @@ def extended(
         relaxed_log_p: added to the log p-value that makes a cause significant, where the adequacy
             test says that something is missing.
     """
-    problem = begun.baseline.fit.problem
-    current, screens = begun.accepted, [*begun.screens]
-    rivals, ranking = begun.rivals, begun.ranking
-    total, rough = begun.gain, roughness(current)
-    whole_effort, failed = effort, begun.failed
-    while len(current.causes) < POLICY.most_causes and not any(tied(current, e) for e in rivals):
-        effort = (
-            whole_effort if len(current.causes) < POLICY.thorough_causes else whole_effort.reduced
-        )
-        found = len(current.fit.released)
-        chosen = shortlisted(
-            problem, screens[-1], effort.shortlist, rough * total, relaxed_log_p, found
-        )
-        chosen = [signal for signal in chosen if signal.cause.name not in failed]
-        relatives: list[Signal] = []
-        for name in current.causes if chosen and effort.retries else ():
-            # A cause that resembles an accepted one may be absorbed by its estimates.
-            relatives += _like(name, screens[-1], [*chosen, *relatives], problem)
-        unseen = [*relatives, *_drifting(current, screens[-1], chosen)]
-        relaxed = _under_relaxed_noise(current, chosen, causes, rng) if effort.retries else None
-        like = partial(_like, before=screens[-1], chosen=[*chosen, *unseen], problem=problem)
-        tried, base = refits(current, chosen, report, relaxed, effort, like, unseen)
-        if base is None:
+    found, many = begun, effort.retries
+    search = Search(causes, rng, effort, report, relaxed_log_p)
+    while len(found.accepted.causes) < POLICY.most_causes:
+        more = search.together(found) if found.accepted.causes and many else None
+        if more is None and not any(tied(found.accepted, e) for e in found.rivals):
+            more = search.contest(found)
+        if more is None or more.accepted.causes == found.accepted.causes:
+            found = more or found
             break
-        if current.causes and not implausible_estimates(current.fit):
-            tried = [e for e in tried if not implausible_estimates(e.fit)]
-            if not tried:
-                failed |= {signal.cause.name for signal in chosen}
-                break
-        if not ranking:
-            ranking = ranking_of(tried, base)
-        gain = base.score - tried[0].score
-        if gain < max(POLICY.evidence_doubt, rough * total):
-            failed |= {signal.cause.name for signal in chosen}
-            break
-        total, failed = total + gain, frozenset()
-        after = screen(tried[0].fit, causes, rng)
-        rough = roughness(tried[0])
-        if effort.retries and shortlisted(problem, after, 1, rough * total):
-            others = [*chosen, *relatives]
-            others += _new(after, others)
-            others += _like(tried[0].causes[-1], screens[-1], others, problem)
-            again = restart_from_winner(current, tried, others, report)
-            if again[0] is not tried[0]:
-                after = screen(again[0].fit, causes, rng)
-            tried = again
-        unsettled = rivals or shortlisted(problem, after, 1)
-        swapped: Sequence[Explanation] = ()
-        if effort.retries and len(tried[0].causes) > 1 and unsettled:
-            swapped = swap_step(tried[0], after.best(), report)
-            if swapped[0] is not tried[0]:
-                after, tried = screen(swapped[0].fit, causes, rng), [swapped[0]]
-        current = _varied(tried[0])
-        if current is not tried[0]:
-            after = screen(current.fit, causes, rng)
-        rough = roughness(current)
-        screens.append(after)
-        others_like = [e for e in tried[1:] if explained_away(e.causes[-1], screens[-2], after)]
-        rivals = rivals_of(current, [*others_like, *swapped[1:]])
-    found_causes = current.causes
-    current = backward_elimination(current)
-    failed = failed if current.causes == found_causes else frozenset()
-    if current.causes and whole_effort.retries:
-        final = reached(partial(finished, current.fit))
+        found = more
+    return settled(found, many)
+
+
+def settled(found: Attribution, thoroughly: bool) -> Attribution:
+    """The attribution without causes that are not needed, its estimates fitted to the end.
+
+    Args:
+        found: what the search has found.
+        thoroughly: whether estimates are to be published.
+    """
+    current = backward_elimination(found.accepted)
+    failed = found.failed if current.causes == found.accepted.causes else frozenset()
+    if current.causes and thoroughly:
+        final = reached(lambda: finished(refined(current.fit)))
         current = Explanation(current.causes, final) if final else current
     # A rival that contains the accepted causes is no rival once a cause is dropped.
-    rivals = tuple(e for e in rivals if not set(current.causes) <= set(e.causes))
-    return Attribution(begun.baseline, tuple(screens), current, rivals, ranking, total, failed)
+    rivals = tuple(e for e in found.rivals if not set(current.causes) <= set(e.causes))
+    return replace(found, accepted=current, rivals=rivals, failed=failed)
 
 
-def _varied(explanation: Explanation) -> Explanation:
-    """The explanation with what the runs differ in as it shows now that more is explained."""
-    found = reached(partial(with_run_variation, explanation.fit))
-    if found is None or found is explanation.fit:
-        return explanation
-    return Explanation(explanation.causes, found)
+@dataclass(frozen=True, eq=False)
+class Search:
+    """How causes are added to an attribution.
 
-
-def rivals_of(best: Explanation, others: Iterable[Explanation]) -> tuple[Explanation, ...]:
-    """Those of other explanations that the runs cannot tell from the best one."""
-    return tuple(
-        e
-        for e in others
-        if alike(best, e)
-        and not same_causes(best.fit.problem, best.causes, e.causes)
-        and not implausible_estimates(e.fit)
-    )
-
-
-def tied(best: Explanation, other: Explanation) -> bool:
-    """Whether the evidence for two explanations is the same, whatever the colour of the residuals.
-
-    If it is not, a further missing cause may hide the difference: that cause is sought first.
+    Attributes:
+        causes: causes to consider.
+        rng: for null distributions.
+        effort: how much to spend.
+        report: told what is being done.
+        relaxed_log_p: added to the log p-value that makes a cause significant.
     """
-    return other.score - best.score < POLICY.evidence_doubt
+
+    causes: Sequence[Cause]
+    rng: np.random.Generator
+    effort: Effort
+    report: Callable[[str], None]
+    relaxed_log_p: float
+
+    def together(self, found: Attribution) -> Attribution | None:
+        """With further effects that are needed beside those found; None without such."""
+        before, rough = found.accepted, roughness(found.accepted)
+        current, after = pursue(
+            before, found.screens[-1], self.causes, self.rng, self.report,
+            rough * found.gain, self.relaxed_log_p,
+        )  # fmt: skip
+        if current.causes == before.causes:
+            return None
+        gain = found.gain + before.score - current.score
+        current, rivals = challenged(current, after, found.rivals, self.report)
+        return replace(
+            found, accepted=current, rivals=rivals, screens=(*found.screens, after), gain=gain,
+            failed=frozenset(),
+        )  # fmt: skip
+
+    def contest(self, found: Attribution) -> Attribution | None:
+        """With the best of all causes that show; the same if it explains too little, None if none.
+
+        Beside causes only coefficients compete, and only under a plausible disturbance: effects are
+        found together, and what else is missing pulls at coefficients.
+        """
+        current, effort = found.accepted, self.effort
+        problem, shown = current.fit.problem, found.screens[-1]
+        least = roughness(current) * found.gain
+        if current.causes and effort.retries:
+            effort = effort.reduced
+            if disturbance_at_limit(current.fit):
+                return None
+        chosen = shortlisted(
+            problem, shown, effort.shortlist, least, self.relaxed_log_p, len(current.fit.released)
+        )
+        if current.causes and self.effort.retries:
+            chosen = [signal for signal in chosen if not signal.cause.is_effect]
+        chosen = [signal for signal in chosen if signal.cause.name not in found.failed]
+        tried, base = self._tried(current, chosen, shown, effort)
+        if base is None:
+            return None
+        ranking = found.ranking or ranking_of(tried, base)
+        if current.causes and not implausible_estimates(current.fit):
+            tried = [e for e in tried if not implausible_estimates(e.fit)]
+        gain = base.score - tried[0].score if tried else 0.0
+        if gain < max(POLICY.evidence_doubt, least):
+            failed = found.failed | {signal.cause.name for signal in chosen}
+            return replace(found, ranking=ranking, failed=failed)
+        best, others, after = self._questioned(current, tried, chosen, shown, found.gain + gain)
+        others = [e for e in others if explained_away(e.causes[-1], shown, after)]
+        return replace(
+            found, accepted=best, screens=(*found.screens, after), ranking=ranking,
+            rivals=rivals_of(best, others), gain=found.gain + gain, failed=frozenset(),
+        )  # fmt: skip
+
+    def _tried(
+        self, current: Explanation, chosen: Sequence[Signal], shown: Screen, effort: Effort
+    ) -> tuple[list[Explanation], Explanation | None]:
+        """Full fits with one cause more, and the present one under the best one's noise."""
+        unseen = _drifting(current, shown, chosen)
+        relaxed = None
+        if effort.retries:
+            relaxed = _under_relaxed_noise(current, chosen, self.causes, self.rng)
+        problem = current.fit.problem
+        like = partial(_like, before=shown, chosen=[*chosen, *unseen], problem=problem)
+        return refits(current, chosen, self.report, relaxed, effort, like, unseen)
+
+    def _questioned(
+        self,
+        current: Explanation,
+        tried: list[Explanation],
+        chosen: Sequence[Signal],
+        shown: Screen,
+        total: float,
+    ) -> tuple[Explanation, list[Explanation], Screen]:
+        """The best explanation, the others, and the screen of the best.
+
+        The others begin again from where the best one is, if it leaves something.
+        """
+        best = tried[0]
+        after = screen(best.fit, self.causes, self.rng)
+        problem, least = best.fit.problem, roughness(best) * total
+        if self.effort.retries and not current.causes and shortlisted(problem, after, 1, least):
+            others = [*chosen]
+            others += _new(after, others)
+            others += _like(best.causes[-1], shown, others, problem)
+            tried = restart_from_winner(current, tried, others, self.report)
+        varied = tried[0].varied()
+        if varied is not best:
+            after = screen(varied.fit, self.causes, self.rng)
+        return varied, tried[1:], after
 
 
 def ranking_of(tried: Sequence[Explanation], base: Explanation) -> tuple[Ranked, ...]:
@@ -299,74 +343,3 @@ def _like(winner: str, before: Screen, chosen: Sequence[Signal], problem: Proble
     alike = set(problem.known[winner].confusable_with) if winner in problem.known else set()
     known = {winner, *(s.cause.name for s in chosen)}
     return [s for s in before.best() if s.cause.name in alike - known]
-
-
-def shortlisted(
-    problem: Problem,
-    screen: Screen,
-    count: int,
-    least: float = 0.0,
-    relaxed_log_p: float = 0.0,
-    found: int = 0,
-) -> list[Signal]:
-    """The most significant causes, and among the others those known to look like the first.
-
-    Effects and coefficients are two lists: what the tests of the two make of a large misfit does
-    not compare. A strong effect is screened far from where it is, so its place among its like
-    means little.
-
-    Args:
-        problem: what is fitted.
-        screen: all causes against the present explanation.
-        count: how many effects to try.
-        least: statistic below which a simulation error explains a cause.
-        relaxed_log_p: added to the log p-value that makes a cause significant.
-        found: coefficients in the present explanation.
-    """
-    strong = [s for s in screen.best() if s.statistic >= least]
-    effects = [
-        s for s in strong if s.cause.is_effect and s.log_p < screen.threshold + relaxed_log_p
-    ]
-    lifted = [s for s in strong if not s.cause.is_effect]
-    enough = _threshold_of_coefficients(screen, found) + relaxed_log_p
-    coefficients = [s for s in lifted if s.log_p < enough]
-    first = problem.known.get(effects[0].cause.name) if effects else None
-    alike = set(first.confusable_with) if first else set()
-    like_first = [s for s in effects[count:] if s.cause.name in alike]
-    return [*effects[:count], *like_first, *coefficients[: max(1, count // 2)]]
-
-
-def _threshold_of_coefficients(screen: Screen, found: int) -> float:
-    """Log p-value that makes a coefficient significant.
-
-    The first has to stand out among all causes. A parameter file that is wrong in one place is
-    often wrong in several, so the next ones are judged among coefficients alone, and the share of
-    false names is bounded (Benjamini and Hochberg, 1995).
-    """
-    if not found:
-        return screen.threshold
-    count = sum(not s.cause.is_effect for s in screen.signals) + found
-    return max(screen.threshold, float(np.log(screen.level * (found + 1) / count)))
-
-
-def explained_away(cause: str, before: Screen, after: Screen) -> bool:
-    """Whether a cause lost most of its evidence when another was accepted.
-
-    If it did not, the two explain different parts of the data: it is a further cause, no rival.
-    """
-    evidence = {s.cause.name: s.statistic for s in before.best()}
-    left = {s.cause.name: s.statistic for s in after.best()}
-    return left.get(cause, 0.0) < 0.5 * evidence.get(cause, np.inf)
-
-
-def alike(best: Explanation, other: Explanation) -> bool:
-    """Whether two explanations cannot be told apart on these runs.
-
-    They are alike when the evidence differs by less than :data:`DOUBT`, counted as the screen
-    counts it: with coloured residuals, divided by the variance inflation of the difference.
-    """
-    gap = other.score - best.score
-    left, there = best.fit.linearised.residuals, other.fit.linearised.residuals
-    apart = (there - left)[:, None]
-    noise = left - apart[:, 0] * (apart[:, 0] @ left) / max(float(apart[:, 0] @ apart[:, 0]), 1e-12)
-    return bool(gap < POLICY.evidence_doubt * Projector(best.fit).variance_inflation(apart, noise))

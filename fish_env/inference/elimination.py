@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 from scipy.special import chdtri
 
+from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import PARAMETER, PREFIX
 from fish_env.inference.policy import POLICY
 from fish_env.inference.search import without
+from fish_env.inference.tails import chi2_log_tail
 
 
 def backward_elimination(current: Explanation) -> Explanation:
@@ -21,13 +25,23 @@ def backward_elimination(current: Explanation) -> Explanation:
     """
     alone = len(current.causes) == 1
     for name in current.causes:
+        if not alone and surely_acts(current.fit, name):
+            continue
         doubtful = may_not_act(current.fit, name)
         if alone and not doubtful:
             return current
-        smaller = without(current, name)
+        smaller = without(current, (name,))
         if smaller and (doubtful or smaller.score < current.score + POLICY.evidence_doubt):
             return backward_elimination(smaller)
     return current
+
+
+def surely_acts(fit: Fit, name: str) -> bool:
+    """Whether a cause is so many standard errors from doing nothing that no fit need tell."""
+    off = off_values(fit, name)
+    if not np.isfinite(list(off.values())).all():
+        return False
+    return _from_off(fit, off) > POLICY.sure_sd**2
 
 
 def may_not_act(fit: Fit, name: str) -> bool:
@@ -36,15 +50,61 @@ def may_not_act(fit: Fit, name: str) -> bool:
     The region is corrected for coloured residuals. What is off at infinity acts at any finite
     value.
     """
-    if name in fit.effects:
-        switching = fit.problem.known[name].switching
-        off = {f"{PREFIX}{name}.{p.name}": p.neutral for p in switching}
-    else:
-        path = name.removeprefix(PARAMETER)
-        off = {path: float(fit.problem.baseline.mean[fit.problem.baseline.paths.index(path)])}
+    off = off_values(fit, name)
     if not np.isfinite(list(off.values())).all():
         return False
+    return bool(_from_off(fit, off) < chdtri(len(off), 0.05))
+
+
+def insignificant(fit: Fit, causes: Sequence[str], threshold: float) -> tuple[str, ...]:
+    """Causes that are not significant beside the others, the weakest dropped before the next.
+
+    Told by the covariance, which is corrected for coloured residuals: estimates of the others move
+    in a linear model as one is dropped. What is off at infinity is not judged.
+
+    Args:
+        fit: with all causes.
+        causes: their names.
+        threshold: log p-value that each has to pass.
+    """
+    at = {name: off_values(fit, name) for name in causes}
+    judged = {name: off for name, off in at.items() if np.isfinite(list(off.values())).all()}
+    estimates, covariance = fit.estimates.copy(), fit.covariance.copy()
+    dropped: list[str] = []
+    while judged:
+        log_p = {}
+        for name, off in judged.items():
+            own = [fit.names.index(path) for path in off]
+            gap = estimates[own] - np.array(list(off.values()))
+            distance = _distance(gap, covariance[np.ix_(own, own)])
+            log_p[name] = float(chi2_log_tail(distance, len(own)))
+        weakest = max(log_p, key=lambda name: log_p[name])
+        if log_p[weakest] < threshold:
+            break
+        off = judged.pop(weakest)
+        own = [fit.names.index(path) for path in off]
+        pull = covariance[:, own] @ np.linalg.inv(covariance[np.ix_(own, own)])
+        estimates -= pull @ (estimates[own] - np.array(list(off.values())))
+        covariance -= pull @ covariance[own]
+        dropped.append(weakest)
+    return tuple(dropped)
+
+
+def _from_off(fit: Fit, off: Mapping[str, float]) -> float:
+    """Squared distance of estimates from where a cause is off, in standard errors."""
     at = [fit.names.index(path) for path in off]
     gap = fit.estimates[at] - np.array(list(off.values()))
-    distance = gap @ np.linalg.solve(fit.covariance[np.ix_(at, at)], gap)
-    return bool(distance < chdtri(len(at), 0.05))
+    return _distance(gap, fit.covariance[np.ix_(at, at)])
+
+
+def _distance(gap: FloatArray, covariance: FloatArray) -> float:
+    return float(gap @ np.linalg.solve(covariance, gap))
+
+
+def off_values(fit: Fit, name: str) -> dict[str, float]:
+    """Path -> value, of what switches a cause on, at which it is off."""
+    if name in fit.effects:
+        switching = fit.problem.known[name].switching
+        return {f"{PREFIX}{name}.{p.name}": p.neutral for p in switching}
+    path = name.removeprefix(PARAMETER)
+    return {path: float(fit.problem.baseline.mean[fit.problem.baseline.paths.index(path)])}

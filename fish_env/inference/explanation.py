@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TypeVar
 
 import numpy as np
 
 from fish_env.arrays import FloatArray
-from fish_env.inference.estimate.fit import Fit, fit
+from fish_env.inference.estimate.fit import Fit, fit, with_run_variation
 from fish_env.inference.estimate.information import information, prior_precision
 from fish_env.inference.policy import POLICY
 
@@ -44,6 +44,18 @@ class Explanation:
             return None
         few = own.problem.subset(3)
         return reached(lambda: fit(few, own.effects, own.point, noise, own.released, rounds=2))
+
+    def varied(self, beside_misfit: bool = False, dropped: Collection[str] = ()) -> Explanation:
+        """The same causes with what the runs differ in, as it shows now that more is explained.
+
+        Args:
+            beside_misfit: keep the variation also where something else is missing.
+            dropped: effects that are no longer among the causes.
+        """
+        found = reached(partial(with_run_variation, self.fit, beside_misfit, dropped))
+        if found is None or found is self.fit:
+            return self
+        return Explanation(tuple(c for c in self.causes if c not in dropped), found)
 
     def extrapolated(self) -> Explanation:
         """The same causes, with estimates as ever finer steps put them."""

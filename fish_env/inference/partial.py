@@ -9,9 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from fish_env.inference.adequacy import disturbance_at_limit, implausible_estimates
+from fish_env.inference.adequacy import implausible_estimates
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.explanation import Explanation
+from fish_env.inference.hypotheses import PARAMETER
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Problem
 from fish_env.inference.result import ResidualModel
@@ -24,43 +25,47 @@ Describe = Callable[[Fit, float, Problem | None], ResidualModel | None]
 def confirmed(accepted: Explanation, threshold: float, describe: Describe) -> Explanation | None:
     """The explanation with those of its causes that no sum of generic forces can stand in for.
 
+    What is left may be a disturbance of implausible strength: it is estimated with the rest, and
+    the evidence for a cause is counted beside it.
+
     Args:
         accepted: causes that explain part of the data.
         threshold: log p-value that a generic force has to pass.
         describe: models what a fit leaves.
 
     Returns:
-        The causes that are left with their fit. None where none is, or where the disturbance is at
-        its limit even beside the generic forces: then something is missing that is neither.
+        The causes that are left with their fit; None where none is.
     """
     while accepted.causes:
-        if implausible_causes(accepted):
-            return None
-        whole = _score(accepted, threshold, describe)
-        if whole is None:
-            return None
-        gaps = {name: _gap(accepted, name, whole, threshold, describe) for name in accepted.causes}
-        weakest = min(gaps, key=lambda name: gaps[name])
-        if gaps[weakest] >= POLICY.evidence_doubt:
-            return accepted
-        smaller = without(accepted, weakest)
+        weakest = _implausible(accepted)
+        if weakest is None:
+            whole = _score(accepted, threshold, describe)
+            gaps = {n: _gap(accepted, n, whole, threshold, describe) for n in accepted.causes}
+            weakest = min(gaps, key=lambda name: gaps[name])
+            if gaps[weakest] >= POLICY.evidence_doubt:
+                return accepted
+        smaller = without(accepted, (weakest,))
         if smaller is None:
             return None
         accepted = smaller
     return None
 
 
-def implausible_causes(accepted: Explanation) -> bool:
-    """Whether an estimate of a cause is implausible."""
-    return bool(implausible_estimates(accepted.fit))
+def _implausible(accepted: Explanation) -> str | None:
+    """The first cause whose estimate is implausible; None if none is."""
+    words = implausible_estimates(accepted.fit)
+    blamed = (name for name in accepted.causes if any(_is_of(name, word) for word in words))
+    return next(blamed, None)
 
 
-def _score(explanation: Explanation, threshold: float, describe: Describe) -> float | None:
-    """-2 log evidence with the empirical model of the residual in place; None at the limit."""
+def _is_of(cause: str, word: str) -> bool:
+    return word.split(" ")[0] in (cause, cause.removeprefix(PARAMETER))
+
+
+def _score(explanation: Explanation, threshold: float, describe: Describe) -> float:
+    """-2 log evidence with the empirical model of the residual in place."""
     model = describe(explanation.fit, threshold, None)
     beside = explanation.fit if model is None else model.fit
-    if disturbance_at_limit(beside):
-        return None
     return Explanation(explanation.causes, beside).score
 
 
@@ -68,8 +73,5 @@ def _gap(
     accepted: Explanation, name: str, whole: float, threshold: float, describe: Describe
 ) -> float:
     """What -2 log evidence loses without a cause, generic forces being allowed to stand in."""
-    smaller = without(accepted, name)
-    if smaller is None:
-        return float("inf")
-    score = _score(smaller, threshold, describe)
-    return float("inf") if score is None else score - whole
+    smaller = without(accepted, (name,))
+    return float("inf") if smaller is None else _score(smaller, threshold, describe) - whole

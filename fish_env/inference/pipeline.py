@@ -108,8 +108,7 @@ def investigate(
     )
     if effort.retries and left.slight and describe:
         left = cross_validated(attribution, left, describe, report)
-    few = len(attribution.accepted.causes) < POLICY.thorough_causes
-    if effort.retries and few and not left.reached:
+    if effort.retries and not left.reached:
         attribution, left = with_weaker_causes(attribution, left, causes, rng, report)
     verdict = decide(attribution, left, shown)
     partly_known = verdict.name == "outside_library" and bool(attribution.accepted.causes)

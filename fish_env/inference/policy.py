@@ -30,13 +30,16 @@ class DecisionPolicy:
         power: of the smallest detectable sizes.
         evidence_doubt: difference of -2 log evidence that decides nothing.
         most_causes: causes that an explanation may have.
-        thorough_causes: causes that are looked for with all effort.
         worth_coarse_fit: statistic above which an effect is tried under relaxed noise.
         most_relaxed: effects tried under relaxed noise.
         coarse_fit_behind: share of the leader's gain that a finalist may lack.
         coarse_fit_leeway: difference of coarse fits in -2 log likelihood that excludes nobody.
         out_of_reach: distance to the leader beyond which a fit is given up.
         aic_penalty: what a coarse fit gains by a parameter without effect.
+        largest_disturbance: strongest disturbance while causes are missing, in plausible ones.
+        sure_sd: standard errors from neutral at which a cause is needed without a fit that tells.
+        pursuits: times that many causes are looked for together.
+        most_challenges: effects tried in full in place of one that was found among many.
         relaxed_log_p: added to the log p-value of a cause where the adequacy test fails.
         adequacy_level: share of adequate explanations that the adequacy test rejects.
         adequacy_certain: multiple of its log p-value that chance does not reach.
@@ -67,13 +70,16 @@ class DecisionPolicy:
         6.0, 0.0, 20.0, "strong evidence: Kass and Raftery (1995), JASA 90, section 3.2"
     )
     most_causes: int = _number(8, 1, 20, "specification of real robots: up to eight")
-    thorough_causes: int = _number(3, 1, 20, EFFORT)
     worth_coarse_fit: float = _number(20.0, 0.0, 100.0, EFFORT)
     most_relaxed: int = _number(4, 0, 40, EFFORT)
     coarse_fit_behind: float = _number(0.25, 0.0, 1.0, EFFORT)
     coarse_fit_leeway: float = _number(100.0, 0.0, 1e4, EFFORT)
     out_of_reach: float = _number(1000.0, 0.0, 1e5, EFFORT)
     aic_penalty: float = _number(2.0, 0.0, 10.0, "Akaike (1974), IEEE TAC 19")
+    sure_sd: float = _number(10.0, 5.0, 100.0, EFFORT)
+    pursuits: int = _number(2, 0, 10, EFFORT)
+    most_challenges: int = _number(2, 0, 20, EFFORT)
+    largest_disturbance: float = _number(20.0, 1.0, 100.0, BY_HAND)
     relaxed_log_p: float = _number(float(np.log(10.0)), 0.0, 10.0, BY_HAND)
     adequacy_level: float = _number(0.003, 1e-4, 0.1, "scripts/calibrate_adequacy.py")
     adequacy_certain: float = _number(2.0, 1.0, 10.0, "scripts/calibrate_adequacy.py: 1.0 at most")

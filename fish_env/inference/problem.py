@@ -371,6 +371,10 @@ class Problem(Protocol):
         """The same problem without finer steps for effects that are not smooth."""
         return self
 
+    def with_refinement(self) -> Problem:
+        """The same problem with finer steps for effects that are not smooth."""
+        return self
+
     def refined(self) -> tuple[Problem, int]:
         """The same problem in finer steps, and how many times finer."""
         return self, 1

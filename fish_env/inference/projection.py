@@ -71,9 +71,11 @@ class Signal(Projected):
 
     Attributes:
         variance_inflation: factor by which coloured residuals widen the score, at least 1.
+        followed: (n, m) how the free parameters of the fit follow the change in a refit.
     """
 
     variance_inflation: float
+    followed: FloatArray | None = None
 
     @property
     def statistic(self) -> float:
@@ -213,7 +215,8 @@ class Projector:
         step = np.linalg.solve(projected, score)
         remaining = self.lin.residuals + left @ step
         inflation = self.variance_inflation(left, remaining)
-        return Signal(cause, probe, left, float(energy.sum()), projected, score, inflation)
+        size = float(energy.sum())
+        return Signal(cause, probe, left, size, projected, score, inflation, followed)
 
     def variance_inflation(self, left: FloatArray, residuals: FloatArray) -> float:
         """Spread of block sums of the score against what white residuals would give.

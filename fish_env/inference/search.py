@@ -125,39 +125,36 @@ def restart_from_winner(
     return _best_first([*tried, *more], tried[0])[0]
 
 
-def swap_step(current: Explanation, left: Sequence[Signal], report: Report) -> list[Explanation]:
-    """The explanation, and the best with a similar cause in place of an earlier one, best first.
+def substituted(
+    current: Explanation, pairs: Sequence[tuple[str, Signal]], most: int, report: Report
+) -> list[Explanation]:
+    """The explanation, and others with another effect in place of one of its causes, best first.
 
-    The first cause is chosen while the others are still missing. A similar one may then win because
-    it compensates for part of them.
+    A cause is chosen while others are still missing. A similar one may then win because it
+    compensates for part of them.
 
     Args:
-        current: at least two causes; the last one was chosen in view of the others.
-        left: what every other effect would still explain.
+        current: causes with their fit.
+        pairs: cause, and the effect to try in its place.
+        most: how many to fit in full.
         report: told what is being done.
     """
     own = current.fit
     fitter = CoarseFitter(own)
     found: list[tuple[float, tuple[str, ...], CoarseFit]] = []
-    for name in current.causes[:-1]:
-        alike = own.problem.known[name].confusable_with if name in own.effects else ()
-        for signal in (s for s in left if s.cause.name in alike):
-            report(f"trying {signal.cause.name} instead of {name}")
-            causes = tuple(signal.cause.name if c == name else c for c in current.causes)
-            coarse = _swapped(fitter, own, name, signal)
-            if coarse is not None:
-                found.append((coarse.objective, causes, coarse))
-    if not found:
-        return [current]
-    _, causes, coarse = min(found, key=lambda f: f[0])
-    if coarse.objective >= fitter.base + POLICY.coarse_fit_leeway:
-        return [current]
-    report(f"fitting {' and '.join(causes)}")
-    fitted = _in_full(own.problem, coarse, own.noise)
-    if fitted is None:
-        return [current]
-    both = [current, Explanation(causes, fitted)]
-    return sorted(both, key=lambda e: e.score)
+    for name, signal in pairs:
+        report(f"trying {signal.cause.name} instead of {name}")
+        causes = tuple(signal.cause.name if c == name else c for c in current.causes)
+        coarse = _swapped(fitter, own, name, signal)
+        if coarse is not None and coarse.objective < fitter.base + POLICY.coarse_fit_leeway:
+            found.append((coarse.objective, causes, coarse))
+    others = []
+    for _, causes, coarse in sorted(found, key=lambda f: f[0])[:most]:
+        report(f"fitting {' and '.join(causes)}")
+        fitted = _at_noise(own.problem, coarse, own.noise, 4)
+        if fitted is not None:
+            others.append(Explanation(causes, fitted))
+    return sorted([current, *others], key=lambda e: e.score)
 
 
 def _swapped(fitter: CoarseFitter, own: Fit, name: str, signal: Signal) -> CoarseFit | None:
@@ -175,15 +172,15 @@ def _swapped(fitter: CoarseFitter, own: Fit, name: str, signal: Signal) -> Coars
     return min((s for s in coarse if s), key=lambda s: s.objective, default=None)
 
 
-def without(current: Explanation, name: str) -> Explanation | None:
-    """The fit when one of its causes is dropped, under the same noise model.
+def without(current: Explanation, dropped: Collection[str]) -> Explanation | None:
+    """The fit when some of its causes are dropped, under the same noise model.
 
-    None where the simulation diverges without it.
+    None where the simulation diverges without them.
     """
     own = current.fit
-    effects = tuple(e for e in own.effects if e != name)
-    released = tuple(p for p in own.released if f"parameter:{p}" != name)
-    values = {p: v for p, v in own.point.effects.items() if p.split(".")[1] != name}
+    effects = tuple(e for e in own.effects if e not in dropped)
+    released = tuple(p for p in own.released if f"parameter:{p}" not in dropped)
+    values = {p: v for p, v in own.point.effects.items() if p.split(".")[1] in effects}
     begin = Point(own.point.z, values)
     smaller = reached(
         lambda: fit(
@@ -192,7 +189,7 @@ def without(current: Explanation, name: str) -> Explanation | None:
     )
     if smaller is None:
         return None
-    return Explanation(tuple(c for c in current.causes if c != name), smaller)
+    return Explanation(tuple(c for c in current.causes if c not in dropped), smaller)
 
 
 def _coarse_fits(
@@ -263,7 +260,7 @@ def _led(
     while left:
         name, coarse = left.pop(0)
         report(f"fitting {name}")
-        leader = _in_full(base.problem, coarse, base.noise)
+        leader = in_full(base.problem, coarse, base.noise)
         if leader is not None:
             first = Explanation((*current.causes, name), leader)
             return [first, *_rest(current, left, leader, report)]
@@ -318,7 +315,8 @@ def _best_first(
     return [Explanation(ranked[0].causes, first), *others], first.noise
 
 
-def _in_full(problem: Problem, coarse: CoarseFit, noise: Any) -> Fit | None:
+def in_full(problem: Problem, coarse: CoarseFit, noise: Any) -> Fit | None:
+    """The full fit from a coarse one, first on a few runs; None where the simulation diverges."""
     few = problem.subset(3)
     first = reached(
         lambda: fit(few, coarse.effects, coarse.point, noise, coarse.released, rounds=1)

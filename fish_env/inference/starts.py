@@ -37,12 +37,9 @@ def starts(base: Fit, signal: Signal, z: FloatArray | None = None) -> list[Point
 
 
 def _on_starting_grid(base: Fit, signal: Signal) -> list[dict[str, float]]:
-    """Sizes of the starting grid, unless the filter follows the drive's phase anyway.
-
-    Nor where the phase at the start is unknown: every size would have its own.
-    """
+    """Sizes of the starting grid, unless the filter follows the drive's phase anyway."""
     problem, name = base.problem, signal.cause.name
-    if problem.follows_drive(base.noise) or not problem.starts_known:
+    if problem.follows_drive(base.noise):
         return []
     return [effect_values(problem, name, size) for size in problem.starting_grid(name)]
 

@@ -71,7 +71,7 @@ def contest(monkeypatch):
         for name, value in {
             "CoarseFitter": CoarseFitter, "_coarse_fits": sketched, "starts": lambda *a: [],
             "disturbance_at_limit": lambda fit: at_limit,
-            "_at_noise": at_noise, "_in_full": in_full, "_noise_too": noise_too,
+            "_at_noise": at_noise, "in_full": in_full, "_noise_too": noise_too,
         }.items():  # fmt: skip
             monkeypatch.setattr(search, name, value)
         monkeypatch.setattr(Explanation, "score", property(lambda self: self.fit.score))

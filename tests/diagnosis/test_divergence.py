@@ -32,8 +32,9 @@ def test_only_divergence_ends_a_fit_quietly():
 def test_a_cause_without_which_the_simulation_diverges_is_not_dropped(monkeypatch):
     monkeypatch.setattr(search, "fit", diverge)
     monkeypatch.setattr(elimination, "may_not_act", lambda fit, name: False)
+    monkeypatch.setattr(elimination, "surely_acts", lambda fit, name: False)
     both = Explanation(("a", "b"), fake())
-    assert without(both, "a") is None
+    assert without(both, ("a",)) is None
     assert elimination.backward_elimination(both) is both
 
 
@@ -46,7 +47,7 @@ def contest(monkeypatch, results, shown="abc"):
     monkeypatch.setattr(
         search, "_coarse_fits", lambda s, base, signal, *rest: [(signal, by_name[signal])]
     )
-    monkeypatch.setattr(search, "_in_full", lambda problem, s, noise: results[s.name])
+    monkeypatch.setattr(search, "in_full", lambda problem, s, noise: results[s.name])
     monkeypatch.setattr(
         search,
         "_at_noise",

@@ -5,11 +5,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fish_env.inference.attribution import alike, ranking_of
+from fish_env.inference.attribution import ranking_of
 from fish_env.inference.estimate.free import Linearised
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.left_out import left_out_scores
 from fish_env.inference.policy import POLICY
+from fish_env.inference.rivals import alike
 from tests.diagnosis.linear import COEFFICIENTS, LinearProblem, Sized
 
 LINEAR = LinearProblem(signals=2)

@@ -9,7 +9,7 @@ from fish_env.effects import catalogue
 from fish_env.inference import search
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.probes import Cause, probes_of
-from fish_env.inference.search import swap_step
+from fish_env.inference.search import substituted
 
 KNOWN = catalogue()
 
@@ -59,33 +59,30 @@ def signals(*names):
     return [SimpleNamespace(cause=Cause(n, probes_of(KNOWN[n])), probe=0) for n in names]
 
 
+def fitted(problem, coarse, noise, iterations):
+    return fit_of(coarse.effects, coarse.objective)
+
+
+def pairs(current, *names):
+    return [(current.causes[0], signal) for signal in signals(*names)]
+
+
 @pytest.mark.parametrize(
     ("reached", "kept"), [(0.0, ("servo_lag", "current")), (-90.0, ("tail_flexibility", "current"))]
 )
 def test_a_better_look_alike_takes_the_place(monkeypatch, reached, kept):
     monkeypatch.setattr(search, "CoarseFitter", Judge)
-    monkeypatch.setattr(
-        search, "_in_full", lambda problem, s, noise: fit_of(s.effects, s.objective)
-    )
+    monkeypatch.setattr(search, "_at_noise", fitted)
     effects = ("tail_flexibility", "current")
     now = Explanation(effects, fit_of(effects, reached))
-    left = signals("servo_delay", "servo_lag", "gyro_bias")  # the last looks like neither
-    assert swap_step(now, left, lambda step: None)[0].causes == kept
+    others = pairs(now, "servo_delay", "servo_lag")
+    assert substituted(now, others, 1, lambda step: None)[0].causes == kept
 
 
 def test_one_that_ends_switched_off_is_tried_from_each_size(monkeypatch):
     monkeypatch.setattr(search, "CoarseFitter", Passing)
-    monkeypatch.setattr(
-        search, "_in_full", lambda problem, s, noise: fit_of(s.effects, s.objective)
-    )
+    monkeypatch.setattr(search, "_at_noise", fitted)
     effects = ("tail_flexibility", "current")
     now = Explanation(effects, fit_of(effects, 0.0))
-    found = swap_step(now, signals("servo_lag"), lambda step: None)
+    found = substituted(now, pairs(now, "servo_lag"), 1, lambda step: None)
     assert found[0].causes == ("servo_lag", "current")
-
-
-def test_the_last_cause_is_not_exchanged(monkeypatch):
-    monkeypatch.setattr(search, "CoarseFitter", Judge)
-    effects = ("current", "tail_flexibility")
-    now = Explanation(effects, fit_of(effects, 0.0))
-    assert swap_step(now, signals("servo_lag"), lambda step: None) == [now]

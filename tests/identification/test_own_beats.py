@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fish_env.data import CommandSteps
-from fish_env.identification.own_beats import own_beats, with_own_beats
+from fish_env.identification.own_beats import OwnBeats, own_beats, with_own_beats
 from fish_env.identification.runs import FREQUENCY
 from fish_env.identification.series import SeriesProblem
 from tests.identification.synthetic import Setup, simulate
@@ -32,14 +32,18 @@ def dataset():
 
 
 def test_runs_that_beat_alike_have_no_beat_of_their_own(dataset):
-    assert own_beats(SeriesProblem(dataset)) == {}
-    assert own_beats(SeriesProblem(told(dataset, [1.01] * 5))) == {}
+    assert own_beats(SeriesProblem(dataset)).own == {}
+    quicker = own_beats(SeriesProblem(told(dataset, [1.01] * 5)))
+    assert quicker.own == {}
+    assert quicker.common == pytest.approx(1.01, abs=1e-3)
 
 
 def test_each_runs_own_beat_is_found_beside_a_common_one(dataset):
     ratios = np.array([1.0, 1.008, 0.99, 1.0, 1.0])
     problem = SeriesProblem(told(dataset, 0.97 * ratios))
-    found = own_beats(problem)
+    beats = own_beats(problem)
+    assert beats.common == pytest.approx(0.97, abs=1e-3)
+    found = beats.own
     assert set(found) == {"r1", "r2"}
     assert found["r1"] == pytest.approx(1.008, abs=1e-3)
     assert found["r2"] == pytest.approx(0.99, abs=1e-3)
@@ -47,8 +51,8 @@ def test_each_runs_own_beat_is_found_beside_a_common_one(dataset):
 
 def test_the_commands_are_those_that_the_tail_followed(dataset):
     problem = SeriesProblem(told(dataset, [1.0, 1.008, 1.0, 1.0, 1.0]))
-    right = with_own_beats(problem, {"r1": 1.008})
+    right = with_own_beats(problem, OwnBeats(1.0, {"r1": 1.008}))
     expected = SeriesProblem(dataset).runs[1].command_values
     assert np.allclose(right.runs[1].command_values, expected)
     assert right.runs[1].own_beat == 1.008
-    assert with_own_beats(problem, {}) is problem
+    assert with_own_beats(problem, OwnBeats()).runs is problem.runs

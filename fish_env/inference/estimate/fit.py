@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any
@@ -267,6 +267,14 @@ def finished(own: Fit) -> Fit:
     return own
 
 
+def refined(own: Fit) -> Fit:
+    """The fit in finer steps where an effect asks for them, if it was made without."""
+    problem = own.problem.with_refinement()
+    if own.problem.refines_steps(own.point.effects) or not problem.refines_steps(own.point.effects):
+        return own
+    return fit(problem, own.effects, own.point, own.noise, own.released, rounds=1, iterations=3)
+
+
 def run_variation(own: Fit) -> Spread:
     """What the runs of a fit differ in, as far as it is strongly indicated.
 
@@ -288,20 +296,31 @@ def run_variation(own: Fit) -> Spread:
     return fit_spread(likelihood, problem.variations)
 
 
-def with_run_variation(own: Fit) -> Fit:
+def with_run_variation(own: Fit, beside_misfit: bool = False, dropped: Collection[str] = ()) -> Fit:
     """The fit, made again where its runs differ by more, or less, than it allows for.
 
-    Where the disturbance stays at its limit nevertheless, what the runs seem to differ in stands in
-    for something else that is missing: the fit then is as it was. A few runs tell no spread.
+    Where the disturbance stays at its limit nevertheless, what the runs seem to differ in may stand
+    in for a cause that is missing: the fit then is as it was. A few runs tell no spread.
+
+    Args:
+        own: the fit.
+        beside_misfit: keep the variation also where something else is missing.
+        dropped: effects that the new fit goes without.
     """
-    if not own.problem.variations or own.problem.run_count < POLICY.fewest_runs_for_spread:
+    problem, noise = own.problem, own.noise
+    if problem.variations and problem.run_count >= POLICY.fewest_runs_for_spread:
+        found = run_variation(own)
+        if found.sd.any() or own.noise.spread.any():
+            problem = problem.with_variation(np.where(found.sd > 0.0, found.values, 0.0))
+            noise = replace(own.noise, spread=found.sd)
+    if problem is own.problem and not dropped:
         return own
-    found = run_variation(own)
-    if not found.sd.any() and not own.noise.spread.any():
-        return own
-    problem = own.problem.with_variation(np.where(found.sd > 0.0, found.values, 0.0))
-    noise = replace(own.noise, spread=found.sd)
-    varied = fit(problem, own.effects, own.point, noise, own.released, rounds=2)
+    effects = [name for name in own.effects if name not in dropped]
+    values = {p: v for p, v in own.point.effects.items() if p.split(".")[1] in effects}
+    start = Point(own.point.z, values)
+    varied = fit(problem, effects, start, noise, own.released, rounds=2)
+    if beside_misfit or dropped:
+        return varied
     return own if problem.disturbance_at_limit(varied.noise) else varied
 
 

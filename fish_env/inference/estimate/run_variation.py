@@ -222,9 +222,10 @@ def _kept(gram: FloatArray, sd: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def fit_spread(likelihood: Likelihood, variations: Sequence[RunVariation]) -> Spread:
-    """Spreads of largest restricted likelihood; none that is not strongly indicated.
+    """Spreads of largest posterior density; none that is not strongly indicated.
 
-    Spreads are added one at a time, the most indicated first, while one gains enough.
+    Spreads are added one at a time, the most indicated first, while one gains enough. The prior of
+    each is half-normal with the usual spread as its scale: what is far beyond it has to be plain.
 
     Args:
         likelihood: of spreads in units of the usual ones.
@@ -252,28 +253,33 @@ def fit_spread(likelihood: Likelihood, variations: Sequence[RunVariation]) -> Sp
 def _alone(
     likelihood: Likelihood, sd: FloatArray, i: int, largest: float
 ) -> tuple[float, int, float]:
-    """-2 log likelihood of one more spread at its best size, which one, and that size."""
+    """-2 log density of one more spread at its best size, which one, and that size."""
     trials = []
     for size in SIZES[largest > SIZES]:
         trial = sd.copy()
         trial[i] = size
-        trials.append((likelihood(trial), i, float(size)))
+        trials.append((_posterior(likelihood, trial), i, float(size)))
     return min(trials)
 
 
 def _largest(
     likelihood: Likelihood, largest: FloatArray, active: Sequence[int], begin: FloatArray
 ) -> tuple[FloatArray, float]:
-    """Spreads (K,) of largest likelihood with only some of them active, and -2 log of it."""
+    """Spreads (K,) of largest density with only some of them active, and -2 log of it."""
     sd, own = np.zeros(len(largest)), list(active)
 
     def value(logs: FloatArray) -> float:
         trial = np.zeros(len(largest))
         trial[own] = np.exp(logs)
-        return likelihood(trial)
+        return _posterior(likelihood, trial)
 
     limits = [(float(np.log(SMALLEST)), float(np.log(largest[i]))) for i in own]
     found = minimize(value, np.log(begin[own]), method="L-BFGS-B", bounds=limits)
     sd[own] = np.exp(found.x)
     sd[sd <= 2.0 * SMALLEST] = 0.0
-    return sd, likelihood(sd)
+    return sd, _posterior(likelihood, sd)
+
+
+def _posterior(likelihood: Likelihood, sd: FloatArray) -> float:
+    """-2 log of the density of spreads (K,) in usual ones, but for a constant."""
+    return likelihood(sd) + float(sd @ sd)

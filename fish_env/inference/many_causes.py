@@ -1,0 +1,85 @@
+"""All further causes at once, beside those that were found one at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from fish_env.inference.adequacy import disturbance_at_limit
+from fish_env.inference.explanation import Explanation
+from fish_env.inference.policy import POLICY
+from fish_env.inference.probes import Cause
+from fish_env.inference.pursuit import pursued, substitutes
+from fish_env.inference.rivals import rivals_of
+from fish_env.inference.screening import Screen, screen
+from fish_env.inference.search import substituted
+from fish_env.inference.shortlist import shortlisted
+
+LINEAR_DOUBT = 3.0 * POLICY.evidence_doubt
+"""Cost of a substitute in the linear model that a fit may yet make good."""
+MOST = 6
+"""Substitutes tried in coarse fits."""
+
+
+def pursue(
+    current: Explanation,
+    shown: Screen,
+    causes: Sequence[Cause],
+    rng: np.random.Generator,
+    report: Callable[[str], None],
+    least: float,
+    relaxed_log_p: float,
+) -> tuple[Explanation, Screen]:
+    """The explanation with all further causes that are needed together, and its screen.
+
+    Args:
+        current: causes found one at a time.
+        shown: all causes against it.
+        causes: causes to consider.
+        rng: for null distributions.
+        report: told what is being done.
+        least: statistic below which a simulation error explains a cause.
+        relaxed_log_p: added to the log p-value that makes a cause significant.
+    """
+    problem = current.fit.problem
+    if not shortlisted(problem, shown, 1, least, relaxed_log_p):
+        return current, shown
+    begun = current
+    if disturbance_at_limit(current.fit):
+        current = current.varied(beside_misfit=True)
+        shown = screen(current.fit, causes, rng)
+    for _ in range(POLICY.pursuits):
+        more = pursued(current, shown, report, least, relaxed_log_p)
+        if more is current:
+            break
+        current = more
+        shown = screen(current.fit, causes, rng)
+    return (current if current.causes != begun.causes else begun), shown
+
+
+def challenged(
+    current: Explanation,
+    shown: Screen,
+    rivals: Sequence[Explanation],
+    report: Callable[[str], None],
+) -> tuple[Explanation, tuple[Explanation, ...]]:
+    """The explanation after the effects closest to its causes were tried in their place.
+
+    With those that explain the data alike.
+
+    Args:
+        current: causes of which some were found together.
+        shown: all other causes against it.
+        rivals: explanations that were as good before the last causes were found.
+        report: told what is being done.
+    """
+    signals = {s.cause.name: s for s in shown.best()}
+    close = [(s.cause, s.name) for s in substitutes(current, shown) if s.cost < LINEAR_DOUBT]
+    pairs_of = (zip(current.causes, e.causes, strict=False) for e in rivals)
+    earlier = [(a, b) for pairs in pairs_of for a, b in pairs if a != b]
+    pairs = [(c, signals[n]) for c, n in [*earlier, *close] if n in signals]
+    if not pairs:
+        return current, ()
+    best, *others = substituted(current, pairs[:MOST], POLICY.most_challenges, report)
+    return best, rivals_of(best, others)

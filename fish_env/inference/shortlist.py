@@ -1,0 +1,57 @@
+"""Which causes to try next, by what the screen makes of them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fish_env.inference.problem import Problem
+from fish_env.inference.projection import Signal
+from fish_env.inference.screening import Screen
+
+
+def shortlisted(
+    problem: Problem,
+    screen: Screen,
+    count: int,
+    least: float = 0.0,
+    relaxed_log_p: float = 0.0,
+    found: int = 0,
+) -> list[Signal]:
+    """The most significant causes, and among the others those known to look like the first.
+
+    Effects and coefficients are two lists: what the tests of the two make of a large misfit does
+    not compare. A strong effect is screened far from where it is, so its place among its like
+    means little.
+
+    Args:
+        problem: what is fitted.
+        screen: all causes against the present explanation.
+        count: how many effects to try.
+        least: statistic below which a simulation error explains a cause.
+        relaxed_log_p: added to the log p-value that makes a cause significant.
+        found: coefficients in the present explanation.
+    """
+    strong = [s for s in screen.best() if s.statistic >= least]
+    effects = [
+        s for s in strong if s.cause.is_effect and s.log_p < screen.threshold + relaxed_log_p
+    ]
+    lifted = [s for s in strong if not s.cause.is_effect]
+    enough = _threshold_of_coefficients(screen, found) + relaxed_log_p
+    coefficients = [s for s in lifted if s.log_p < enough]
+    first = problem.known.get(effects[0].cause.name) if effects else None
+    alike = set(first.confusable_with) if first else set()
+    like_first = [s for s in effects[count:] if s.cause.name in alike]
+    return [*effects[:count], *like_first, *coefficients[: max(1, count // 2)]]
+
+
+def _threshold_of_coefficients(screen: Screen, found: int) -> float:
+    """Log p-value that makes a coefficient significant.
+
+    The first has to stand out among all causes. A parameter file that is wrong in one place is
+    often wrong in several, so the next ones are judged among coefficients alone, and the share of
+    false names is bounded (Benjamini and Hochberg, 1995).
+    """
+    if not found:
+        return screen.threshold
+    count = sum(not s.cause.is_effect for s in screen.signals) + found
+    return max(screen.threshold, float(np.log(screen.level * (found + 1) / count)))

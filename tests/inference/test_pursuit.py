@@ -1,0 +1,108 @@
+"""Many causes at once, against fits made one after another and the whole normal equations."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from fish_env.inference.elimination import insignificant
+from fish_env.inference.estimate.fit import Fit, fit
+from fish_env.inference.explanation import Explanation
+from fish_env.inference.pipeline import infer
+from fish_env.inference.probes import causes_of
+from fish_env.inference.projection import Projector
+from fish_env.inference.pursuit import picked, pursued, substitutes
+from fish_env.inference.screening import Screen, screen
+from fish_env.inference.tails import chi2_log_tail
+from tests.inference.boat import sail, split
+from tests.inference.boat_problem import BoatProblem
+from tests.inference.test_boat import BIAS, EAST, FITTED, NORTH, WALK
+
+HIDDEN = {BIAS: 0.03, NORTH: 0.05, EAST: -0.1}
+NAMES = {"rudder_bias", "current"}
+NO_MORE = -20.0
+
+
+def silent(step: str) -> None:
+    """Reports go nowhere."""
+
+
+@cache
+def problem(seed: int = 3) -> BoatProblem:
+    runs = sail(np.random.default_rng(seed), FITTED + 2, HIDDEN)
+    return BoatProblem(split(runs, FITTED)[0])
+
+
+@cache
+def screened() -> tuple[Fit, Screen]:
+    baseline = fit(problem())
+    return baseline, screen(baseline, causes_of(problem()), np.random.default_rng(0))
+
+
+def test_all_hidden_effects_are_picked_in_the_linear_model():
+    baseline, shown = screened()
+    picks = picked(Projector(baseline), shown, 8)
+    assert {pick.signal.cause.name for pick in picks} >= NAMES
+    assert [p.signal.cause.name for p in picked(Projector(baseline), shown, 1)] == [
+        picks[0].signal.cause.name
+    ]
+
+
+def test_each_pick_explains_what_the_whole_normal_equations_say():
+    """The evidence of the second, beside the first, by solving for everything at once."""
+    baseline, shown = screened()
+    projector = Projector(baseline)
+    one, two = picked(projector, shown, 2)
+
+    def explained(*signals):
+        rows = np.hstack([s.left for s in signals])
+        pulls = np.hstack([np.sqrt(projector.prior)[:, None] * s.followed for s in signals])
+        score = np.concatenate([s.score for s in signals])
+        return score @ np.linalg.solve(rows.T @ rows + pulls.T @ pulls, score)
+
+    gain = explained(one.signal, two.signal) - explained(one.signal)
+    expected = chi2_log_tail(gain / two.signal.variance_inflation, two.signal.freedom)
+    assert two.log_p == pytest.approx(float(expected), rel=1e-3)
+
+
+def test_effects_are_found_together_and_nothing_else():
+    baseline, shown = screened()
+    found = pursued(Explanation((), baseline), shown, silent)
+    assert set(found.causes) == NAMES
+    for path, truth in HIDDEN.items():
+        low, high = found.fit.interval(path, 0.999)
+        assert low < truth < high
+
+
+def test_where_nothing_shows_nothing_is_fitted():
+    baseline, shown = screened()
+    nothing = Explanation((), baseline)
+    assert pursued(nothing, shown, silent, least=1e12) is nothing
+
+
+def test_an_effect_that_does_nothing_is_not_significant_beside_the_others():
+    runs = sail(np.random.default_rng(7), FITTED, {BIAS: 0.03})
+    both = fit(BoatProblem(runs), ("rudder_bias", "propeller_walk"))
+    assert insignificant(both, ("rudder_bias", "propeller_walk"), NO_MORE) == ("propeller_walk",)
+
+
+def test_a_substitute_costs_what_a_fit_with_it_loses():
+    runs = sail(np.random.default_rng(7), FITTED, {BIAS: 0.03})
+    boat = BoatProblem(runs)
+    right = fit(boat, ("rudder_bias",))
+    shown = screen(right, causes_of(boat), np.random.default_rng(0))
+    costs = {s.name: s.cost for s in substitutes(Explanation(("rudder_bias",), right), shown)}
+    for name in ("propeller_walk", "current"):
+        wrong = fit(boat, (name,), noise=right.noise, refit_noise=False, iterations=10)
+        loss = wrong.objective - right.objective
+        inflation = {s.cause.name: s.variance_inflation for s in shown.best()}[name]
+        assert costs[name] == pytest.approx(loss / inflation, rel=0.2)
+
+
+def test_three_causes_are_named():
+    runs = sail(np.random.default_rng(3), FITTED + 2, {**HIDDEN, WALK: -0.03})
+    result = infer(*map(BoatProblem, split(runs, FITTED)), seed=3)
+    assert set(result.verdict.causes) == {*NAMES, "propeller_walk"}
+    assert result.verdict.alternatives == ()

@@ -252,8 +252,7 @@ class Search:
         after = screen(best.fit, self.causes, self.rng)
         problem, least = best.fit.problem, roughness(best) * total
         if self.effort.retries and not current.causes and shortlisted(problem, after, 1, least):
-            others = [*chosen]
-            others += _new(after, others)
+            others = _new(after, chosen)
             others += _like(best.causes[-1], shown, others, problem)
             tried = restart_from_winner(current, tried, others, self.report)
         varied = tried[0].varied()

@@ -108,7 +108,8 @@ def investigate(
     )
     if effort.retries and left.slight and describe:
         left = cross_validated(attribution, left, describe, report)
-    if effort.retries and not left.reached:
+    # A weaker cause may explain what is left, but no disturbance of implausible strength.
+    if effort.retries and not left.reached and not left.implausible:
         attribution, left = with_weaker_causes(attribution, left, causes, rng, report)
     verdict = decide(attribution, left, shown)
     partly_known = verdict.name == "outside_library" and bool(attribution.accepted.causes)

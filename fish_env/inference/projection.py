@@ -55,9 +55,14 @@ class Projected:
         return len(self.score)
 
     @property
+    def size(self) -> FloatArray:
+        """(m,) multiple of each setting in the linearised fit."""
+        return np.asarray(np.linalg.solve(self.projected, self.score))
+
+    @property
     def likelihood_ratio(self) -> float:
         """Of the linearised fit, in white noise of unit variance and with no bound in the way."""
-        return float(self.score @ np.linalg.solve(self.projected, self.score))
+        return float(self.score @ self.size)
 
     @property
     def absorbed_share(self) -> float:

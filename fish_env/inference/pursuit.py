@@ -10,7 +10,7 @@ selection in a linear model (orthogonal matching pursuit; Pati, Rezaiifar and Kr
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -26,7 +26,7 @@ from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point
 from fish_env.inference.projection import Projector, Signal
 from fish_env.inference.screening import Screen
-from fish_env.inference.starts import starts
+from fish_env.inference.starts import linear_estimate, probed, starts
 from fish_env.inference.tails import chi2_log_tail
 
 Report = Callable[[str], None]
@@ -39,10 +39,42 @@ class Pick:
     Attributes:
         signal: the cause at its best alternative.
         log_p: of what it explains beside the causes picked before it.
+        size: (m,) multiple of each of its settings, estimated together with all other picks.
     """
 
     signal: Signal
     log_p: float
+    size: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """What a signal changes in the residuals, and how it pulls coefficients from their priors.
+
+    Attributes:
+        left: (D, m) change of the residuals after a refit.
+        pull: (n, m) of the coefficients, in units of their prior.
+    """
+
+    left: FloatArray
+    pull: FloatArray
+
+    def times(self, other: Rows) -> FloatArray:
+        """Inner products (m, k) of all columns with those of another signal."""
+        return np.asarray(inner(self.left, other.left) + self.pull.T @ other.pull)
+
+    def orthogonal(self, directions: Sequence[Rows], root: FloatArray) -> Rows:
+        """Orthonormal columns of what orthonormal directions leave of this signal.
+
+        Args:
+            directions: orthonormal, and to each other.
+            root: (m, m) inverse square root of what is left.
+        """
+        left, pull = self.left, self.pull
+        for one in directions:
+            shared = one.times(self)
+            left, pull = left - one.left @ shared, pull - one.pull @ shared
+        return Rows(left @ root, pull @ root)
 
 
 def picked(
@@ -57,43 +89,50 @@ def picked(
         least: statistic below which a simulation error explains an effect.
         relaxed_log_p: added to the log p-value that makes an effect significant.
     """
-    weight = np.sqrt(projector.prior)[:, None]
     candidates = [s for s in shown.signals if s.cause.is_effect and s.followed is not None]
-    left = [s.left for s in candidates]
-    pulls = [weight * s.followed for s in candidates if s.followed is not None]
+    weight = np.sqrt(projector.prior)[:, None]
+    rows = [Rows(s.left, weight * np.asarray(s.followed)) for s in candidates]
     score = [s.score.copy() for s in candidates]
     info = [s.projected.copy() for s in candidates]
-    whole = [s.projected for s in candidates]
-    found: list[Pick] = []
-    directions: list[tuple[FloatArray, FloatArray]] = []
-    taken: set[str] = set()
-    while len(found) < most:
-        best, best_p = -1, np.inf
-        for i, s in enumerate(candidates):
-            if s.cause.name in taken or not _independent(info[i], whole[i]):
-                continue
-            statistic = float(score[i] @ np.linalg.solve(info[i], score[i])) / s.variance_inflation
-            log_p = float(chi2_log_tail(statistic, s.freedom))
-            if statistic >= least and log_p < best_p:
-                best, best_p = i, log_p
-        if best < 0 or best_p >= shown.threshold + relaxed_log_p:
-            return found
-        found.append(Pick(candidates[best], best_p))
-        taken.add(candidates[best].cause.name)
+    chosen: list[tuple[int, float]] = []
+    directions: list[Rows] = []
+    while len(chosen) < most:
+        taken = {candidates[i].cause.name for i, _ in chosen}
+        tests = [
+            (_log_p(score[i], info[i], s, least), i)
+            for i, s in enumerate(candidates)
+            if s.cause.name not in taken and _independent(info[i], s.projected)
+        ]
+        log_p, best = min(tests, default=(np.inf, -1))
+        if log_p >= shown.threshold + relaxed_log_p:
+            break
+        chosen.append((best, log_p))
         # What the pick leaves of all others: one step of a block Cholesky factorisation.
-        rows, pull = left[best].copy(), pulls[best].copy()
-        for basis, along in directions:
-            shared = inner(basis, left[best]) + along.T @ pulls[best]
-            rows -= basis @ shared
-            pull -= along @ shared
         root = np.linalg.inv(np.linalg.cholesky(info[best])).T
-        basis, along, own_score = rows @ root, pull @ root, root.T @ score[best]
-        directions.append((basis, along))
-        for i in range(len(candidates)):
-            shared = inner(basis, left[i]) + along.T @ pulls[i]
+        basis, pull = rows[best].orthogonal(directions, root), root.T @ score[best]
+        directions.append(basis)
+        for i, row in enumerate(rows):
+            shared = basis.times(row)
             info[i] = info[i] - shared.T @ shared
-            score[i] = score[i] - shared.T @ own_score
-    return found
+            score[i] = score[i] - shared.T @ pull
+    return _sized([(candidates[i], rows[i], log_p) for i, log_p in chosen])
+
+
+def _log_p(score: FloatArray, info: FloatArray, signal: Signal, least: float) -> float:
+    statistic = float(score @ np.linalg.solve(info, score)) / signal.variance_inflation
+    return float(chi2_log_tail(statistic, signal.freedom)) if statistic >= least else np.inf
+
+
+def _sized(chosen: Sequence[tuple[Signal, Rows, float]]) -> list[Pick]:
+    """Picks with the sizes that all of them together have."""
+    if not chosen:
+        return []
+    score = np.concatenate([signal.score for signal, _, _ in chosen])
+    whole = np.block([[one.times(other) for _, other, _ in chosen] for _, one, _ in chosen])
+    sizes = np.linalg.solve(whole + 1e-9 * np.diag(np.diag(whole)), score)
+    ends = np.cumsum([signal.freedom for signal, _, _ in chosen])[:-1]
+    parts = np.split(sizes, ends)
+    return [Pick(s, log_p, size) for (s, _, log_p), size in zip(chosen, parts, strict=True)]
 
 
 def _independent(info: FloatArray, whole: FloatArray) -> bool:
@@ -121,15 +160,11 @@ def pursued(
     picks = picked(Projector(current.fit.extrapolated), shown, room, least, relaxed_log_p)
     if not picks:
         return current
-    like_found = {n for c in current.causes for n in _confusable(current, c)}
-    first = picks[0].signal.cause.name
-    # Two delays in a row are nearly one: the second shows no more, and what shows is its echo.
-    alike = like_found | set(_confusable(current, first))
-    echoes = [s for s in shown.best() if s.cause.name in alike - {first}]
-    causes, coarse = _chained(current, [pick.signal for pick in picks], echoes, report)
-    if not causes:
-        return current
+    causes = _led([pick.signal.cause.name for pick in picks], current, shown, report)
     report(f"fitting {', '.join(causes)} together")
+    coarse = _together(current, causes, picks, shown)
+    if coarse is None:
+        return current
     fitted = _fitted(current, coarse)
     if fitted is None:
         return current
@@ -159,49 +194,49 @@ def _fitted(current: Explanation, coarse: CoarseFit) -> Fit | None:
     return reached(lambda: fit(problem, *start, rounds=2, iterations=3))
 
 
-def _chained(
-    current: Explanation, signals: Sequence[Signal], echoes: Sequence[Signal], report: Report
-) -> tuple[list[str], CoarseFit]:
-    """Coarse fits of one effect after another, each kept if it explains more than chance would.
+def _led(names: list[str], current: Explanation, shown: Screen, report: Report) -> list[str]:
+    """Names of effects, the first of them replaced by what it may be an echo of if that is better.
 
-    Args:
-        current: causes accepted so far.
-        signals: effects in the order they are tried.
-        echoes: effects that the first of them may be an echo of; the best of all comes first.
-        report: told what is being done.
+    Two delays in a row are nearly one: the second shows no more, and what shows is its echo.
     """
+    alike = {n for c in (*current.causes, names[0]) for n in _confusable(current, c)} - {*names}
+    others = [s for s in shown.best() if s.cause.name in alike]
+    if not others:
+        return names
     base = current.fit
     fitter = CoarseFitter(base)
-    best = fitter.coarse_fit(base.effects, base.released, [base.point])
-    kept: list[str] = []
-
-    def tried(signal: Signal) -> CoarseFit | None:
+    tried: list[tuple[float, str]] = []
+    for signal in (s for s in shown.best() if s.cause.name in alike | {names[0]}):
         name = signal.cause.name
-        report(f"trying {name} beside {len(current.causes) + len(kept)} others")
-        begin = [_beside(best.point, s, name) for s in starts(base, signal, best.point.z)]
-        found = reached(partial(fitter.coarse_fit, (*best.effects, name), base.released, begin))
-        # Coloured residuals inflate what chance gains (QAIC; Lebreton et al., 1992).
-        chance = POLICY.aic_penalty * signal.freedom * signal.variance_inflation
-        return found if found and found.objective < best.objective - chance else None
-
-    def led() -> tuple[str, CoarseFit] | None:
-        found = [(s.cause.name, tried(s)) for s in (signals[0], *echoes)]
-        able = [(name, fitted) for name, fitted in found if fitted]
-        return min(able, key=lambda pair: pair[1].objective) if able else None
-
-    first = led()
-    if first:
-        best, kept = first[1], [first[0]]
-    for signal in signals[1:]:
-        found = None if signal.cause.name in kept else tried(signal)
+        report(f"trying {name} beside {', '.join(current.causes)}")
+        effects, begin = (*base.effects, name), starts(base, signal, base.point.z)
+        found = reached(partial(fitter.coarse_fit, effects, base.released, begin))
         if found:
-            best, kept = found, [*kept, signal.cause.name]
-    return kept, best
+            tried.append((found.objective, name))
+    best = min(tried)[1] if tried else names[0]
+    return [best, *names[1:]]
 
 
-def _beside(point: Point, start: Point, name: str) -> Point:
-    own = {path: v for path, v in start.effects.items() if path.split(".")[1] == name}
-    return replace(point, effects={**point.effects, **own})
+def _together(
+    current: Explanation, causes: Sequence[str], picks: Sequence[Pick], shown: Screen
+) -> CoarseFit | None:
+    """The coarse fit with all effects at once; None where the simulation diverges.
+
+    It begins from their sizes in the linear model, and from their mildest settings.
+    """
+    base = current.fit
+    sizes = {pick.signal.cause.name: pick for pick in picks}
+    signals = {s.cause.name: s for s in shown.best()}
+    linear = dict(base.point.effects)
+    for name in causes:
+        pick = sizes.get(name)
+        linear |= linear_estimate(base, pick.signal, pick.size) if pick else {}
+    mild = dict(base.point.effects)
+    for name in causes:
+        mild |= probed(base.problem, signals[name])[0]
+    begin = [Point(base.point.z, {**mild, **linear}), Point(base.point.z, mild)]
+    effects = (*base.effects, *causes)
+    return reached(lambda: CoarseFitter(base).coarse_fit(effects, base.released, begin))
 
 
 @dataclass(frozen=True)

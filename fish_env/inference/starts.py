@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from fish_env.arrays import FloatArray
@@ -22,18 +24,25 @@ def starts(base: Fit, signal: Signal, z: FloatArray | None = None) -> list[Point
     if not cause.is_effect:
         return [base.point]
     signal = zoomed(base, signal)
-    size = np.linalg.solve(signal.projected, signal.score)
-    settings = signal.cause.probes[signal.probe]
-    start = {p.rsplit(".", 1)[1]: v for p, v in problem.neutral([cause.name]).items()}
-    estimate = combined(problem.known[cause.name], settings, size.tolist(), start)
-    linear = effect_values(problem, cause.name, estimate)
-    bounds = {f.path: (f.lower, f.upper) for f in problem.freedoms([cause.name])}
-    clipped = [
-        {path: float(np.clip(value, *bounds[path])) for path, value in values.items()}
-        for values in (linear, *probed(problem, signal), *_on_starting_grid(base, signal))
-    ]
+    linear = linear_estimate(base, signal, signal.size)
+    others = [*probed(problem, signal), *_on_starting_grid(base, signal)]
+    clipped = [linear, *(_clipped(base, cause.name, values) for values in others)]
     begin = baselines(base) if z is None else (z,)
     return [Point(z, {**base.point.effects, **values}) for z in begin for values in clipped]
+
+
+def linear_estimate(base: Fit, signal: Signal, size: FloatArray) -> dict[str, float]:
+    """Parameters of an effect by the multiple (m,) of each setting, within what it may be."""
+    problem, cause = base.problem, signal.cause
+    start = {p.rsplit(".", 1)[1]: v for p, v in problem.neutral([cause.name]).items()}
+    settings = cause.probes[signal.probe]
+    estimate = combined(problem.known[cause.name], settings, size.tolist(), start)
+    return _clipped(base, cause.name, effect_values(problem, cause.name, estimate))
+
+
+def _clipped(base: Fit, name: str, values: Mapping[str, float]) -> dict[str, float]:
+    bounds = {f.path: (f.lower, f.upper) for f in base.problem.freedoms([name])}
+    return {path: float(np.clip(value, *bounds[path])) for path, value in values.items()}
 
 
 def _on_starting_grid(base: Fit, signal: Signal) -> list[dict[str, float]]:

@@ -132,22 +132,29 @@ def implausible_estimates(fit: Fit) -> tuple[str, ...]:
     return tuple(found)
 
 
+def beyond_plausible(fit: Fit, name: str) -> bool:
+    """Whether an interval of an effect's strength lies wholly outside its plausible range."""
+    switching = fit.problem.known[name].switching
+    return any(_beyond(p, fit.interval(f"{PREFIX}{name}.{p.name}"), 1.0) for p in switching)
+
+
 def _out_of_place(parameter: EffectParameter, value: float) -> bool:
     """Whether a shape is far from any plausible one, where the effect is a different one."""
     low, high = parameter.plausible
     return bool(abs(value - 0.5 * (low + high)) > 1.5 * (high - low))
 
 
-def _beyond(parameter: EffectParameter, interval: tuple[float, float]) -> bool:
-    """Whether an interval lies wholly outside what could be, seen from neutral."""
+def _beyond(
+    parameter: EffectParameter,
+    interval: tuple[float, float],
+    times: float = POLICY.implausible_prior_sd,
+) -> bool:
+    """Whether an interval lies wholly outside so many times what could be, seen from neutral."""
     neutral, (low, high) = parameter.neutral, parameter.plausible
     if not np.isfinite(neutral):
-        return interval[1] < low / POLICY.implausible_prior_sd
+        return interval[1] < low / times
     below, above = min(low - neutral, 0.0), max(high - neutral, 0.0)
-    return bool(
-        interval[0] > neutral + POLICY.implausible_prior_sd * above
-        or interval[1] < neutral + POLICY.implausible_prior_sd * below
-    )
+    return bool(interval[0] > neutral + times * above or interval[1] < neutral + times * below)
 
 
 def adequacy(fit: Fit, rng: np.random.Generator, tolerated: float = 0.0) -> Adequacy:

@@ -124,17 +124,20 @@ def extended(
         relaxed_log_p: added to the log p-value that makes a cause significant, where the adequacy
             test says that something is missing.
     """
-    found, many = begun, effort.retries
     search = Search(causes, rng, effort, report, relaxed_log_p)
+    found, together = begun, effort.retries
     while len(found.accepted.causes) < POLICY.most_causes:
-        more = search.together(found) if found.accepted.causes and many else None
-        if more is None and not any(tied(found.accepted, e) for e in found.rivals):
-            more = search.contest(found)
+        if found.accepted.causes and together:
+            found, together = search.together(found), False
+            continue
+        if any(tied(found.accepted, e) for e in found.rivals):
+            break
+        more = search.contest(found)
         if more is None or more.accepted.causes == found.accepted.causes:
             found = more or found
             break
         found = more
-    return settled(found, many)
+    return settled(found, effort.retries)
 
 
 def settled(found: Attribution, thoroughly: bool) -> Attribution:
@@ -172,15 +175,15 @@ class Search:
     report: Callable[[str], None]
     relaxed_log_p: float
 
-    def together(self, found: Attribution) -> Attribution | None:
-        """With further effects that are needed beside those found; None without such."""
+    def together(self, found: Attribution) -> Attribution:
+        """With further effects that are needed beside those found; the same without such."""
         before, rough = found.accepted, roughness(found.accepted)
         current, after = pursue(
             before, found.screens[-1], self.causes, self.rng, self.report,
             rough * found.gain, self.relaxed_log_p,
         )  # fmt: skip
         if current.causes == before.causes:
-            return None
+            return found
         gain = found.gain + before.score - current.score
         current, rivals = challenged(current, after, found.rivals, self.report)
         return replace(

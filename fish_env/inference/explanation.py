@@ -10,6 +10,7 @@ from typing import TypeVar
 import numpy as np
 
 from fish_env.arrays import FloatArray
+from fish_env.inference.adequacy import disturbance_at_limit
 from fish_env.inference.estimate.fit import Fit, fit, with_run_variation
 from fish_env.inference.estimate.information import information, prior_precision
 from fish_env.inference.policy import POLICY
@@ -48,14 +49,28 @@ class Explanation:
     def varied(self, beside_misfit: bool = False, dropped: Collection[str] = ()) -> Explanation:
         """The same causes with what the runs differ in, as it shows now that more is explained.
 
+        Where the disturbance stays at its limit nevertheless, what the runs seem to differ in may
+        stand in for a cause that is missing: the explanation then is as it was.
+
         Args:
             beside_misfit: keep the variation also where something else is missing.
             dropped: effects that are no longer among the causes.
         """
-        found = reached(partial(with_run_variation, self.fit, beside_misfit, dropped))
-        if found is None or found is self.fit:
+        if dropped:
+            found = reached(partial(with_run_variation, self.fit, dropped))
+            if found is None:
+                return self
+            return Explanation(tuple(c for c in self.causes if c not in dropped), found)
+        found = self._varied
+        stands_in = found is None or disturbance_at_limit(found)
+        if found is None or found is self.fit or (stands_in and not beside_misfit):
             return self
-        return Explanation(tuple(c for c in self.causes if c not in dropped), found)
+        return Explanation(self.causes, found)
+
+    @cached_property
+    def _varied(self) -> Fit | None:
+        """The fit with what the runs differ in; None where the simulation diverges."""
+        return reached(partial(with_run_variation, self.fit))
 
     def extrapolated(self) -> Explanation:
         """The same causes, with estimates as ever finer steps put them."""

@@ -13,7 +13,7 @@ from fish_env.inference.probes import Cause
 from fish_env.inference.pursuit import pursued, substitutes
 from fish_env.inference.rivals import rivals_of
 from fish_env.inference.screening import Screen, screen
-from fish_env.inference.search import substituted
+from fish_env.inference.search import substituted, without
 from fish_env.inference.shortlist import shortlisted
 
 LINEAR_DOUBT = 3.0 * POLICY.evidence_doubt
@@ -55,7 +55,24 @@ def pursue(
             break
         current = more
         shown = screen(current.fit, causes, rng)
+        if disturbance_at_limit(current.fit):
+            # Much is still unknown, and what would be picked next stands in for it.
+            current = _told_apart(current, begun.causes, shown)
+            break
     return (current if current.causes != begun.causes else begun), shown
+
+
+def _told_apart(current: Explanation, first: Sequence[str], shown: Screen) -> Explanation:
+    """The explanation without further causes that another effect explains as well.
+
+    Args:
+        current: causes with their fit.
+        first: those of them that were found one at a time.
+        shown: all other causes against it.
+    """
+    close = {s.cause for s in substitutes(current, shown) if s.cost < POLICY.evidence_doubt}
+    doubtful = close - {*first}
+    return (without(current, doubtful) or current) if doubtful else current
 
 
 def challenged(
@@ -66,7 +83,8 @@ def challenged(
 ) -> tuple[Explanation, tuple[Explanation, ...]]:
     """The explanation after the effects closest to its causes were tried in their place.
 
-    With those that explain the data alike.
+    With those that explain the data alike. Beside a disturbance of implausible strength no fit
+    tells which is better, and none is made.
 
     Args:
         current: causes of which some were found together.
@@ -74,6 +92,8 @@ def challenged(
         rivals: explanations that were as good before the last causes were found.
         report: told what is being done.
     """
+    if disturbance_at_limit(current.fit):
+        return current, ()
     signals = {s.cause.name: s for s in shown.best()}
     close = [(s.cause, s.name) for s in substitutes(current, shown) if s.cost < LINEAR_DOUBT]
     pairs_of = (zip(current.causes, e.causes, strict=False) for e in rivals)

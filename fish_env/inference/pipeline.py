@@ -21,7 +21,8 @@ from fish_env.inference.adequacy import (
 from fish_env.inference.attribution import Attribution, attribute, extended
 from fish_env.inference.budget import Budget, error_budget
 from fish_env.inference.effort import FULL, Effort
-from fish_env.inference.estimate.fit import Fit, finished, fit, with_run_variation
+from fish_env.inference.estimate.fit import Fit, finished, fit
+from fish_env.inference.explanation import Explanation
 from fish_env.inference.gain import gap_closed
 from fish_env.inference.parallel import both
 from fish_env.inference.partial import Describe, confirmed
@@ -72,7 +73,7 @@ def refit_baseline(problem: Problem) -> Fit:
     Raises:
         LinAlgError: the simulation diverges with the nominal coefficients.
     """
-    own = with_run_variation(fit(problem, rounds=2, iterations=3))
+    own = Explanation((), fit(problem, rounds=2, iterations=3)).varied().fit
     return own if disturbance_at_limit(own) else finished(own)
 
 

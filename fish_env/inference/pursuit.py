@@ -16,7 +16,7 @@ from functools import partial
 import numpy as np
 
 from fish_env.arrays import FloatArray
-from fish_env.inference.adequacy import implausible_estimates
+from fish_env.inference.adequacy import beyond_plausible, implausible_estimates
 from fish_env.inference.elimination import insignificant, off_values
 from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
 from fish_env.inference.estimate.fit import Fit, fit
@@ -30,6 +30,8 @@ from fish_env.inference.starts import linear_estimate, probed, starts
 from fish_env.inference.tails import chi2_log_tail
 
 Report = Callable[[str], None]
+ECHOES = 3
+"""Effects tried as what the first pick may be an echo of."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,7 +171,10 @@ def pursued(
     if fitted is None:
         return current
     found = Explanation((*current.causes, *causes), fitted)
-    idle = insignificant(fitted, found.causes, shown.threshold)
+    # Beside so many others an effect of implausible size stands in for something else.
+    wild = [name for name in causes if beyond_plausible(fitted, name)]
+    sober = [name for name in found.causes if name not in wild]
+    idle = (*wild, *insignificant(fitted, sober, shown.threshold))
     if not set(causes) - set(idle):
         return current
     report(f"fitting without {', '.join(idle)}" if idle else "fitting what the runs differ in")
@@ -200,13 +205,13 @@ def _led(names: list[str], current: Explanation, shown: Screen, report: Report) 
     Two delays in a row are nearly one: the second shows no more, and what shows is its echo.
     """
     alike = {n for c in (*current.causes, names[0]) for n in _confusable(current, c)} - {*names}
-    others = [s for s in shown.best() if s.cause.name in alike]
-    if not others:
+    echoes = [s for s in shown.best() if s.cause.name in alike][:ECHOES]
+    if not echoes:
         return names
     base = current.fit
     fitter = CoarseFitter(base)
     tried: list[tuple[float, str]] = []
-    for signal in (s for s in shown.best() if s.cause.name in alike | {names[0]}):
+    for signal in (*echoes, *(s for s in shown.best() if s.cause.name == names[0])):
         name = signal.cause.name
         report(f"trying {name} beside {', '.join(current.causes)}")
         effects, begin = (*base.effects, name), starts(base, signal, base.point.z)

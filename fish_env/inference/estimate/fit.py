@@ -296,15 +296,13 @@ def run_variation(own: Fit) -> Spread:
     return fit_spread(likelihood, problem.variations)
 
 
-def with_run_variation(own: Fit, beside_misfit: bool = False, dropped: Collection[str] = ()) -> Fit:
+def with_run_variation(own: Fit, dropped: Collection[str] = ()) -> Fit:
     """The fit, made again where its runs differ by more, or less, than it allows for.
 
-    Where the disturbance stays at its limit nevertheless, what the runs seem to differ in may stand
-    in for a cause that is missing: the fit then is as it was. A few runs tell no spread.
+    A few runs tell no spread.
 
     Args:
         own: the fit.
-        beside_misfit: keep the variation also where something else is missing.
         dropped: effects that the new fit goes without.
     """
     problem, noise = own.problem, own.noise
@@ -318,10 +316,7 @@ def with_run_variation(own: Fit, beside_misfit: bool = False, dropped: Collectio
     effects = [name for name in own.effects if name not in dropped]
     values = {p: v for p, v in own.point.effects.items() if p.split(".")[1] in effects}
     start = Point(own.point.z, values)
-    varied = fit(problem, effects, start, noise, own.released, rounds=2)
-    if beside_misfit or dropped:
-        return varied
-    return own if problem.disturbance_at_limit(varied.noise) else varied
+    return fit(problem, effects, start, noise, own.released, rounds=2)
 
 
 def _extrapolated(own: Fit) -> Fit:

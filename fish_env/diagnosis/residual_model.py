@@ -171,10 +171,14 @@ def _enlarged(state: _State, forces: GenericForces, threshold: float) -> _State:
     others = [column for column, _ in asked[:POOL] if column not in present]
     pool = np.array([*present, *others], np.int64)
     before = np.r_[state.sizes, np.zeros(len(others))] / probes(pool)
-    chooser = _Chooser(
-        own, projector, own.linearised.whitened(bound.changes(pool).T).T, before, threshold
-    )
-    chosen = chooser.chosen(list(range(len(present))))
+    change = own.linearised.whitened(bound.changes(pool).T).T
+    # A wrench that shows nothing, or makes the simulation diverge, would spoil the test of all.
+    each = projector.signals([(NOTHING, 0, [i]) for i in range(len(pool))], change.T)
+    seen = np.array([signal is not None for signal in each], bool)
+    kept = int(seen[: len(present)].sum())
+    pool, change, before = pool[seen], change[:, seen], before[seen]
+    chooser = _Chooser(own, projector, change, before, threshold)
+    chosen = chooser.chosen(list(range(kept)))
     sizes, errors = chooser.sizes(chosen)
     unit = probes(pool[chosen])
     return replace(state, columns=pool[chosen], sizes=unit * sizes, errors=unit * errors)
@@ -201,8 +205,10 @@ class _Chooser:
 
     def chosen(self, present: list[int]) -> list[int]:
         """Those worth having: the present ones and more, in the order they were added."""
+        if self.all is None:
+            return []
         chosen = present
-        while self.all is not None and len(chosen) < MOST:
+        while len(chosen) < MOST:
             log_p = {i: self._log_p([*chosen, i])[-1] for i in self._apart(chosen)}
             best = min(log_p, key=lambda i: log_p[i], default=None)
             if best is None or log_p[best] > self.threshold:

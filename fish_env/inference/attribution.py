@@ -149,7 +149,8 @@ def settled(found: Attribution, thoroughly: bool) -> Attribution:
     """
     current = backward_elimination(found.accepted)
     failed = found.failed if current.causes == found.accepted.causes else frozenset()
-    if current.causes and thoroughly:
+    # What else is missing moves estimates by more than a few steps more would.
+    if current.causes and thoroughly and not disturbance_at_limit(current.fit):
         final = reached(lambda: finished(refined(current.fit)))
         current = Explanation(current.causes, final) if final else current
     # A rival that contains the accepted causes is no rival once a cause is dropped.

@@ -1,28 +1,41 @@
 """Known causes beside something unknown: which of them act, although the model stays inadequate.
 
 A force that no known cause exerts is often imitated by one that does. Such an imitation is not
-needed once an empirical model of the residual, a sum of generic forces, may stand in for it. A
-cause that acts is: without it, no such sum explains the data as well.
+needed once a sum of generic forces may stand in for it. A cause that acts is: without it, no such
+sum explains the data as well. All sums are formed in the linear model of one fit.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
-from fish_env.inference.adequacy import implausible_estimates
+import numpy as np
+
+from fish_env.arrays import FloatArray
+from fish_env.inference.adequacy import generic_signals, implausible_estimates
+from fish_env.inference.elimination import off_values
 from fish_env.inference.estimate.fit import Fit
+from fish_env.inference.estimate.products import inner
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import PARAMETER
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Problem
+from fish_env.inference.projection import Projector, Signal
 from fish_env.inference.result import ResidualModel
 from fish_env.inference.search import without
+from fish_env.inference.tails import chi2_log_tail
 
 Describe = Callable[[Fit, float, Problem | None], ResidualModel | None]
 """Models what a fit leaves: the fit, the log p-value that a term has to pass, runs to judge on."""
+POOL = 16
+"""Generic forces that are considered beside each set of causes, the most indicated ones."""
+MOST = 8
+"""Generic forces in one sum."""
 
 
-def confirmed(accepted: Explanation, threshold: float, describe: Describe) -> Explanation | None:
+def confirmed(accepted: Explanation, threshold: float) -> Explanation | None:
     """The explanation with those of its causes that no sum of generic forces can stand in for.
 
     What is left may be a disturbance of implausible strength: it is estimated with the rest, and
@@ -31,7 +44,6 @@ def confirmed(accepted: Explanation, threshold: float, describe: Describe) -> Ex
     Args:
         accepted: causes that explain part of the data.
         threshold: log p-value that a generic force has to pass.
-        describe: models what a fit leaves.
 
     Returns:
         The causes that are left with their fit; None where none is.
@@ -39,8 +51,7 @@ def confirmed(accepted: Explanation, threshold: float, describe: Describe) -> Ex
     while accepted.causes:
         weakest = _implausible(accepted)
         if weakest is None:
-            whole = _score(accepted, threshold, describe)
-            gaps = {n: _gap(accepted, n, whole, threshold, describe) for n in accepted.causes}
+            gaps = StandIns(accepted, threshold).gaps()
             weakest = min(gaps, key=lambda name: gaps[name])
             if gaps[weakest] >= POLICY.evidence_doubt:
                 return accepted
@@ -62,16 +73,129 @@ def _is_of(cause: str, word: str) -> bool:
     return word.split(" ")[0] in (cause, cause.removeprefix(PARAMETER))
 
 
-def _score(explanation: Explanation, threshold: float, describe: Describe) -> float:
-    """-2 log evidence with the empirical model of the residual in place."""
-    model = describe(explanation.fit, threshold, None)
-    beside = explanation.fit if model is None else model.fit
-    return Explanation(explanation.causes, beside).score
+@dataclass(frozen=True, eq=False)
+class Removed:
+    """A cause taken out of the linear model.
+
+    Attributes:
+        loss: by how much -2 log likelihood grows.
+        shift: (k,) of its parameters.
+        own: (k,) numbers of these among all free ones.
+        rest: numbers of the others.
+        along: (rest, k) how the others follow.
+        left: (k, k) information about its parameters beside the others.
+        inflation: of its variance by coloured residuals.
+    """
+
+    loss: float
+    shift: FloatArray
+    own: FloatArray
+    rest: FloatArray
+    along: FloatArray
+    left: FloatArray
+    inflation: float
+
+    def seen(self, pull: FloatArray) -> FloatArray:
+        """(k, m) product of what only the cause changes with m signals of this pull (n, m)."""
+        return np.asarray(pull[self.own] - self.along.T @ pull[self.rest])
 
 
-def _gap(
-    accepted: Explanation, name: str, whole: float, threshold: float, describe: Describe
-) -> float:
-    """What -2 log evidence loses without a cause, generic forces being allowed to stand in."""
-    smaller = without(accepted, (name,))
-    return float("inf") if smaller is None else _score(smaller, threshold, describe) - whole
+class StandIns:
+    """Sums of generic forces with which a model may do without one of its causes.
+
+    Args:
+        found: causes with their fit.
+        threshold: log p-value that each force of a sum has to pass.
+    """
+
+    def __init__(self, found: Explanation, threshold: float) -> None:
+        self.fit, self.causes, self.threshold = found.fit.extrapolated, found.causes, threshold
+        self.projector = Projector(self.fit)
+
+    def gaps(self) -> dict[str, float]:
+        """By how much more -2 log likelihood loses without each cause than forces make good."""
+        removed = {name: self._removed(name) for name in self.causes}
+        beside = self._explained(None)
+        return {
+            name: np.inf
+            if one is None
+            else (one.loss + beside - self._explained(one)) / one.inflation
+            for name, one in removed.items()
+        }
+
+    def _removed(self, name: str) -> Removed | None:
+        """A cause taken out; None for one that is off at infinity: no slope leads there."""
+        off = off_values(self.fit, name)
+        own = np.array([self.fit.names.index(path) for path in off])
+        shift = np.array(list(off.values())) - self.fit.estimates[own]
+        if not np.isfinite(shift).all():
+            return None
+        if name not in self.fit.effects:
+            shift = np.array([-self.fit.point.z[own[0]]])
+        hessian = self.projector.hessian
+        rest = np.setdiff1d(np.arange(len(hessian)), own)
+        across = hessian[np.ix_(rest, own)]
+        along = np.linalg.solve(hessian[np.ix_(rest, rest)], across)
+        left = hessian[np.ix_(own, own)] - across.T @ along
+        loss = float(shift @ left @ shift)
+        return Removed(loss, shift, own, rest, along, left, self._inflation(own))
+
+    def _inflation(self, own: FloatArray) -> float:
+        """Of the variance of some parameters, by coloured residuals."""
+        scale = np.eye(len(self.fit.names))
+        count = len(self.fit.problem.baseline)
+        scale[:count, :count] = self.fit.problem.baseline.factor
+        white = np.diag(scale @ np.linalg.inv(self.projector.hessian) @ scale.T)
+        return float(max(1.0, (np.diag(self.fit.covariance)[own] / white[own]).max()))
+
+    @cached_property
+    def _pool(self) -> list[Signal]:
+        """Forces that are most indicated beside all causes, or without one of them."""
+        removed = [None, *(r for r in map(self._removed, self.causes) if r is not None)]
+        best: list[list[tuple[float, int, Signal]]] = [[] for _ in removed]
+        forces = self.fit.problem.generic_terms(self.fit)
+        for column, signal in generic_signals(forces, self.projector):
+            for ranked, one in zip(best, removed, strict=True):
+                ranked.append((self._gain(signal, one), column, signal))
+                ranked.sort(key=lambda entry: (-entry[0], entry[1]))
+                del ranked[POOL:]
+        chosen = {column: signal for ranked in best for _, column, signal in ranked}
+        return [chosen[column] for column in sorted(chosen)]
+
+    def _gain(self, signal: Signal, removed: Removed | None) -> float:
+        info, score = self._system([signal], removed)
+        return float(score[0] ** 2 / info[0, 0] / signal.variance_inflation)
+
+    def _system(
+        self, signals: Sequence[Signal], removed: Removed | None
+    ) -> tuple[FloatArray, FloatArray]:
+        """Information (N, N) and score (N,) of forces beside all causes, or without one."""
+        left = np.hstack([s.left for s in signals])
+        followed = np.hstack([np.asarray(s.followed) for s in signals])
+        info = inner(left, left) + followed.T @ (self.projector.prior[:, None] * followed)
+        score = np.concatenate([s.score for s in signals])
+        if removed is not None:
+            seen = removed.seen(self.projector.hessian @ followed)
+            info = info + seen.T @ np.linalg.solve(removed.left, seen)
+            score = score - seen.T @ removed.shift
+        return info, score
+
+    def _explained(self, removed: Removed | None) -> float:
+        """What the best sum of forces explains, in -2 log likelihood; picked one after another."""
+        pool = self._pool
+        if not pool:
+            return 0.0
+        info, score = self._system(pool, removed)
+        whole, explained = np.diag(info).copy(), 0.0
+        inflation = np.array([s.variance_inflation for s in pool])
+        for _ in range(MOST):
+            left = np.diag(info)
+            gains = np.where(left > 0.05 * whole, score**2 / np.maximum(left, 1e-300), 0.0)
+            best = int(np.argmax(gains / inflation))
+            if chi2_log_tail(float(gains[best] / inflation[best]), 1) >= self.threshold:
+                break
+            explained += float(gains[best])
+            along = info[best] / info[best, best]
+            score = score - along * score[best]
+            info = info - np.outer(info[best], along)
+        return explained

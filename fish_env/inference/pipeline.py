@@ -114,9 +114,9 @@ def investigate(
         attribution, left = with_weaker_causes(attribution, left, causes, rng, report)
     verdict = decide(attribution, left, shown)
     partly_known = verdict.name == "outside_library" and bool(attribution.accepted.causes)
-    if effort.retries and partly_known and describe:
+    if effort.retries and partly_known:
         report("testing which causes act beside what is unknown")
-        attribution, verdict = partly(attribution, left, verdict, describe)
+        attribution, verdict = partly(attribution, left, verdict)
     attribution = attribution.extrapolated()
     gap = None
     if verdict.name in EXTENDING and held_out is not None:
@@ -132,7 +132,7 @@ def investigate(
 
 
 def partly(
-    attribution: Attribution, left: Adequacy, verdict: Verdict, describe: Describe
+    attribution: Attribution, left: Adequacy, verdict: Verdict
 ) -> tuple[Attribution, Verdict]:
     """The verdict ``partial`` where known causes act beside something unknown.
 
@@ -140,9 +140,8 @@ def partly(
         attribution: what was found.
         left: adequacy of the accepted explanation, which is not adequate.
         verdict: the verdict without such causes.
-        describe: models what a fit leaves.
     """
-    found = confirmed(attribution.accepted, left.threshold, describe)
+    found = confirmed(attribution.accepted, left.threshold)
     if found is None:
         return attribution, verdict
     rivals = tuple(e for e in attribution.rivals if len(e.causes) == len(found.causes))

@@ -20,7 +20,6 @@ from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.products import inner
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import PARAMETER
-from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Problem
 from fish_env.inference.projection import Projector, Signal
 from fish_env.inference.result import ResidualModel
@@ -43,7 +42,7 @@ def confirmed(accepted: Explanation, threshold: float) -> Explanation | None:
 
     Args:
         accepted: causes that explain part of the data.
-        threshold: log p-value that a generic force has to pass.
+        threshold: log p-value that a generic force has to pass, and a cause beside such forces.
 
     Returns:
         The causes that are left with their fit; None where none is.
@@ -51,9 +50,9 @@ def confirmed(accepted: Explanation, threshold: float) -> Explanation | None:
     while accepted.causes:
         weakest = _implausible(accepted)
         if weakest is None:
-            gaps = StandIns(accepted, threshold).gaps()
-            weakest = min(gaps, key=lambda name: gaps[name])
-            if gaps[weakest] >= POLICY.evidence_doubt:
+            log_p = StandIns(accepted, threshold).log_p()
+            weakest = max(log_p, key=lambda name: log_p[name])
+            if log_p[weakest] < threshold:
                 return accepted
         smaller = without(accepted, (weakest,))
         if smaller is None:
@@ -83,7 +82,7 @@ class Removed:
         own: (k,) numbers of these among all free ones.
         rest: numbers of the others.
         along: (rest, k) how the others follow.
-        left: (k, k) information about its parameters beside the others.
+        freed: (k, k) inverse information about its parameters that forces gain by its absence.
         inflation: of its variance by coloured residuals.
     """
 
@@ -92,7 +91,7 @@ class Removed:
     own: FloatArray
     rest: FloatArray
     along: FloatArray
-    left: FloatArray
+    freed: FloatArray
     inflation: float
 
     def seen(self, pull: FloatArray) -> FloatArray:
@@ -112,33 +111,39 @@ class StandIns:
         self.fit, self.causes, self.threshold = found.fit.extrapolated, found.causes, threshold
         self.projector = Projector(self.fit)
 
-    def gaps(self) -> dict[str, float]:
-        """By how much more -2 log likelihood loses without each cause than forces make good."""
-        removed = {name: self._removed(name) for name in self.causes}
-        beside = self._explained(None)
-        return {
-            name: np.inf
-            if one is None
-            else (one.loss + beside - self._explained(one)) / one.inflation
-            for name, one in removed.items()
-        }
+    def log_p(self) -> dict[str, float]:
+        """Log p-value of what each cause explains that no sum of forces makes good."""
+        return {name: self._log_p(self._removed(name)) for name in self.causes}
+
+    def _log_p(self, removed: Removed | None) -> float:
+        if removed is None:
+            return -np.inf
+        gap = removed.loss + self._explained(None) - self._explained(removed)
+        return float(chi2_log_tail(max(gap, 0.0) / removed.inflation, len(removed.own)))
 
     def _removed(self, name: str) -> Removed | None:
-        """A cause taken out; None for one that is off at infinity: no slope leads there."""
+        """A cause taken out; None for one that is off at infinity: no slope leads there.
+
+        A coefficient gets its prior back, and may move as far as that lets it.
+        """
         off = off_values(self.fit, name)
         own = np.array([self.fit.names.index(path) for path in off])
         shift = np.array(list(off.values())) - self.fit.estimates[own]
         if not np.isfinite(shift).all():
             return None
-        if name not in self.fit.effects:
-            shift = np.array([-self.fit.point.z[own[0]]])
         hessian = self.projector.hessian
         rest = np.setdiff1d(np.arange(len(hessian)), own)
         across = hessian[np.ix_(rest, own)]
         along = np.linalg.solve(hessian[np.ix_(rest, rest)], across)
         left = hessian[np.ix_(own, own)] - across.T @ along
+        freed = np.linalg.inv(left)
         loss = float(shift @ left @ shift)
-        return Removed(loss, shift, own, rest, along, left, self._inflation(own))
+        if name not in self.fit.effects:
+            z, held = float(self.fit.point.z[own[0]]), float(left[0, 0])
+            shift = np.array([-z / (1.0 + held)])
+            loss = z * z * held / (1.0 + held)
+            freed = freed - 1.0 / (1.0 + held)
+        return Removed(loss, shift, own, rest, along, freed, self._inflation(own))
 
     def _inflation(self, own: FloatArray) -> float:
         """Of the variance of some parameters, by coloured residuals."""
@@ -176,7 +181,7 @@ class StandIns:
         score = np.concatenate([s.score for s in signals])
         if removed is not None:
             seen = removed.seen(self.projector.hessian @ followed)
-            info = info + seen.T @ np.linalg.solve(removed.left, seen)
+            info = info + seen.T @ removed.freed @ seen
             score = score - seen.T @ removed.shift
         return info, score
 

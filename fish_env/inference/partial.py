@@ -113,7 +113,7 @@ class StandIns:
 
     def log_p(self) -> dict[str, float]:
         """Log p-value of what each cause explains that no sum of forces makes good."""
-        return {name: self._log_p(self._removed(name)) for name in self.causes}
+        return {name: self._log_p(self.removed(name)) for name in self.causes}
 
     def _log_p(self, removed: Removed | None) -> float:
         if removed is None:
@@ -121,7 +121,7 @@ class StandIns:
         gap = removed.loss + self._explained(None) - self._explained(removed)
         return float(chi2_log_tail(max(gap, 0.0) / removed.inflation, len(removed.own)))
 
-    def _removed(self, name: str) -> Removed | None:
+    def removed(self, name: str) -> Removed | None:
         """A cause taken out; None for one that is off at infinity: no slope leads there.
 
         A coefficient gets its prior back, and may move as far as that lets it.
@@ -156,7 +156,7 @@ class StandIns:
     @cached_property
     def _pool(self) -> list[Signal]:
         """Forces that are most indicated beside all causes, or without one of them."""
-        removed = [None, *(r for r in map(self._removed, self.causes) if r is not None)]
+        removed = [None, *(r for r in map(self.removed, self.causes) if r is not None)]
         best: list[list[tuple[float, int, Signal]]] = [[] for _ in removed]
         forces = self.fit.problem.generic_terms(self.fit)
         for column, signal in generic_signals(forces, self.projector):

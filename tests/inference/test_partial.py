@@ -1,0 +1,51 @@
+"""Causes beside something unknown: those that act are named, imitations are not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fish_env.inference.estimate.fit import fit
+from fish_env.inference.explanation import Explanation
+from fish_env.inference.partial import StandIns, confirmed
+from fish_env.inference.pipeline import infer
+from tests.inference.boat import sail
+from tests.inference.boat_problem import BoatProblem
+from tests.inference.test_boat import BIAS, EAST, FITTED, NORTH, problems, wind
+
+THRESHOLD = -10.0
+
+
+@pytest.mark.parametrize("seed", [3, 4, 5])
+def test_a_cause_beside_an_unknown_force_is_named(seed):
+    result = infer(*problems(seed, {NORTH: 0.15, EAST: -0.2}, foreign=wind), seed=seed)
+    assert result.verdict.name == "partial"
+    assert result.verdict.causes == ("current",)
+
+
+@pytest.mark.parametrize("seed", [3, 4, 5])
+def test_a_cause_that_a_force_of_no_origin_replaces_is_not_named(seed):
+    """A rudder askew makes a moment with the square of the speed."""
+    result = infer(*problems(seed, {BIAS: 0.06}, foreign=wind), seed=seed)
+    assert result.verdict.name == "outside_library"
+
+
+def test_an_imitation_of_an_unknown_force_is_not_confirmed():
+    boat = BoatProblem(sail(np.random.default_rng(2), FITTED, foreign=wind))
+    imitation = Explanation(("current",), fit(boat, ("current",)))
+    assert confirmed(imitation, THRESHOLD) is None
+
+
+def test_where_nothing_is_unknown_a_cause_is_confirmed():
+    boat = BoatProblem(sail(np.random.default_rng(7), FITTED, {NORTH: 0.15, EAST: -0.2}))
+    right = Explanation(("current",), fit(boat, ("current",)))
+    assert confirmed(right, THRESHOLD) is right
+    assert StandIns(right, THRESHOLD).log_p()["current"] < THRESHOLD
+
+
+def test_a_removed_cause_costs_what_a_fit_without_it_loses():
+    boat = BoatProblem(sail(np.random.default_rng(7), FITTED, {NORTH: 0.05}))
+    right = fit(boat, ("current",))
+    removed = StandIns(Explanation(("current",), right), THRESHOLD).removed("current")
+    without = fit(boat, (), noise=right.noise, refit_noise=False, iterations=10)
+    assert removed.loss == pytest.approx(without.objective - right.objective, rel=0.1)

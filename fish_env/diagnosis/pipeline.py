@@ -186,7 +186,8 @@ def _diagnose_runs(
     every = SeriesProblem(dataset, fish, dt=effort.step_s)
     if effort.retries:
         every = with_own_beats(every, own_beats(every))
-    problem = _named(every, fitted).subset(effort.runs).until(effort.seconds)
+    chosen = _named(every, fitted)
+    problem = chosen.some(chosen.spread(effort.runs)).until(effort.seconds)
     judging = _named(every, final) if final else None
     progress("comparing the channels with each other")
     progress("refitting the baseline")

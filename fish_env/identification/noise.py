@@ -135,8 +135,8 @@ def fitted_noise(
         noise: the present noise model.
         largest_sensor_sd: as :func:`fit_noise` takes it.
     """
-    # What is missing shows in whitened residuals only if the noise is as large as what is missing.
-    within = disturbance_range(problem.fish).widened(POLICY.largest_disturbance)
+    plausible = disturbance_range(problem.fish)
+    wide = plausible.widened(POLICY.largest_disturbance)
     found = noise
     for _ in range(3):
         runs, made_with = problem.filtered(point, found, keep_slopes=True), found
@@ -146,7 +146,11 @@ def fitted_noise(
             small_disturbance(found.sensor_sd), phase_sd=found.phase_sd, spread=found.spread
         )
         start = max((found, small), key=replay)
-        found = fit_noise(replay, start, within, 45, largest_sensor_sd)
+        found = fit_noise(replay, start, plausible, 45, largest_sensor_sd)
+        if plausible.left_by(found):
+            # What is missing shows in whitened residuals only if the noise is as large as it is.
+            start = max((found, start), key=replay)
+            found = fit_noise(replay, start, wide, 45, largest_sensor_sd)
         if made_with.is_close(found, 0.4):
             break
     return found

@@ -33,6 +33,7 @@ from fish_env.identification.noise import (
     white_noise_sd,
 )
 from fish_env.identification.open_loop import windows, without_feedback
+from fish_env.identification.own_beats import beside_measured
 from fish_env.identification.parameters import ALIKE, Baseline, changes_of, neutral_values
 from fish_env.identification.phases import settle_phases
 from fish_env.identification.runs import FINER, RunData, prepare_run
@@ -49,13 +50,7 @@ from fish_env.model.effect import Effect
 from fish_env.params.io import load_fish
 from fish_env.params.schema import FishParams
 
-RANDOM_WALK_PHASE = 0.3
-"""rad/s^0.5. Enough to stay in step with a beat that is a tenth off."""
-
-
-BESIDE_MEASURED = (-6e-3, -3e-3, 0.0, 3e-3, 6e-3)
-"""Departures from the measured beat that a fit begins from: less than a third of a cycle in a run
-of a minute."""
+RANDOM_WALK_PHASE = 0.3  # rad/s^0.5, enough to stay in step with a beat that is a tenth off
 
 
 class SeriesProblem(Problem):
@@ -136,22 +131,13 @@ class SeriesProblem(Problem):
             self._filters[stages] = RunFilter(model, self.runs, self.channels)
         return self._filters[stages]
 
-    def subset(self, count: int) -> SeriesProblem:
-        """The same problem on at most ``count`` runs, spread over all of them."""
-        if len(self.runs) <= count:
-            return self
-        return self.some(self.spread(count))
-
     def until(self, end_s: float) -> SeriesProblem:
         """The same problem on the beginnings of its runs."""
         return self.with_runs([run.until(end_s) for run in self.runs])
 
     def with_runs(self, runs: Sequence[RunData]) -> SeriesProblem:
         """The same problem on other runs."""
-        other = copy(self)
-        other.runs = tuple(runs)
-        other._filters = {}
-        return other
+        return self._but(runs=tuple(runs), _filters={})
 
     def neutral(self, names: Iterable[str]) -> dict[str, float]:
         """Values of effects as the fish's file has them, neutral where it says nothing."""
@@ -192,10 +178,8 @@ class SeriesProblem(Problem):
         self, filtered: Sequence[Filtered], noise: NoiseModel
     ) -> tuple[SeriesProblem, Sequence[Filtered], IntArray]:
         """Windows from filtered states over which the fish swims alone (see the protocol)."""
-        cut = [
-            windows(run, f, POLICY.prediction_window_s)
-            for run, f in zip(self.runs, filtered, strict=True)
-        ]
+        pairs = zip(self.runs, filtered, strict=True)
+        cut = [windows(run, f, POLICY.prediction_window_s) for run, f in pairs]
         problem = self.with_runs([window for own in cut for window in own])
         corners = bool(filtered and filtered[0].corners)
         still = [without_feedback(w, corners=corners, sd=noise.sensor_sd) for w in problem.runs]
@@ -224,7 +208,7 @@ class SeriesProblem(Problem):
     ) -> NoiseModel:
         """Noise model of largest likelihood at a point, from at most four runs."""
         largest = self.largest_sensor_sd if final else None
-        return fitted_noise(self.subset(4), point, noise, largest)
+        return fitted_noise(self.some(self.spread(4)), point, noise, largest)
 
     def disturbance_at_limit(self, noise: NoiseModel) -> tuple[str, ...]:
         """How the disturbance leaves what is plausible: a misfit with another name."""
@@ -245,7 +229,7 @@ class SeriesProblem(Problem):
         return all(run.phase_known for run in self.runs)
 
     def relaxed_noise(self, noise: NoiseModel) -> NoiseModel:
-        """The noise model with a random-walk tail phase, which follows a beat out of step."""
+        """The noise model with a random-walk tail phase."""
         return replace(noise, phase_sd=RANDOM_WALK_PHASE)
 
     def follows_drive(self, noise: NoiseModel) -> bool:
@@ -253,27 +237,17 @@ class SeriesProblem(Problem):
         return noise.phase_sd > 0.0
 
     def starting_grid(self, name: str) -> tuple[Mapping[str, float], ...]:
-        """Sizes of an effect that drifts in phase, close enough to put it in step again.
-
-        Where the phase at the start is unknown every size would have its own: then those around
-        the beat that was measured.
-        """
-        effect = self.known[name]
+        """Sizes of an effect that drifts in phase, close enough to put it in step again."""
         if self.starts_known:
-            return phase_grid(effect, max(run.beats for run in self.runs))
-        scales = [p for p in effect.switching if p.neutral == 1.0 and p.unit == "-"]
-        if not effect.drifts_in_phase or len(scales) != 1:
-            return ()
-        return tuple({scales[0].name: self.beat + off} for off in BESIDE_MEASURED)
+            return phase_grid(self.known[name], max(run.beats for run in self.runs))
+        return beside_measured(self.known[name], self.beat)
 
     def with_beat(self, beat: float) -> SeriesProblem:
         """The same problem, told at what multiple of the commanded frequency all runs beat."""
-        other = copy(self)
-        other.beat = beat
-        return other
+        return self._but(beat=beat)
 
     def batch_key(self, effects: Iterable[str]) -> frozenset[str]:
-        """Stages of the quickest kernel: settings of one kind pay for no effects of another."""
+        """Stages of the quickest kernel."""
         return self.stages_for(effects)
 
     @property
@@ -336,8 +310,8 @@ class SeriesProblem(Problem):
             filtered: gains to use.
             pushes: a prescribed wrench for each point.
         """
-        records, measurement = self.lanes(z, effects)
-        return self.filter_for(effects).innovations(records, measurement, noise, filtered, pushes)
+        lanes = self.lanes(z, effects)
+        return self.filter_for(effects).innovations(*lanes, noise, filtered, pushes)
 
     def changes(
         self,
@@ -349,7 +323,7 @@ class SeriesProblem(Problem):
     ) -> FloatArray:
         """What :meth:`innovations` change from the first point to each other (N - 1, residuals)."""
         rows = self.innovations(z, effects, noise, filtered, pushes)
-        rows[1:] -= rows[0]  # in place: fresh memory costs as much as the arithmetic
+        rows[1:] -= rows[0]
         return rows[1:]
 
     def filtered(
@@ -373,15 +347,15 @@ class SeriesProblem(Problem):
 
     def without_refinement(self) -> SeriesProblem:
         """The same problem without finer steps for effects that make the tail's rate jump."""
-        return self._refining(False)
+        return self._but(unrefined=True)
 
     def with_refinement(self) -> SeriesProblem:
         """The same problem with finer steps for effects that make the tail's rate jump."""
-        return self._refining(True)
+        return self._but(unrefined=False)
 
-    def _refining(self, refining: bool) -> SeriesProblem:
+    def _but(self, **changes: Any) -> SeriesProblem:
         other = copy(self)
-        other.unrefined = not refining
+        vars(other).update(changes)
         return other
 
     def with_long_steps(self) -> SeriesProblem:
@@ -403,8 +377,7 @@ class SeriesProblem(Problem):
 
     def lane(self, point: Point) -> tuple[FloatArray, Measurement]:
         """Parameter record (parameters, 1) of a point, and what its sensors do."""
-        effects = {path: np.array([value]) for path, value in point.effects.items()}
-        return self.lanes(point.z[:, None], effects)
+        return self.lanes(point.z[:, None], {k: np.array([v]) for k, v in point.effects.items()})
 
     def lanes(
         self, z: FloatArray, effects: Mapping[str, FloatArray]

@@ -318,9 +318,10 @@ def _best_first(
 def in_full(problem: Problem, coarse: CoarseFit, noise: Any) -> Fit | None:
     """The full fit from a coarse one, first on a few runs; None where the simulation diverges."""
     few = problem.subset(3)
-    first = reached(
-        lambda: fit(few, coarse.effects, coarse.point, noise, coarse.released, rounds=1)
-    )
+    # The noise of the sensors is told in a second round only.
+    rounds = 2 if few is problem else 1
+    start = (coarse.effects, coarse.point, noise, coarse.released)
+    first = reached(lambda: fit(few, *start, rounds=rounds))
     return first if first is None or few is problem else _noise_too(problem, first)
 
 

@@ -82,8 +82,7 @@ class SeriesProblem(Problem):
         user_effects: Iterable[Effect] = (),
         dt: float = 0.01,
     ) -> None:
-        self.dataset = dataset
-        self.fish = fish or load_fish(dataset.fish)
+        self.dataset, self.fish = dataset, fish or load_fish(dataset.fish)
         self.known = {**catalogue(), **{e.name: e for e in user_effects}}
         own = tuple(effect for effect in self.known.values() if effect.name not in catalogue())
         self.model: ExtendedModel = build_model(
@@ -187,7 +186,7 @@ class SeriesProblem(Problem):
 
     @property
     def run_ids(self) -> tuple[str, ...]:
-        """Ids of the runs."""
+        """Ids."""
         return tuple(run.id for run in self.runs)
 
     def some(self, runs: Sequence[int]) -> SeriesProblem:
@@ -238,9 +237,9 @@ class SeriesProblem(Problem):
 
     def starting_grid(self, name: str) -> tuple[Mapping[str, float], ...]:
         """Sizes of an effect that drifts in phase, close enough to put it in step again."""
-        if self.starts_known:
-            return phase_grid(self.known[name], max(run.beats for run in self.runs))
-        return beside_measured(self.known[name], self.beat)
+        if not self.starts_known:
+            return beside_measured(self.known[name], self.beat)
+        return phase_grid(self.known[name], max(run.beats for run in self.runs))
 
     def with_beat(self, beat: float) -> SeriesProblem:
         """The same problem, told at what multiple of the commanded frequency all runs beat."""

@@ -151,8 +151,8 @@ def _beyond(
 ) -> bool:
     """Whether an interval lies wholly outside so many times what could be, seen from neutral."""
     neutral, (low, high) = parameter.neutral, parameter.plausible
-    if not np.isfinite(neutral):
-        return interval[1] < low / times
+    if not np.isfinite(neutral):  # such a limit is the stronger, the closer to zero it is
+        return interval[1] < low / times if neutral > 0.0 else interval[0] > high / times
     below, above = min(low - neutral, 0.0), max(high - neutral, 0.0)
     return bool(interval[0] > neutral + times * above or interval[1] < neutral + times * below)
 

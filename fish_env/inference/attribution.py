@@ -11,6 +11,7 @@ from scipy.special import stdtrit
 
 from fish_env.arrays import FloatArray
 from fish_env.inference.adequacy import disturbance_at_limit, implausible_estimates
+from fish_env.inference.drive import beside_drive
 from fish_env.inference.effort import FULL, Effort
 from fish_env.inference.elimination import backward_elimination
 from fish_env.inference.estimate.fit import Fit, finished, refined
@@ -133,6 +134,8 @@ def extended(
         if any(tied(found.accepted, e) for e in found.rivals):
             break
         more = search.contest(found)
+        if not found.accepted.causes:
+            more = search.in_step(found, more)
         if more is None or more.accepted.causes == found.accepted.causes:
             found = more or found
             break
@@ -190,6 +193,27 @@ class Search:
         return replace(
             found, accepted=current, rivals=rivals, screens=(*found.screens, after), gain=gain,
             failed=frozenset(),
+        )  # fmt: skip
+
+    def in_step(self, begun: Attribution, found: Attribution | None) -> Attribution | None:
+        """With a cause and what puts the drive in step, where they explain more than one cause.
+
+        Args:
+            begun: without a cause.
+            found: with the best single cause, if there is one.
+        """
+        best = (found or begun).accepted
+        if not (self.effort.retries and disturbance_at_limit(best.fit)):
+            return found
+        more = beside_drive(begun.accepted, best, self.causes, self.rng, self.effort, self.report)
+        if more is None:
+            return found
+        accepted = more.explanation.varied(beside_misfit=True)
+        after = screen(accepted.fit, self.causes, self.rng)
+        return replace(
+            begun, accepted=accepted, screens=(*begun.screens, after), rivals=(),
+            ranking=ranking_of(more.tried, more.base), failed=frozenset(),
+            gain=(found or begun).gain + best.score - accepted.score,
         )  # fmt: skip
 
     def contest(self, found: Attribution) -> Attribution | None:

@@ -25,7 +25,7 @@ from fish_env.inference.estimate.fit import Fit, finished, fit
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.gain import gap_closed
 from fish_env.inference.parallel import both
-from fish_env.inference.partial import Describe, confirmed
+from fish_env.inference.partial import Describe, confirmed, sustained
 from fish_env.inference.policy import POLICY
 from fish_env.inference.preconditions import preconditions
 from fish_env.inference.probes import Cause, causes_of
@@ -116,7 +116,7 @@ def investigate(
     partly_known = verdict.name == "outside_library" and bool(attribution.accepted.causes)
     if effort.retries and partly_known:
         report("testing which causes act beside what is unknown")
-        attribution, verdict = partly(attribution, left, verdict)
+        attribution, verdict = partly(attribution, left, verdict, rng)
     attribution = attribution.extrapolated()
     gap = None
     if verdict.name in EXTENDING and held_out is not None:
@@ -132,7 +132,7 @@ def investigate(
 
 
 def partly(
-    attribution: Attribution, left: Adequacy, verdict: Verdict
+    attribution: Attribution, left: Adequacy, verdict: Verdict, rng: np.random.Generator
 ) -> tuple[Attribution, Verdict]:
     """The verdict ``partial`` where known causes act beside something unknown.
 
@@ -140,8 +140,10 @@ def partly(
         attribution: what was found.
         left: adequacy of the accepted explanation, which is not adequate.
         verdict: the verdict without such causes.
+        rng: for intervals of shares.
     """
     found = confirmed(attribution.accepted, left.threshold)
+    found = sustained(found, rng) if found else None
     if found is None:
         return attribution, verdict
     rivals = tuple(e for e in attribution.rivals if len(e.causes) == len(found.causes))

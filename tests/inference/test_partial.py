@@ -7,7 +7,7 @@ import pytest
 
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.explanation import Explanation
-from fish_env.inference.partial import StandIns, confirmed
+from fish_env.inference.partial import StandIns, confirmed, sustained
 from fish_env.inference.pipeline import infer
 from tests.inference.boat import sail
 from tests.inference.boat_problem import BoatProblem
@@ -49,3 +49,22 @@ def test_a_removed_cause_costs_what_a_fit_without_it_loses():
     removed = StandIns(Explanation(("current",), right), THRESHOLD).removed("current")
     without = fit(boat, (), noise=right.noise, refit_noise=False, iterations=10)
     assert removed.loss == pytest.approx(without.objective - right.objective, rel=0.1)
+
+
+@pytest.mark.parametrize("seed", [4, 5, 6])
+def test_a_cause_that_improves_no_simulation_is_dropped(seed):
+    """No rudder is askew: the current is all that simulations get better by."""
+    rng = np.random.default_rng(seed)
+    boat = BoatProblem(sail(rng, FITTED, {NORTH: 0.15, EAST: -0.2}, foreign=wind))
+    both = Explanation(("current", "rudder_bias"), fit(boat, ("current", "rudder_bias")))
+    found = sustained(both, rng)
+    assert found is not None
+    assert found.causes == ("current",)
+
+
+@pytest.mark.parametrize("seed", [4, 5, 6])
+def test_a_cause_that_improves_every_simulation_stays(seed):
+    rng = np.random.default_rng(seed)
+    boat = BoatProblem(sail(rng, FITTED, {BIAS: 0.06}, foreign=wind))
+    right = Explanation(("rudder_bias",), fit(boat, ("rudder_bias",)))
+    assert sustained(right, rng) is right

@@ -28,6 +28,10 @@ SETTLED_S = 3.0
 """s. A run that begins in motion is compared from here on."""
 STEP_S = 0.02
 """s. Physics step: only averages are wanted."""
+BY_NOISE = 1e-3
+"""Probability that noise alone makes a way that counts."""
+QUARTILE = 0.6745
+"""Median of the absolute value of a standard normal number."""
 AGAINST = "against commands"
 Simulated = dict[str, FloatArray]
 
@@ -114,5 +118,19 @@ def _mean(columns: Sequence[FloatArray], stride: int) -> FloatArray:
 
 
 def _speed(columns: Sequence[FloatArray], stride: int) -> FloatArray:
+    """Way in the time of a stride; NaN where noise makes as long a one.
+
+    A way has no sign, so the noise of positions does not cancel in it: positions that are nothing
+    but noise would look like a fast fish.
+    """
     way: FloatArray = np.hypot(*(grown(column, stride) for column in columns))
-    return way
+    noise = float(np.linalg.norm([_noise(column) for column in columns]))
+    # The way between two positions with this noise is Rayleigh distributed.
+    return np.where(way > noise * np.sqrt(-2.0 * np.log(BY_NOISE)), way, np.nan)
+
+
+def _noise(column: FloatArray) -> float:
+    """Standard deviation of white noise in a column, from its second differences."""
+    bends = np.abs(np.diff(column, 2))
+    bends = bends[np.isfinite(bends)]
+    return float(np.median(bends)) / (QUARTILE * np.sqrt(6.0)) if len(bends) else 0.0

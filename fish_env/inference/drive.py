@@ -1,0 +1,119 @@
+"""Causes beside a periodic drive that is out of step.
+
+A drive that is slower or quicker than commanded hides what else is wrong, and is hidden by it: no
+single cause explains much, and what compensates best wins a contest of single causes. Under relaxed
+noise the filter follows the drive whatever its frequency. What else is wrong then shows first, and
+beside it what puts the drive in step again. All that is compared in the end is in step by itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fish_env.inference.effort import Effort
+from fish_env.inference.estimate.fit import Fit, fit
+from fish_env.inference.explanation import Explanation, reached
+from fish_env.inference.policy import POLICY
+from fish_env.inference.probes import Cause
+from fish_env.inference.problem import Problem
+from fish_env.inference.screening import screen
+from fish_env.inference.search import refits
+from fish_env.inference.shortlist import shortlisted
+
+FEW_RUNS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Followed:
+    """What was found while the drive was followed.
+
+    Attributes:
+        explanation: causes with their fit, the drive in step by them.
+        tried: fits with one cause each while the drive was followed, best first.
+        base: the fit without a cause, under the noise of the best.
+    """
+
+    explanation: Explanation
+    tried: Sequence[Explanation]
+    base: Explanation
+
+
+def beside_drive(
+    nothing: Explanation,
+    best: Explanation,
+    causes: Sequence[Cause],
+    rng: np.random.Generator,
+    effort: Effort,
+    report: Callable[[str], None],
+) -> Followed | None:
+    """A cause with what puts the drive in step, if they explain more than the best single cause.
+
+    Args:
+        nothing: the refitted baseline.
+        best: the best single cause; the baseline where none is significant.
+        causes: causes to consider.
+        rng: for null distributions.
+        effort: how much to spend.
+        report: told what is being done.
+
+    Returns:
+        What was found; None where the drive explains less than the best cause, or nothing more is
+        found.
+    """
+    loose = _relaxed(nothing.fit, best.fit.objective, report)
+    if loose is None:
+        return None
+    problem = loose.fit.problem
+    chosen = shortlisted(problem, screen(loose.fit, causes, rng), effort.shortlist)
+    tried, base = refits(loose, chosen, report, effort=effort)
+    if not tried or base is None or base.score - tried[0].score < POLICY.evidence_doubt:
+        return None
+    first = tried[0]
+    own = _under(problem, first.fit, nothing.fit.noise, 2)
+    if own is None:
+        return None
+    begun = Explanation(first.causes, own)
+    found = min(
+        (begun, *_with_drive(begun, first.fit, causes, rng, effort, report)), key=lambda e: e.score
+    )
+    return Followed(found, tried, base) if found.score < best.score else None
+
+
+def _relaxed(baseline: Fit, objective: float, report: Callable[[str], None]) -> Explanation | None:
+    """The baseline under relaxed noise; None where that explains less than an objective says."""
+    noise = baseline.problem.relaxed_noise(baseline.noise)
+    if noise is None:
+        return None
+    report("following the drive")
+    loose = _under(baseline.problem, baseline, noise, 2)
+    if loose is None or loose.objective > objective - POLICY.evidence_doubt:
+        return None
+    return Explanation((), loose).varied(beside_misfit=True)
+
+
+def _with_drive(
+    begun: Explanation,
+    followed: Fit,
+    causes: Sequence[Cause],
+    rng: np.random.Generator,
+    effort: Effort,
+    report: Callable[[str], None],
+) -> list[Explanation]:
+    """Fits with a cause and one effect that puts the drive in step, best first."""
+    problem = begun.fit.problem
+    known = problem.known
+    drives = [c for c in causes if c.is_effect and known[c.name].drifts_in_phase]
+    shown = list(screen(followed, drives, rng).best())
+    few = _under(problem.subset(FEW_RUNS), followed, followed.noise, 1)
+    if few is None or not shown:
+        return []
+    return refits(begun, shown, report, (few, shown), effort)[0]
+
+
+def _under(problem: Problem, at: Fit, noise: Any, rounds: int) -> Fit | None:
+    """A fit again, from a noise model; None where the simulation diverges."""
+    return reached(lambda: fit(problem, at.effects, at.point, noise, at.released, rounds=rounds))

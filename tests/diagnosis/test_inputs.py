@@ -28,6 +28,7 @@ from tests.diagnosis.mistakes import (
     sensed,
     times,
 )
+from tests.identification.synthetic import Setup, simulate
 
 FIRST = 60012
 """A multiple of 18; no number of a suite or of a calibration."""
@@ -240,3 +241,15 @@ def test_what_was_put_right_is_noted_with_the_data():
     assert found.dataset.notes[-1] == "inputs: r has the wrong sign"
     assert found.logged.notes == sensed(NINE, FIRST).notes
     assert check_module.without(found.dataset, ["r"]).channels[-1] == "q"
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_noise_in_place_of_measurements_is_no_wrong_unit(seed):
+    """Positions that are nothing but noise look fast, as centimetres for millimetres would."""
+    rng = np.random.default_rng(seed)
+    data = simulate(Setup(runs=8, duration=30.0))
+    runs = [
+        replace(run, channels={n: rng.normal(0.0, 0.3, v.shape) for n, v in run.channels.items()})
+        for run in data.runs
+    ]
+    assert check_inputs(replace(data, runs=tuple(runs))).faults == ()

@@ -38,6 +38,8 @@ POOL = 32
 MOST = 8
 APART = 1e-3
 """Share of a wrench that those already chosen must leave."""
+ROUNDS, ROUNDS_BESIDE = 4, 2
+"""Most rounds of choosing and fitting: alone, and beside causes, where a round takes longest."""
 RESTING = 0.3
 """Standard errors by which sizes may still move at the end."""
 
@@ -119,7 +121,7 @@ class _State:
 
 
 def residual_model(
-    explanation: Fit, threshold: float, final: Problem | None, rounds: int = 4
+    explanation: Fit, threshold: float, final: Problem | None, rounds: int | None = None
 ) -> ResidualModel | None:
     """What an explanation leaves, as a sum of simple wrenches.
 
@@ -127,7 +129,7 @@ def residual_model(
         explanation: the best one there is.
         threshold: log p-value of a wrench that chance passes rarely enough.
         final: runs that chose nothing.
-        rounds: most rounds of choosing and fitting.
+        rounds: most rounds of choosing and fitting; default: fewer beside causes.
 
     Returns:
         None where the data ask for no wrench beyond chance, or where they are not explained better
@@ -135,7 +137,8 @@ def residual_model(
     """
     like = forces = generic_forces(series_of(explanation).runs, explanation.filtered)
     state = _State(explanation, np.zeros(0, np.int64), np.zeros(0), np.zeros(0))
-    for _ in range(rounds):
+    most = ROUNDS_BESIDE if explanation.effects else ROUNDS
+    for _ in range(most if rounds is None else rounds):
         chosen = _enlarged(state, forces, threshold)
         if not len(chosen.columns):
             return None

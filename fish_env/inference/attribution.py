@@ -134,8 +134,6 @@ def extended(
         if any(tied(found.accepted, e) for e in found.rivals):
             break
         more = search.contest(found)
-        if not found.accepted.causes:
-            more = search.in_step(found, more)
         if more is None or more.accepted.causes == found.accepted.causes:
             found = more or found
             break
@@ -195,25 +193,24 @@ class Search:
             failed=frozenset(),
         )  # fmt: skip
 
-    def in_step(self, begun: Attribution, found: Attribution | None) -> Attribution | None:
-        """With a cause and what puts the drive in step, where they explain more than one cause.
+    def in_step(self, begun: Attribution, best: Explanation) -> Attribution | None:
+        """With a cause and what puts the drive in step; None where one cause explains more.
 
         Args:
             begun: without a cause.
-            found: with the best single cause, if there is one.
+            best: with the best single cause; without one where none shows.
         """
-        best = (found or begun).accepted
         if not (self.effort.retries and disturbance_at_limit(best.fit)):
-            return found
-        more = beside_drive(begun.accepted, best, self.causes, self.rng, self.effort, self.report)
+            return None
+        nothing = begun.accepted
+        more = beside_drive(nothing, best, self.causes, self.rng, self.effort, self.report)
         if more is None:
-            return found
-        accepted = more.explanation.varied(beside_misfit=True)
+            return None
+        accepted = more.explanation
         after = screen(accepted.fit, self.causes, self.rng)
         return replace(
-            begun, accepted=accepted, screens=(*begun.screens, after), rivals=(),
-            ranking=ranking_of(more.tried, more.base), failed=frozenset(),
-            gain=(found or begun).gain + best.score - accepted.score,
+            begun, accepted=accepted, screens=(*begun.screens, after),
+            ranking=ranking_of(more.tried, more.base), gain=nothing.score - accepted.score,
         )  # fmt: skip
 
     def contest(self, found: Attribution) -> Attribution | None:
@@ -236,8 +233,11 @@ class Search:
             chosen = [signal for signal in chosen if not signal.cause.is_effect]
         chosen = [signal for signal in chosen if signal.cause.name not in found.failed]
         tried, base = self._tried(current, chosen, shown, effort)
-        if base is None:
-            return None
+        in_step = None
+        if not current.causes:
+            in_step = self.in_step(found, tried[0] if tried else current)
+        if in_step is not None or base is None:
+            return in_step
         ranking = found.ranking or ranking_of(tried, base)
         if current.causes and not implausible_estimates(current.fit):
             tried = [e for e in tried if not implausible_estimates(e.fit)]

@@ -48,7 +48,6 @@ EFFECT = Effect(
     initial_states=start_anywhere,
     order=3,
     step_error=0.003,
-    diagnosed=False,
     confusable_with=(
         "offset_gain",
         "swing_loss",

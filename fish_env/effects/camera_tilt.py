@@ -22,7 +22,6 @@ EFFECT = Effect(
     source="Extrinsic calibration of a camera: Hartley and Zisserman, Multiple View Geometry",
     parameters=(_angle("roll"), _angle("pitch")),
     geometry=tilt,
-    diagnosed=False,
     confusable_with=(
         "attitude_misalignment",
         "marker_offset",

@@ -22,7 +22,6 @@ EFFECT = Effect(
     source="Scale-factor error of a gyro: Titterton and Weston, section 4.2",
     parameters=(_axis("p", "x"), _axis("q", "y"), _axis("r", "z")),
     measure=scale_rates,
-    diagnosed=False,
     order=-1,
     confusable_with=(
         "clock_scale",

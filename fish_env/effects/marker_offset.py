@@ -26,6 +26,5 @@ EFFECT = Effect(
         _component("z", "below"),
     ),
     geometry=marker,
-    diagnosed=False,
     confusable_with=("camera_tilt",),
 )

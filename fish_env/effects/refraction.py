@@ -27,6 +27,5 @@ EFFECT = Effect(
         EffectParameter("height", "m", inf, 0.1, inf, (1.0, 5.0), "camera above the water"),
     ),
     geometry=bent,
-    diagnosed=False,
     confusable_with=("position_scale",),
 )

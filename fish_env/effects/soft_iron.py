@@ -24,6 +24,5 @@ EFFECT = Effect(
         EffectParameter("angle", "rad", 0.0, -7.0, 7.0, (-3.0, 3.0), "where it is", shapes=True),
     ),
     geometry=iron,
-    diagnosed=False,
     confusable_with=("attitude_misalignment",),
 )

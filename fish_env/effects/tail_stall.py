@@ -46,7 +46,6 @@ EFFECT = Effect(
         ),
     ),
     hooks={"tail_lift": lose_lift},
-    diagnosed=False,
     confusable_with=(
         "tail_gain",
         "tail_reactive",

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from fish_env.inference.adequacy import implausible_estimates
 from fish_env.inference.effort import Effort
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.explanation import Explanation, reached
@@ -68,8 +69,11 @@ def beside_drive(
     if loose is None:
         return None
     problem = loose.fit.problem
-    chosen = shortlisted(problem, screen(loose.fit, causes, rng), effort.shortlist)
+    # What else is missing pulls at coefficients, and one of them would win.
+    effects = [cause for cause in causes if cause.is_effect]
+    chosen = shortlisted(problem, screen(loose.fit, effects, rng), effort.shortlist)
     tried, base = refits(loose, chosen, report, effort=effort)
+    tried = [e for e in tried if not implausible_estimates(e.fit)]
     if not tried or base is None or base.score - tried[0].score < POLICY.evidence_doubt:
         return None
     first = tried[0]

@@ -30,6 +30,11 @@ NEEDS: dict[str, tuple[tuple[str, ...], ...]] = {
     "position_scale": (_MOVING,),
     "sensor_delay": (),
     "depth_bias": (),
+    "camera_tilt": (),
+    "gyro_scale": (),
+    "marker_offset": (),
+    "refraction": (),
+    "soft_iron": (),
 }
 """Sets of channels, each of which lets kinematics show an effect; none for what it never shows."""
 
@@ -38,6 +43,8 @@ NEVER = {
     "sensor_delay": "all channels share the delay, so only the commands can tell it",
     "depth_bias": "a shifted depth is a depth like any other",
 }
+LATER = ("camera_tilt", "gyro_scale", "marker_offset", "refraction", "soft_iron")
+"""Effects that this test has no setting for; fits of the motion look for them."""
 LOOKS_ALIKE = {
     "clock_scale": "`clock_skew`, or a gyro with a wrong gain (`gyro_scale`)",
     "attitude_misalignment": "a gyro that is mounted askew",
@@ -221,6 +228,8 @@ def _words(
 ) -> str:
     if effect in NEVER:
         return f"{effect}: kinematics cannot show it; {NEVER[effect]}."
+    if effect in LATER:
+        return f"{effect}: not tested here; fits of the motion look for it."
     if not parameters and needs:
         return f"{effect}: not to be seen without {', '.join(needs)}."
     if not parameters:

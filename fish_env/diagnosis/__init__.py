@@ -4,6 +4,7 @@
 the fits and screens for a closer look.
 """
 
-from fish_env.diagnosis.pipeline import Diagnosis, diagnose, diagnose_runs
+from fish_env.diagnosis.pipeline import diagnose, diagnose_runs
+from fish_env.diagnosis.result import Diagnosis
 
 __all__ = ["Diagnosis", "diagnose", "diagnose_runs"]

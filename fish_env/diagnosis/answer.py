@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from statistics import pstdev
-from typing import TYPE_CHECKING
 
 from fish_env.data.schema import Dataset
 from fish_env.diagnosis.entries import (
@@ -22,7 +21,7 @@ from fish_env.diagnosis.entries import (
 )
 from fish_env.diagnosis.input_checks import doubts
 from fish_env.diagnosis.regimes import as_plain
-from fish_env.diagnosis.result import Diagnosed
+from fish_env.diagnosis.result import Diagnosed, Diagnosis
 from fish_env.identification.beats import beats_of, by_run, uneven
 from fish_env.identification.generic_forces import wrench_unit
 from fish_env.identification.own_beats import USUAL_BEAT
@@ -35,9 +34,6 @@ from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import coefficient_sizes
 from fish_env.inference.screening import smallest_detectable
 from fish_env.rigidbody import consistency, noise_floor, outliers
-
-if TYPE_CHECKING:
-    from fish_env.diagnosis.pipeline import Diagnosis
 
 
 def as_dict(diagnosis: Diagnosis) -> Plain:

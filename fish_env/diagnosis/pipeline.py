@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,12 +16,12 @@ from fish_env.diagnosis.answer import as_dict
 from fish_env.diagnosis.extended_file import extended_fish
 from fish_env.diagnosis.gain import measure_gain, misfit_of, one_step
 from fish_env.diagnosis.input_checks import check_runs, divergence
-from fish_env.diagnosis.inputs.check import Inputs, check_inputs
+from fish_env.diagnosis.inputs.check import check_inputs
 from fish_env.diagnosis.next_experiment import propose
-from fish_env.diagnosis.regimes import Localisation, localise_fits
+from fish_env.diagnosis.regimes import localise_fits
 from fish_env.diagnosis.report import ReportSeries, series_from, write_report
 from fish_env.diagnosis.residual_model import ResidualModel, residual_model
-from fish_env.diagnosis.result import Diagnosed
+from fish_env.diagnosis.result import Diagnosis
 from fish_env.diagnosis.tables.pipeline import diagnose_steady
 from fish_env.diagnosis.writing import outputs, write_answer
 from fish_env.errors import DatasetError
@@ -43,36 +42,8 @@ from fish_env.params.io import as_fish, fish_files
 from fish_env.params.schema import FishParams
 from fish_env.rigidbody.consistency import Consistency, check_consistency
 from fish_env.rigidbody.noise_floor import Floor, noise_floors
-from fish_env.rigidbody.outliers import Outliers
 
 Progress = Callable[[str], None]
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Diagnosis(Diagnosed):
-    """Everything a diagnosis of runs found.
-
-    Attributes:
-        outliers: samples of each channel that were left out.
-        inputs: what is wrong with the data or their description, and the data put right, which
-            everything else is about.
-        final_runs: ids of the runs kept for judging.
-        floors: noise of each channel, from the data alone.
-        consistency: whether the channels agree among themselves.
-        problem: the others.
-        localisation: where in the regime the baseline's misfit sits.
-        residual: what no known cause explains, as a sum of simple wrenches, if it can be so told.
-    """
-
-    dataset: Dataset
-    outliers: tuple[Outliers, ...]
-    inputs: Inputs
-    final_runs: tuple[str, ...]
-    floors: tuple[Floor, ...]
-    consistency: Consistency
-    problem: SeriesProblem
-    localisation: Localisation
-    residual: ResidualModel | None
 
 
 def diagnose(

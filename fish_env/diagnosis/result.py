@@ -1,4 +1,4 @@
-"""What every diagnosis holds, whatever was measured."""
+"""What a diagnosis holds: of every kind of data, of runs over time, of tables."""
 
 from __future__ import annotations
 
@@ -6,13 +6,21 @@ from dataclasses import dataclass
 
 from fish_env.data.schema import Dataset, SteadyDataset
 from fish_env.diagnosis.gain import Gain, Pair
+from fish_env.diagnosis.inputs.check import Inputs
 from fish_env.diagnosis.next_experiment import Proposal
+from fish_env.diagnosis.regimes import Localisation
+from fish_env.diagnosis.residual_model import ResidualModel
+from fish_env.identification.series import SeriesProblem
+from fish_env.identification.tables.problem import TableProblem
 from fish_env.inference.adequacy import Adequacy
 from fish_env.inference.attribution import Attribution
 from fish_env.inference.budget import Budget
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.preconditions import Precondition
 from fish_env.inference.verdict import Verdict
+from fish_env.rigidbody.consistency import Consistency
+from fish_env.rigidbody.noise_floor import Floor
+from fish_env.rigidbody.outliers import Outliers
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -51,3 +59,44 @@ class Diagnosed:
     def accepted(self) -> Fit:
         """The accepted fit: extended, or the refitted baseline."""
         return self.attribution.accepted.fit
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Diagnosis(Diagnosed):
+    """Everything a diagnosis of runs found.
+
+    Attributes:
+        outliers: samples of each channel that were left out.
+        inputs: what is wrong with the data or their description, and the data put right, which
+            everything else is about.
+        final_runs: ids of the runs kept for judging.
+        floors: noise of each channel, from the data alone.
+        consistency: whether the channels agree among themselves.
+        problem: the others.
+        localisation: where in the regime the baseline's misfit sits.
+        residual: what no known cause explains, as a sum of simple wrenches, if it can be so told.
+    """
+
+    dataset: Dataset
+    outliers: tuple[Outliers, ...]
+    inputs: Inputs
+    final_runs: tuple[str, ...]
+    floors: tuple[Floor, ...]
+    consistency: Consistency
+    problem: SeriesProblem
+    localisation: Localisation
+    residual: ResidualModel | None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TableDiagnosis(Diagnosed):
+    """Everything a diagnosis of a table found.
+
+    Attributes:
+        problem: the conditions that were fitted.
+        notes: for the user.
+    """
+
+    dataset: SteadyDataset
+    problem: TableProblem
+    notes: tuple[str, ...]

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from math import comb
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from scipy.optimize import minimize
 
 from fish_env.arrays import FloatArray
 from fish_env.data.schema import Dataset
-from fish_env.identification.filtering import NoiseModel
+from fish_env.identification.filtering import Filtered, NoiseModel, RunFilter
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point
 from fish_env.params.schema import FishParams
-
-if TYPE_CHECKING:
-    from fish_env.identification.series import SeriesProblem
 
 ORDER = 4
 WINDOW = 30
@@ -121,8 +118,29 @@ def small_disturbance(sensor_sd: FloatArray) -> NoiseModel:
     return NoiseModel(sensor_sd, 3e-3, 1e-4, 1.0)
 
 
+class FilteredRuns(Protocol):
+    """Runs under an extended Kalman filter, as a fit of their noise needs them."""
+
+    @property
+    def fish(self) -> FishParams:
+        """The fish, whose size says what a disturbance may be."""
+
+    @property
+    def lean_filter(self) -> RunFilter:
+        """The quickest filter that knows the runs."""
+
+    def filtered(
+        self,
+        point: Point,
+        noise: NoiseModel,
+        near: Sequence[Filtered] = (),
+        keep_slopes: bool = False,
+    ) -> list[Filtered]:
+        """Filter every run at one point (see :meth:`SeriesProblem.filtered`)."""
+
+
 def fitted_noise(
-    problem: SeriesProblem, point: Point, noise: NoiseModel, largest_sensor_sd: FloatArray | None
+    problem: FilteredRuns, point: Point, noise: NoiseModel, largest_sensor_sd: FloatArray | None
 ) -> NoiseModel:
     """Noise model of largest likelihood at a point.
 

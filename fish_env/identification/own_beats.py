@@ -11,16 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fish_env.arrays import FloatArray
 from fish_env.identification.runs import FREQUENCY, PHASE, RunData
-from fish_env.model.effect import Effect
-
-if TYPE_CHECKING:
-    from fish_env.identification.series import SeriesProblem
+from fish_env.identification.series import SeriesProblem
 
 COARSE: FloatArray = np.asarray(1.0 + np.arange(-24, 25) * 5e-3)
 """Frequencies over the commanded one of all runs together, tried on their beginnings."""
@@ -37,9 +33,6 @@ CLEARLY = 0.2
 """Share of what the common beat leaves that a run's own has to take away. Chance takes one per
 cent, for a hundred independent residuals a run."""
 FEWEST = 3
-BESIDE = (-6e-3, -3e-3, 0.0, 3e-3, 6e-3)
-"""Departures from the measured beat that a fit begins from: less than a third of a cycle in a run
-of a minute."""
 
 
 @dataclass(frozen=True)
@@ -85,21 +78,6 @@ def own_beats(problem: SeriesProblem) -> OwnBeats:
         if abs(beat - 1.0) >= LEAST:
             found[run.id] = beat
     return OwnBeats(together, found)
-
-
-def beside_measured(effect: Effect, beat: float) -> tuple[dict[str, float], ...]:
-    """Sizes of an effect that scales the beat, around what was measured.
-
-    For runs whose phase at the start is unknown: of a comb of sizes each would have its own.
-
-    Args:
-        effect: the effect; none of one that scales no beat.
-        beat: measured over commanded frequency.
-    """
-    scales = [p.name for p in effect.switching if p.neutral == 1.0 and p.unit == "-"]
-    if not effect.drifts_in_phase or len(scales) != 1:
-        return ()
-    return tuple({scales[0]: beat + off} for off in BESIDE)
 
 
 def with_own_beats(problem: SeriesProblem, beats: OwnBeats) -> SeriesProblem:

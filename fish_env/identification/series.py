@@ -16,6 +16,7 @@ from fish_env.effects import catalogue
 from fish_env.effects.extended import ExtendedModel, build_model
 from fish_env.errors import EffectError
 from fish_env.identification.applied_wrench import EFFECT as APPLIED_WRENCH
+from fish_env.identification.beats import beside_measured
 from fish_env.identification.channels import usable_channels
 from fish_env.identification.filtering import (
     Filtered,
@@ -33,7 +34,6 @@ from fish_env.identification.noise import (
     white_noise_sd,
 )
 from fish_env.identification.open_loop import windows, without_feedback
-from fish_env.identification.own_beats import beside_measured
 from fish_env.identification.parameters import ALIKE, Baseline, changes_of, neutral_values
 from fish_env.identification.phases import settle_phases
 from fish_env.identification.runs import FINER, RunData, prepare_run

@@ -18,23 +18,21 @@ import math
 import numbers
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fish_env.arrays import FloatArray
 from fish_env.errors import ParameterError
 from fish_env.params import trees
 from fish_env.params.balance import central_inertia
 from fish_env.params.fields import Leaf, leaves, tables
+from fish_env.params.fish_data import FishData
 from fish_env.params.provenance import STATUSES, Origin, Posterior
 from fish_env.reading import printable_lines, shown
 
-if TYPE_CHECKING:
-    from fish_env.params.schema import FishParams
 
-
-def check_fish(fish: "FishParams") -> None:
+def check_fish(fish: FishData) -> None:
     """Checks a whole fish.
 
     Raises:
@@ -58,7 +56,7 @@ def check_fish(fish: "FishParams") -> None:
         check_posterior(fish, fish.posterior)
 
 
-def fault(fish: "FishParams", key: str, problem: str, remedy: str) -> ParameterError:
+def fault(fish: FishData, key: str, problem: str, remedy: str) -> ParameterError:
     """Words an error: file, key, what is wrong, what to do."""
     return ParameterError(f"{fish.source_file or fish.name}: {key} {problem}; {remedy}")
 
@@ -69,7 +67,7 @@ def closest(word: str, choices: Iterable[str]) -> str:
     return f", did you mean '{match[0]}'?" if match else ""
 
 
-def unknown_path(fish: "FishParams", path: str) -> str:
+def unknown_path(fish: FishData, path: str) -> str:
     """Words the error for a path that names no number."""
     origin = fish.source_file or fish.name
     for key, table in tables(fish):
@@ -82,7 +80,7 @@ def unknown_path(fish: "FishParams", path: str) -> str:
     return f"{origin}: no parameter {path}{hint or '; see values() for all paths'}"
 
 
-def check_number(fish: "FishParams", key: str, value: Any) -> None:
+def check_number(fish: FishData, key: str, value: Any) -> None:
     """Checks that a value is one finite number; true and false are not."""
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
         what = f"{shown(value)} ({type(value).__name__})"
@@ -91,7 +89,7 @@ def check_number(fish: "FishParams", key: str, value: Any) -> None:
         raise fault(fish, key, f"is {value}", "write a finite number")
 
 
-def check_bounds(fish: "FishParams", leaf: Leaf) -> None:
+def check_bounds(fish: FishData, leaf: Leaf) -> None:
     """Checks that a value lies within its declared bounds."""
     spec = leaf.spec
     if not spec.lower <= leaf.value <= spec.upper:
@@ -105,7 +103,7 @@ def check_bounds(fish: "FishParams", leaf: Leaf) -> None:
         )
 
 
-def check_masses(fish: "FishParams") -> None:
+def check_masses(fish: FishData) -> None:
     """Checks that the block is a part of the fish and the crank can turn."""
     mass, crank = fish.mass, fish.weight_block.crank
     if mass.weight_block >= mass.total:
@@ -124,7 +122,7 @@ def check_masses(fish: "FishParams") -> None:
         )
 
 
-def broken_triangles(fish: "FishParams") -> Iterator[tuple[ParameterError, bool]]:
+def broken_triangles(fish: FishData) -> Iterator[tuple[ParameterError, bool]]:
     """Parts with a moment above the sum of the other two, and whether it was identified."""
     parts = {
         "inertia.rest": fish.inertia.rest,
@@ -143,7 +141,7 @@ def broken_triangles(fish: "FishParams") -> Iterator[tuple[ParameterError, bool]
         yield fault(fish, f"{key}[{worst}]", problem, remedy), "identified" in status
 
 
-def warn_of_effective_inertia(fish: "FishParams") -> None:
+def warn_of_effective_inertia(fish: FishData) -> None:
     """Says which moments of inertia no rigid body has: for whoever reads or writes a file."""
     for error, _ in broken_triangles(fish):
         warnings.warn(
@@ -151,7 +149,7 @@ def warn_of_effective_inertia(fish: "FishParams") -> None:
         )
 
 
-def check_central_inertia(fish: "FishParams") -> None:
+def check_central_inertia(fish: FishData) -> None:
     """Checks that the fish's inertia about its centre of mass is positive definite."""
     smallest = float(np.linalg.eigvalsh(central_inertia(fish))[0])
     if smallest <= 0:
@@ -163,7 +161,7 @@ def check_central_inertia(fish: "FishParams") -> None:
         )
 
 
-def check_effects(fish: "FishParams") -> None:
+def check_effects(fish: FishData) -> None:
     """Checks that effects are names with named finite numbers."""
     for name, parameters in fish.effects.items():
         key = f"effects.{name}"
@@ -174,7 +172,7 @@ def check_effects(fish: "FishParams") -> None:
             check_number(fish, f"{key}.{parameter}", value)
 
 
-def check_provenance(fish: "FishParams") -> None:
+def check_provenance(fish: FishData) -> None:
     """Checks that origins have a known status and a source, and belong to something."""
     known = trees.known_paths(type(fish))
     check_origin(fish, "default", fish.provenance.default)
@@ -185,7 +183,7 @@ def check_provenance(fish: "FishParams") -> None:
             raise fault(fish, f"provenance.{path}", "belongs to nothing", remedy)
 
 
-def check_origin(fish: "FishParams", path: str, origin: Origin) -> None:
+def check_origin(fish: FishData, path: str, origin: Origin) -> None:
     """Checks status and source of one origin."""
     if origin.status not in STATUSES:
         remedy = f"use one of {', '.join(STATUSES)}"
@@ -195,7 +193,7 @@ def check_origin(fish: "FishParams", path: str, origin: Origin) -> None:
         raise fault(fish, f"provenance.{path}.source", f"is {shown(origin.source)}", remedy)
 
 
-def check_posterior(fish: "FishParams", posterior: Posterior) -> None:
+def check_posterior(fish: FishData, posterior: Posterior) -> None:
     """Checks names, sizes and definiteness of a posterior."""
     check_names(fish, posterior.names)
     if not isinstance(posterior.validity, Mapping):
@@ -212,7 +210,7 @@ def check_posterior(fish: "FishParams", posterior: Posterior) -> None:
     check_covariance(fish, np.array(posterior.covariance))
 
 
-def check_names(fish: "FishParams", names: tuple[str, ...]) -> None:
+def check_names(fish: FishData, names: tuple[str, ...]) -> None:
     """Checks that a posterior names parameters or effect parameters of the fish, once each."""
     known = {leaf.path for leaf in leaves(fish)}
     known |= {f"effects.{name}.{key}" for name, values in fish.effects.items() for key in values}
@@ -226,7 +224,7 @@ def check_names(fish: "FishParams", names: tuple[str, ...]) -> None:
         raise fault(fish, "posterior.names", "has a name twice", "name each parameter once")
 
 
-def check_covariance(fish: "FishParams", matrix: NDArray[np.float64]) -> None:
+def check_covariance(fish: FishData, matrix: FloatArray) -> None:
     """Checks that a covariance is symmetric and positive semidefinite, in units of its diagonal."""
     scale = np.sqrt(np.clip(np.diag(matrix), 0.0, None)) if matrix.size else np.ones(0)
     scale[scale == 0] = 1.0

@@ -1,14 +1,10 @@
 """From the relative priors of a parameter file to standard deviations and covariances."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
-from numpy.typing import NDArray
 
+from fish_env.arrays import FloatArray
 from fish_env.params.fields import Leaf
-
-if TYPE_CHECKING:
-    from fish_env.params.schema import FishParams
+from fish_env.params.fish_data import FishData
 
 # A fish is trimmed in the water with weights of a fraction of a gram, so buoyancy minus mass is
 # known far better than either of the two.
@@ -16,7 +12,7 @@ TRIM_SD_KG = 0.0002
 STATIC_MOMENT_ARM_M = 0.1
 
 
-def standard_deviation(fish: "FishParams", leaf: Leaf) -> float:
+def standard_deviation(fish: FishData, leaf: Leaf) -> float:
     """Returns the prior standard deviation of one number in its own unit.
 
     For the buoyancy it is that of the trim, given the mass.
@@ -32,7 +28,7 @@ def standard_deviation(fish: "FishParams", leaf: Leaf) -> float:
     return relative * abs(float(leaf.value))
 
 
-def covariance(fish: "FishParams", chosen: list[Leaf]) -> NDArray[np.float64]:
+def covariance(fish: FishData, chosen: list[Leaf]) -> FloatArray:
     """Returns the prior covariance of several numbers, shape (n, n).
 
     The buoyancy is the mass plus an independent trim: it has the variance of both, and the mass's

@@ -2,16 +2,13 @@
 
 import dataclasses
 from collections.abc import Mapping
-from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
+from fish_env.arrays import FloatArray
 from fish_env.errors import ParameterError
 from fish_env.params import checks, prior, trees
-from fish_env.params.fields import Leaf, as_number, aside, leaves, section, tables
-from fish_env.params.groups import Body, Inertia, Mass, Prior, Tail, Water, WeightBlock
-from fish_env.params.provenance import UNSTATED, Posterior, Provenance, Status
+from fish_env.params.fields import Leaf, as_number, leaves, tables
+from fish_env.params.fish_data import FishData
+from fish_env.params.provenance import Status
 from fish_env.params.tables import CoefficientTable
 
 
@@ -45,7 +42,7 @@ class ParameterInfo:
 
 
 @dataclasses.dataclass(frozen=True)
-class FishParams:
+class FishParams(FishData):
     """The parameters of one fish.
 
     Two fish are equal when all their numbers, tables, effects and origins are, whatever file they
@@ -64,20 +61,6 @@ class FishParams:
     Raises:
         ParameterError: A value is impossible; names the file, the key and the remedy.
     """
-
-    name: str
-    water: Water = section(Water)
-    mass: Mass = section(Mass)
-    inertia: Inertia = section(Inertia)
-    weight_block: WeightBlock = section(WeightBlock)
-    tail: Tail = section(Tail)
-    body: Body = section(Body)
-    prior: Prior = aside(Prior)
-    effects: Mapping[str, Mapping[str, float]] = dataclasses.field(default_factory=dict)
-    provenance: Provenance = dataclasses.field(default_factory=lambda: Provenance(UNSTATED))
-    posterior: Posterior | None = None
-    source_file: Path | None = dataclasses.field(default=None, compare=False)
-    trust_effects: bool = dataclasses.field(default=False, compare=False)
 
     def __post_init__(self) -> None:
         checks.check_fish(self)
@@ -160,7 +143,7 @@ class FishParams:
         """
         return prior.standard_deviation(self, self._leaf(path))
 
-    def prior_covariance(self, paths: list[str]) -> NDArray[np.float64]:
+    def prior_covariance(self, paths: list[str]) -> FloatArray:
         """Returns the prior covariance of several parameters, shape (n, n), in their own units.
 
         It is diagonal but for mass and buoyancy, which move together: their difference is known

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fish_env.arrays import FloatArray
 from fish_env.errors import ParameterError
 from fish_env.files import write_text
 from fish_env.reading import Unreadable, plain_number, read_text, short
@@ -57,7 +57,7 @@ class CoefficientTable:
         check_rows(self)
         check_shape(self)
 
-    def pchip(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def pchip(self) -> tuple[FloatArray, FloatArray]:
         """Interpolates the table by a monotone cubic over 0 to pi/2.
 
         Beyond the last angle a_n, with value C_n, the curve goes on as the analytic form does:
@@ -89,13 +89,13 @@ def snap(alpha: float) -> float:
     return HALF_PI if abs(alpha - HALF_PI) < ROUNDING else alpha
 
 
-def extension_angles(last: float) -> NDArray[np.float64]:
+def extension_angles(last: float) -> FloatArray:
     """Returns the knots beyond the last angle of a table up to pi/2, rad, one degree apart."""
     count = math.ceil((HALF_PI - last) / EXTENSION_STEP)
     return np.linspace(last, HALF_PI, count + 1)[1:]
 
 
-def extension_values(table: CoefficientTable, alpha: NDArray[np.float64]) -> NDArray[np.float64]:
+def extension_values(table: CoefficientTable, alpha: FloatArray) -> FloatArray:
     """Continues a table by the shape of the analytic curve through its last row."""
     last, end = table.alpha[-1], table.value[-1]
     if table.kind == "drag":

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from fish_env.diagnosis.answer import shared_entries
 from fish_env.diagnosis.entries import Plain, gain_entry
+from fish_env.diagnosis.result import TableDiagnosis
 from fish_env.identification.tables.problem import TableProblem
 from fish_env.identification.tables.table import UNITS
 from fish_env.inference.effort import TABLE_LEFT_OUT
 from fish_env.inference.estimate.fit import Fit
-
-if TYPE_CHECKING:
-    from fish_env.diagnosis.tables.pipeline import TableDiagnosis
 
 
 def as_dict(diagnosis: TableDiagnosis) -> Plain:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from fish_env.diagnosis.extended_file import extended_fish_of_table
 from fish_env.diagnosis.next_experiment import plausible_sizes
 from fish_env.diagnosis.report import write_report
 from fish_env.diagnosis.report.steady import steady_series_from
-from fish_env.diagnosis.result import Diagnosed
+from fish_env.diagnosis.result import TableDiagnosis
 from fish_env.diagnosis.tables.answer import as_dict
 from fish_env.diagnosis.tables.experiment import propose
 from fish_env.diagnosis.tables.gain import measure_gain, misfit_of
@@ -47,20 +47,6 @@ ABSENT = (
     "effects that depend on place, heading or time, and those that leave averages as they are, "
     "cannot be told from this table and were left out: {names}"
 )
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class TableDiagnosis(Diagnosed):
-    """Everything a diagnosis of a table found.
-
-    Attributes:
-        problem: the conditions that were fitted.
-        notes: for the user.
-    """
-
-    dataset: SteadyDataset
-    problem: TableProblem
-    notes: tuple[str, ...]
 
 
 def diagnose_steady(

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from fish_env.identification.whole_runs.problem import WholeRunProblem
+from fish_env.identification.whole_runs.simulated_runs import SimulatedRuns
 
 FEW_RUNS = 3
 SILENT = 0.003
@@ -16,7 +14,7 @@ SILENT = 0.003
 noise, below which nothing shows the parameter."""
 
 
-def shown_parameters(problem: WholeRunProblem, values: Mapping[str, float]) -> set[str]:
+def shown_parameters(problem: SimulatedRuns, values: Mapping[str, float]) -> set[str]:
     """Effect parameters whose change by a tenth changes what is measured.
 
     Args:

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fish_env.arrays import FloatArray
 from fish_env.identification.whole_runs.noise import SimulationNoise
 from fish_env.identification.whole_runs.own_numbers import PACE, PHASE
+from fish_env.identification.whole_runs.simulated_runs import SimulatedRuns
 from fish_env.inference.estimate.box_qp import minimise_in_box
 from fish_env.inference.estimate.gauss_newton import predicted_decrease
 from fish_env.inference.problem import Point
-
-if TYPE_CHECKING:
-    from fish_env.identification.whole_runs.problem import WholeRunProblem
 
 NUDGE = 0.02
 """Step for differences, in units of what matters."""
@@ -59,7 +56,7 @@ class OwnFit:
         return np.asarray(left[:, sizes > 1e-9 * max(float(sizes[0]), 1e-300)])
 
 
-def likeliest(problem: WholeRunProblem, point: Point, noise: SimulationNoise) -> list[FloatArray]:
+def likeliest(problem: SimulatedRuns, point: Point, noise: SimulationNoise) -> list[FloatArray]:
     """The own numbers (K,) of every run that leave least, an unknown phase tried all round.
 
     Args:
@@ -92,7 +89,7 @@ def likeliest(problem: WholeRunProblem, point: Point, noise: SimulationNoise) ->
 
 
 def fit_own_numbers(
-    problem: WholeRunProblem,
+    problem: SimulatedRuns,
     point: Point,
     noise: SimulationNoise,
     starts: Sequence[FloatArray],
@@ -134,7 +131,7 @@ def fit_own_numbers(
 
 
 def _step(
-    problem: WholeRunProblem, run: int, now: OwnFit, damping: float
+    problem: SimulatedRuns, run: int, now: OwnFit, damping: float
 ) -> tuple[FloatArray, float]:
     """A step (K,) in SI units, and the decrease it predicts."""
     kind = problem.own[run]
@@ -150,7 +147,7 @@ def _step(
 
 
 def _linearised(
-    problem: WholeRunProblem, point: Point, noise: SimulationNoise, own: dict[int, FloatArray]
+    problem: SimulatedRuns, point: Point, noise: SimulationNoise, own: dict[int, FloatArray]
 ) -> dict[int, OwnFit]:
     """Residuals and slopes of some runs at given own numbers."""
     runs = list(own)

@@ -18,7 +18,7 @@ from fish_env.model.crank_slider import CrankSlider
 from fish_env.model.effect import Effect
 from fish_env.model.emit import OUTPUTS
 from fish_env.model.frames import quaternion_from_euler
-from fish_env.model.runtime import Grid
+from fish_env.model.grid import Grid
 from fish_env.model.state import BASE_STATES, INPUTS
 from fish_env.params.io import as_fish
 from fish_env.params.schema import FishParams

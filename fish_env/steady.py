@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from fish_env.arrays import FloatArray
 from fish_env.effects.extended import ExtendedModel, build_model
 from fish_env.errors import ScheduleError
-from fish_env.model.runtime import Grid
+from fish_env.model.grid import Grid
 from fish_env.model.state import BASE_STATES, INPUTS
 from fish_env.params.schema import FishParams
 from fish_env.sensing import channels_from_states, measured_channels, true_times

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from fish_env.model import compose
-from fish_env.model.compose import Composition
+from fish_env.model.composition import Composition
 from fish_env.model.runtime import Kernels
 from fish_env.simulator import Simulator
 
@@ -41,7 +41,7 @@ def plain_module(composition: Composition, replacements: Replacements) -> types.
     Raises:
         LookupError: a text to replace is not there, so nothing would be broken.
     """
-    text = composition.source()
+    text = compose.source(composition)
     for old, new in {**replacements, JIT_IMPORT: NO_JIT}.items():
         if old not in text:
             raise LookupError(f"the composed model no longer contains {old!r}")

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from fish_env.arrays import FloatArray
 from fish_env.effects.registry import catalogue, get_effect, load_effect_file
 from fish_env.errors import EffectError, ParameterError, ScheduleError
-from fish_env.model.compose import Composition
+from fish_env.model.composition import Composition
 from fish_env.model.effect import Effect
 from fish_env.model.runtime import Kernels, kernels
 from fish_env.params.packing import PATHS, pack_tables, pack_values

@@ -15,8 +15,9 @@ from fish_env.envs import start
 from fish_env.envs.layout import GOAL, MAX_BEAT_S, OBSERVATION, OUTPUTS, SENSORS, Failure
 from fish_env.envs.options import EnvOptions
 from fish_env.errors import ConfigError
+from fish_env.model.grid import Grid
 from fish_env.model.history import forget, history_rows
-from fish_env.model.runtime import Grid, Kernels, kernels, run_in_threads
+from fish_env.model.runtime import Kernels, kernels, run_in_threads
 from fish_env.model.state import BASE_STATES, INTEGRAL_ROW
 from fish_env.threads import default_threads
 

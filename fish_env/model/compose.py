@@ -6,25 +6,21 @@ code: it can be read, stepped through, run without numba, and numba caches its m
 
 from __future__ import annotations
 
-import hashlib
 import importlib.util
 import sys
 import warnings
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
 from fish_env.errors import OutputError
 from fish_env.files import write_text
 from fish_env.model import jit
+from fish_env.model.composition import Composition
 from fish_env.model.effect import STAGES, Effect
-from fish_env.model.emit import BASE_TERMS, HEADER, Emitter
+from fish_env.model.emit import HEADER, Emitter
 from fish_env.model.kernel_cache import cache_root
-from fish_env.model.state import BASE_STATES
-from fish_env.params.packing import RECORD_FIELDS
 
-TEMPLATE = Path(__file__).with_name("rollout_template.py")
 _BEGIN = "# --- completed by compose ---"
 _END = "# --- end ---"
 
@@ -35,69 +31,12 @@ def _kept_imports(template: str) -> str:
     return before[before.index("import numpy as np") :]
 
 
-@dataclass(frozen=True)
-class Composition:
-    """Which effects a kernel contains, and whether coefficient tables can be used.
-
-    Attributes:
-        effects: effects in the order their hooks run.
-        tables: coefficient curves may come from tables (slower: a search for each).
-        templates: source files with the entry points; each may use what precedes it.
-    """
-
-    effects: tuple[Effect, ...] = ()
-    tables: bool = False
-    templates: tuple[Path, ...] = (TEMPLATE,)
-
-    @property
-    def state_names(self) -> tuple[str, ...]:
-        """Rows of the state: the fish, states of effects, then what effects remember."""
-        states = (f"{e.name}.{s}" for e in self.effects for s in e.state_names)
-        return (*BASE_STATES, *states, *self.memory_names)
-
-    @property
-    def memory_names(self) -> tuple[str, ...]:
-        """The last rows of the state: kept from step to step, not integrated."""
-        return tuple(f"{e.name}.{m}" for e in self.effects for m in e.memory_names)
-
-    @property
-    def tail_rows(self) -> list[int]:
-        """Rows of states that follow the tail's phase."""
-        names = [f"{e.name}.{state}" for e in self.effects for state in e.states.get("tail", ())]
-        return [self.state_names.index(name) for name in names]
-
-    @property
-    def delays(self) -> tuple[str, ...]:
-        """Parameters by which the tail's command is late (s)."""
-        return tuple(f"{e.name}.{e.command_delay}" for e in self.effects if e.command_delay)
-
-    @property
-    def parameter_names(self) -> tuple[str, ...]:
-        """Rows of the parameter record: the fish, then ``effect.parameter``."""
-        extra = (f"{e.name}.{p.name}" for e in self.effects for p in e.parameters)
-        return (*RECORD_FIELDS, *extra)
-
-    @property
-    def term_names(self) -> tuple[str, ...]:
-        """Names of the wrench terms."""
-        extra = (e.name for e in self.effects if {"wrench", "tail_force"} & set(e.hooks))
-        return (*BASE_TERMS, *extra)
-
-    @property
-    def label(self) -> str:
-        """Short name of the generated file."""
-        names = ",".join(effect.name for effect in self.effects) + (
-            "|tables" if self.tables else ""
-        )
-        kind = "baseline" if not self.effects else f"effects{len(self.effects)}"
-        return f"{kind}_{hashlib.sha256(names.encode()).hexdigest()[:8]}"
-
-    def source(self) -> str:
-        """The composed module as text."""
-        texts = [path.read_text(encoding="utf-8") for path in self.templates]
-        bodies = [text[text.index(_END) :] for text in texts]
-        imports = [_kept_imports(text) for text in texts]
-        return "\n".join([HEADER, *imports, Emitter(self).text(), *bodies])
+def source(composition: Composition) -> str:
+    """The composed module as text."""
+    texts = [path.read_text(encoding="utf-8") for path in composition.templates]
+    bodies = [text[text.index(_END) :] for text in texts]
+    imports = [_kept_imports(text) for text in texts]
+    return "\n".join([HEADER, *imports, Emitter(composition).text(), *bodies])
 
 
 def cache_folder(composition: Composition) -> Path:
@@ -121,13 +60,13 @@ def load(composition: Composition) -> ModuleType:
     name = f"robofish_composed_{composition.label}_{folder.name}"
     if name in sys.modules:
         return sys.modules[name]
-    path, source = folder / f"{composition.label}.py", composition.source()
-    kept = _kept(path, source)
+    path, text = folder / f"{composition.label}.py", source(composition)
+    kept = _kept(path, text)
     try:
-        module = _executed(composition, name, path, None if kept else source)
+        module = _executed(composition, name, path, None if kept else text)
     except (EOFError, ValueError, TypeError):  # a damaged bytecode file; the source is as it should
         Path(importlib.util.cache_from_source(str(path))).unlink(missing_ok=True)
-        module = _executed(composition, name, path, None if kept else source)
+        module = _executed(composition, name, path, None if kept else text)
     return module
 
 

@@ -7,28 +7,12 @@ idea, in the order in which the model is computed.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
+from fish_env.model.composition import BASE_TERMS, Composition
+from fish_env.model.effect import Effect
 from fish_env.model.history import COMMAND, HEARD
 from fish_env.params.packing import CURVES, RECORD_FIELDS
 
-if TYPE_CHECKING:
-    from fish_env.model.compose import Composition
-    from fish_env.model.effect import Effect
-
-BASE_TERMS = (
-    "gravity",
-    "buoyancy",
-    "damping",
-    "impact",
-    "xz_drag",
-    "xz_lift",
-    "xy_drag",
-    "xy_lift",
-    "tail_drag",
-    "tail_lift",
-    "inertial",
-)
 OUTPUTS = {
     "tail_angle": "tail.angle",
     "tail_rate": "tail.rate",

@@ -11,16 +11,12 @@ Before its first step a fish is taken to have been told the same all along.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from fish_env.arrays import FloatArray, IntArray
+from fish_env.model.grid import Grid
 from fish_env.model.inputs import with_tail_command
 from fish_env.model.jit import kernel
-
-if TYPE_CHECKING:
-    from fish_env.model.runtime import Grid
 
 COMMAND = (
     "offset",

@@ -10,15 +10,16 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numba
 import numpy as np
 
-from fish_env.arrays import FloatArray, IntArray
+from fish_env.arrays import FloatArray
 from fish_env.model import compose
-from fish_env.model.compose import Composition
+from fish_env.model.composition import Composition
 from fish_env.model.emit import OUTPUTS
+from fish_env.model.grid import Grid
 from fish_env.model.history import history_rows_on
 from fish_env.model.state import BASE_STATES
 from fish_env.threads import default_threads
@@ -52,24 +53,6 @@ def run_in_threads(task: Callable[[int, int], int], count: int, lanes: int, thre
     pool = _pool(threads)
     jobs = [pool.submit(task, edges[i], edges[i + 1]) for i in range(1, parts)]
     return task(edges[0], edges[1]) + sum(job.result() for job in jobs)
-
-
-class Grid(NamedTuple):
-    """Segments of a rollout: piecewise constant commands and step sizes.
-
-    Attributes:
-        slots: (segments,) which row of the commands holds.
-        starts: (segments,) time since the start at which each segment begins (s).
-        steps: (segments,) physics steps in each.
-        sizes: (segments,) step size (s).
-        every: (segments,) a sample is stored after every this many steps.
-    """
-
-    slots: IntArray
-    starts: FloatArray
-    steps: IntArray
-    sizes: FloatArray
-    every: IntArray
 
 
 class Kernels:

@@ -10,7 +10,7 @@ import numpy as np
 import fish_env  # noqa: F401  (registers the environment)
 from fish_env import load_fish
 from fish_env.effects.extended import build_model
-from fish_env.model.runtime import Grid
+from fish_env.model.grid import Grid
 from scripts.bench.harness import Contender
 
 ENV_ID = "RoboticFish3D-v0"

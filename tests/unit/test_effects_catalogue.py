@@ -6,7 +6,7 @@ import pytest
 from fish_env.effects import catalogue, get_effect
 from fish_env.effects.extended import ExtendedModel, build_model
 from fish_env.errors import EffectError, ParameterError
-from fish_env.model.compose import Composition
+from fish_env.model.composition import Composition
 from fish_env.model.effect import SECTIONS
 from fish_env.simulator import Simulator
 from tests.broken import PlainKernels

@@ -10,9 +10,9 @@ import pytest
 from fish_env.effects.extended import build_model
 from fish_env.errors import EffectError
 from fish_env.model.effect import Effect, EffectParameter
+from fish_env.model.grid import Grid
 from fish_env.model.jit import kernel
 from fish_env.model.records import Wrench
-from fish_env.model.runtime import Grid
 from fish_env.simulator import Simulator
 from tests.physics.cases import swimmer
 

@@ -213,7 +213,7 @@ def test_a_disk_that_takes_no_files_costs_time_only(tmp_path):
 
 COMPOSED = """
 from fish_env.model import compose
-from fish_env.model.compose import Composition
+from fish_env.model.composition import Composition
 print(compose.load(Composition()).__file__)
 """
 

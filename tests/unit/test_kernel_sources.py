@@ -16,7 +16,7 @@ import pytest
 from fish_env.envs.batch import STEP_TEMPLATE
 from fish_env.identification.filtering import TEMPLATES
 from fish_env.model import compose, jit
-from fish_env.model.compose import TEMPLATE, Composition
+from fish_env.model.composition import TEMPLATE, Composition
 
 ROOT = Path(__file__).resolve().parents[2]
 DRAWN_ON = (
@@ -33,7 +33,8 @@ EDITS = """
 import json, sys
 from pathlib import Path
 from fish_env.envs.batch import STEP_TEMPLATE
-from fish_env.model.compose import TEMPLATE, Composition, cache_folder
+from fish_env.model.compose import cache_folder
+from fish_env.model.composition import TEMPLATE, Composition
 
 package = Path(sys.modules["fish_env"].__file__).parent
 environment = Composition(templates=(TEMPLATE, STEP_TEMPLATE))

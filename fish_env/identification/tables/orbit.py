@@ -20,7 +20,7 @@ from fish_env.effects.extended import ExtendedModel
 from fish_env.identification.filtering import Measurement
 from fish_env.identification.tables.means import MEANS, beat_means
 from fish_env.model.frames import euler_from_quaternion, quaternion_from_euler
-from fish_env.model.runtime import Grid
+from fish_env.model.grid import Grid
 from fish_env.model.state import BASE_STATES
 from fish_env.steady import BEAT_WITHOUT_TAIL_S
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fish_env.model.runtime import Grid
+from fish_env.model.grid import Grid
 from fish_env.simulator import Simulator
 from tests.physics.cases import mass_matrix, rotation
 from tests.unit.effects.support import MASS, in_space, run

@@ -5,8 +5,8 @@ import pytest
 
 from fish_env.data.schema import CommandSteps
 from fish_env.effects.extended import build_model
+from fish_env.model.grid import Grid
 from fish_env.model.history import RECORD, forget, history_rows
-from fish_env.model.runtime import Grid
 from fish_env.simulator import InitialState, Simulator
 from tests.physics.cases import swimmer
 from tests.unit.effects.support import assert_same_motion, run

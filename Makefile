@@ -32,6 +32,7 @@ docs: $(VENV)/.with-docs  ## write the generated pages, then the site into out/s
 	$(BIN)/python -m scripts.make_effects_page
 	$(BIN)/python -m scripts.make_policy_page
 	$(BIN)/python -m scripts.make_environment_page
+	$(BIN)/python -m scripts.make_import_graphs
 	$(BIN)/python -m scripts.make_benchmarks_page
 	$(BIN)/python -m scripts.update_readme
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet

@@ -86,11 +86,9 @@ def graph_of(imports: Iterable[Import], node: Callable[[str], str] = str) -> Gra
     edges: dict[str, set[str]] = {}
     for found in imports:
         importer, imported = node(found.importer), node(found.imported)
-        if not importer or not imported:
-            continue
-        edges.setdefault(importer, set())
-        edges.setdefault(imported, set())
-        if importer != imported:
+        for name in filter(None, (importer, imported)):
+            edges.setdefault(name, set())
+        if importer and imported and importer != imported:
             edges[importer].add(imported)
     return {name: frozenset(edges[name]) for name in sorted(edges)}
 

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from fish_env.arrays import FloatArray
 from fish_env.data.schema import CommandSteps
+from fish_env.data.validity import warn_far_outside
 from fish_env.effects.extended import EffectValues, build_model
 from fish_env.errors import ScheduleError, SimulationDiverged
 from fish_env.model.crank_slider import CrankSlider
@@ -147,6 +148,7 @@ class Simulator:
         self.fish = as_fish(fish, trust_effects)
         self.model = build_model(self.fish, effects, user_effects)
         self.dt = dt / self.model.substeps(dt)
+        self._told_range = False
 
     @property
     def crank(self) -> CrankSlider:
@@ -178,6 +180,7 @@ class Simulator:
         """
         steps = commands if isinstance(commands, CommandSteps) else schedule(commands)
         self._warn_reach(steps)
+        self._warn_range(steps)
         times = _sample_times(duration_s, rate_hz, sample_times_s)
         _check_length(times, self.dt)
         arrivals = np.append(steps.times_s, steps.times_s[1:] + self.model.command_delay)
@@ -282,6 +285,13 @@ class Simulator:
             self.model.kernels.initialise(tail_states, columns[0], self.model.record, clock)
             full[len(BASE_STATES) :] = tail_states[len(BASE_STATES) :]
         return full, columns[0], columns[1], self.model.record, clock
+
+    def _warn_range(self, steps: CommandSteps) -> None:
+        """Says once that commands are far outside of the data behind the fish."""
+        if not self._told_range:
+            ends = np.column_stack([steps.values.min(axis=0), steps.values.max(axis=0)]).tolist()
+            asked = {name: (low, high) for name, (low, high) in zip(INPUTS, ends, strict=True)}
+            self._told_range = warn_far_outside(self.fish, asked, "stay near them", stacklevel=4)
 
     def _warn_reach(self, steps: CommandSteps) -> None:
         low, high = self.crank.reach

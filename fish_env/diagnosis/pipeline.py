@@ -13,7 +13,6 @@ from threadpoolctl import threadpool_limits
 
 from fish_env.data import Dataset, SteadyDataset, dataset_files, load_dataset, split_runs
 from fish_env.diagnosis.answer import as_dict
-from fish_env.diagnosis.extended_file import extended_fish
 from fish_env.diagnosis.gain import measure_gain, misfit_of, one_step
 from fish_env.diagnosis.input_checks import check_runs, divergence
 from fish_env.diagnosis.inputs.check import check_inputs
@@ -32,6 +31,7 @@ from fish_env.identification.own_beats import own_beats, with_own_beats
 from fish_env.identification.recorded import recorded
 from fish_env.identification.sensors import without_outliers
 from fish_env.identification.series import SeriesProblem, series_of
+from fish_env.identification.writing import identified_fish
 from fish_env.inference.effort import effort_of
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.parallel import both
@@ -101,7 +101,7 @@ def diagnose(
 def write(diagnosis: Diagnosis, answer: dict[str, Any], folder: Path) -> None:
     """Writes ``diagnosis.json``, ``report.html`` and, if something extends, ``extended.yaml``."""
     extends = diagnosis.verdict.name in EXTENDING and not diagnosis.inputs.binding
-    extended = extended_fish(diagnosis.accepted, diagnosis.dataset) if extends else None
+    extended = identified_fish(diagnosis.accepted) if extends else None
     write_answer(answer, extended, folder)
     write_report(answer, _series(diagnosis), folder)
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from fish_env.arrays import FloatArray
+from fish_env.data.validity import warn_far_outside
 from fish_env.effects.extended import PREFIX, EffectValues, ExtendedModel, build_model
 from fish_env.envs.config import EnvConfig, load_env_config
 from fish_env.envs.config_checks import speed_range
@@ -98,6 +99,9 @@ def env_options(
     model = build_model(loaded, _water(effects, current, wave), whole_catalogue=whole)
     _check_effects({} if effects is None else effects, model)
     _check_reach(settings, loaded)
+    ends = zip(settings.low.tolist(), settings.high.tolist(), strict=True)
+    asked = dict(zip(INPUTS, ends, strict=True))
+    warn_far_outside(loaded, asked, "narrow actuators in the settings (config)", stacklevel=3)
     random = build_randomization(randomization, loaded, model)
     settings = _resolving(settings, model, random)
     return EnvOptions(

@@ -22,7 +22,7 @@ from fish_env.identification.tables.problem import TableProblem
 from fish_env.identification.tables.table import UNITS, table_of
 from fish_env.identification.whole_runs import fitting, prediction
 from fish_env.identification.whole_runs.problem import WholeRunProblem
-from fish_env.identification.writing import identified_fish, posterior_of, with_posterior
+from fish_env.identification.writing import identified_fish
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.estimate.free import evaluated
 from fish_env.inference.problem import Point, Problem
@@ -139,7 +139,7 @@ class WholeRun:
 
     def fish(self, fit: Fit, name: str) -> FishParams:
         """The fish of a fit."""
-        return fitting.identified_fish(fit, name)
+        return identified_fish(fit, name)
 
 
 class Means:
@@ -184,13 +184,7 @@ class Means:
 
     def fish(self, fit: Fit, name: str) -> FishParams:
         """The fish of a fit."""
-        problem = fit.problem
-        assert isinstance(problem, TableProblem)
-        commands = problem.table.commands
-        ranges = {"commands": [commands.min(axis=0).tolist(), commands.max(axis=0).tolist()]}
-        posterior = posterior_of(fit.names, fit.estimates, fit.covariance, ranges)
-        source = f"identified from {problem.table.name}, {problem.run_count} conditions"
-        return with_posterior(problem.fish, posterior, name, source)
+        return identified_fish(fit, name)
 
 
 OBJECTIVES: dict[str, Objective] = {o.name: o for o in (OneStep(), WholeRun(), Means())}

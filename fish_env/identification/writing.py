@@ -2,44 +2,45 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from fish_env.arrays import FloatArray
+from fish_env.data.vocabulary import COMMANDS
 from fish_env.effects.extended import PREFIX
-from fish_env.identification.series import series_of
+from fish_env.identification.series import SeriesProblem
+from fish_env.identification.tables.problem import TableProblem
+from fish_env.identification.whole_runs.problem import WholeRunProblem
 from fish_env.inference.estimate.fit import Fit
 from fish_env.params.provenance import Posterior
 from fish_env.params.schema import FishParams
 
 
-def identified_fish(fit: Fit, name: str) -> FishParams:
-    """The fish of a fit, with status ``identified`` and its posterior.
+def identified_fish(fit: Fit, name: str | None = None) -> FishParams:
+    """The fish of a fit, with status ``identified``, its posterior and what its data covered.
 
     It loads wherever a fish does; its posterior can drive the environment's randomisation.
 
     Args:
-        fit: result of an identification.
-        name: name of the new fish.
+        fit: result of an identification from runs one sample ahead, whole runs, or a table.
+        name: name of the new fish; default: that of the old one and ``-extended``.
     """
-    problem = series_of(fit)
-    source = f"identified from {problem.dataset.name}, {len(problem.runs)} runs"
-    posterior = posterior_of(fit.names, fit.estimates, fit.covariance, validity(fit))
-    return with_posterior(problem.fish, posterior, name, source)
-
-
-def posterior_of(
-    names: tuple[str, ...], estimates: FloatArray, covariance: FloatArray, valid: dict[str, Any]
-) -> Posterior:
-    """Estimates (n,) and covariance (n, n) as a parameter file keeps them."""
-    symmetric = 0.5 * (covariance + covariance.T)
+    problem = fit.problem
+    assert isinstance(problem, SeriesProblem | WholeRunProblem | TableProblem)
+    valid = validity_of(problem)
+    kind = "conditions" if isinstance(problem, TableProblem) else "runs"
+    whole = " over their whole length" if isinstance(problem, WholeRunProblem) else ""
+    source = f"identified from {problem.run_count} {kind} of {valid['dataset']}{whole}"
+    symmetric = 0.5 * (fit.covariance + fit.covariance.T)
     rows = tuple(tuple(row) for row in symmetric.tolist())
-    return Posterior(names, tuple(estimates.tolist()), rows, valid)
+    posterior = Posterior(fit.names, tuple(fit.estimates.tolist()), rows, valid)
+    return _with_posterior(problem.fish, posterior, name or f"{problem.fish.name}-extended", source)
 
 
-def with_posterior(fish: FishParams, posterior: Posterior, name: str, source: str) -> FishParams:
+def _with_posterior(fish: FishParams, posterior: Posterior, name: str, source: str) -> FishParams:
     """The fish at the posterior's estimates, under a new name, with status ``identified``."""
     values = dict(zip(posterior.names, posterior.mean, strict=True))
     coefficients = {p: v for p, v in values.items() if not p.startswith(PREFIX)}
@@ -51,17 +52,26 @@ def with_posterior(fish: FishParams, posterior: Posterior, name: str, source: st
     return replace(moved, name=name, effects=effects, posterior=posterior, source_file=None)
 
 
-def validity(fit: Fit) -> dict[str, Any]:
-    """Ranges of the motion and of the commands behind a fit, (lowest, highest), SI."""
-    states = np.concatenate([f.states for f in fit.filtered])
-    commands = np.concatenate([run.commands[1] for run in series_of(fit).runs])
-    rows = {"surge": 7, "sway": 8, "heave": 9, "depth": 2, "roll_rate": 10, "pitch_rate": 11}
-    rows["yaw_rate"] = 12
-    ranges: dict[str, Any] = {name: _range(states[:, row]) for name, row in rows.items()}
-    names = ("tail_offset", "tail_amplitude", "tail_frequency", "block_displacement", "block_angle")
-    ranges |= {name: _range(commands[:, i]) for i, name in enumerate(names)}
-    return ranges
+def validity_of(problem: SeriesProblem | WholeRunProblem | TableProblem) -> dict[str, Any]:
+    """The data behind a fit: their name, runs or conditions, and ranges (lowest, highest), SI."""
+    if isinstance(problem, TableProblem):
+        table = problem.table
+        columns = dict(zip(COMMANDS, table.commands.T, strict=True))
+        for k, name in enumerate(table.observations):
+            columns[name] = table.values[table.present[:, k], k]
+        return {"dataset": table.name, "conditions": list(table.conditions), **_ranges(columns)}
+    runs = [problem.dataset.run(id) for id in problem.run_ids]
+    commands = np.concatenate([run.commands.values for run in runs])
+    columns = dict(zip(COMMANDS, commands.T, strict=True))
+    for channel in problem.channels:
+        columns[channel] = np.concatenate([run.channels[channel] for run in runs])
+    return {
+        "dataset": problem.dataset.name,
+        "runs": [run.id for run in runs],
+        **_ranges(columns),
+    }
 
 
-def _range(values: Any) -> list[float]:
-    return [float(np.min(values)), float(np.max(values))]
+def _ranges(columns: Mapping[str, FloatArray]) -> dict[str, Any]:
+    measured = {name: values[np.isfinite(values)] for name, values in columns.items()}
+    return {"ranges": {n: [float(v.min()), float(v.max())] for n, v in measured.items() if v.size}}

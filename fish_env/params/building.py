@@ -15,7 +15,9 @@ from fish_env.params.tables import CoefficientTable, TableKind, read_table
 from fish_env.reading import short, shown
 
 AXES = 3
-OPTIONAL = ("effects", "provenance", "posterior")
+OPTIONAL = ("format", "effects", "provenance", "posterior")
+EXTENDED_FORMAT = "robofish-extended/1"
+"""Form of a file that an identification wrote; one without a format is read as this."""
 
 
 def build_fish(data: Mapping[str, Any], file: Path) -> FishParams:
@@ -28,6 +30,11 @@ def build_fish(data: Mapping[str, Any], file: Path) -> FishParams:
     """
     groups = [field.name for field in parameter_fields(FishParams)]
     check_keys(data, ["name", *groups, "prior"], OPTIONAL, "", file)
+    if data.get("format", EXTENDED_FORMAT) != EXTENDED_FORMAT:
+        raise ParameterError(
+            f"{file}: format is {shown(data['format'])}, this version reads {EXTENDED_FORMAT}; "
+            "update robotic-fish, or write the file again with this version"
+        )
     fields = {
         field.name: build_field(field, data, "", file) for field in parameter_fields(FishParams)
     }

@@ -12,7 +12,7 @@ from typing import Any
 
 from fish_env.errors import ParameterError
 from fish_env.params import trees
-from fish_env.params.building import build_fish
+from fish_env.params.building import EXTENDED_FORMAT, build_fish
 from fish_env.params.checks import closest, warn_of_effective_inertia
 from fish_env.params.files import read_yaml, write_yaml
 from fish_env.params.provenance import Origin, Posterior, Provenance
@@ -215,6 +215,8 @@ def save_fish(fish: FishParams, path: str | Path) -> list[Path]:
         raise ParameterError(f"{file}: give the file the ending .yaml")
     warn_of_effective_inertia(fish)
     data: dict[str, Any] = {"name": fish.name, **trees.to_plain(fish)}
+    if fish.posterior is not None:
+        data = {"format": EXTENDED_FORMAT, **data}
     written = fish_outputs(fish, file)
     save_tables(fish, data, written)
     data["prior"] = trees.to_plain(fish.prior)

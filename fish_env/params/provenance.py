@@ -68,7 +68,9 @@ class Posterior:
         names: Parameter paths, or effect parameters as `effects.servo_lag.time_constant`.
         mean: Estimates in the units of the parameters, shape (n,).
         covariance: Covariance of the estimates, shape (n, n), symmetric, positive semidefinite.
-        validity: Range of the data behind the estimates, free form, as plain YAML values.
+        validity: The data behind the estimates, as plain YAML values: `dataset`, `runs` or
+            `conditions`, and `ranges`, the lowest and highest value of each command and channel in
+            SI units. Simulators and environments warn far outside of the commands' ranges.
     """
 
     names: tuple[str, ...]

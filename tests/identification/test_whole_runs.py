@@ -7,7 +7,6 @@ from fish_env.data import load_dataset
 from fish_env.identification import WholeRunProblem
 from fish_env.identification.whole_runs.fitting import (
     fit_whole_runs,
-    identified_fish,
 )
 from fish_env.identification.whole_runs.noise import (
     SimulationNoise,
@@ -15,6 +14,7 @@ from fish_env.identification.whole_runs.noise import (
     integrated_ou,
 )
 from fish_env.identification.whole_runs.prediction import prediction_errors, second_half
+from fish_env.identification.writing import identified_fish
 from fish_env.inference.estimate.free import Free, linearise
 from fish_env.inference.problem import Point
 from fish_env.params import load_fish
@@ -127,7 +127,7 @@ def test_the_fish_carries_what_was_found(found):
     assert fish.info(PATHS[0]).status == "identified"
     assert fish.posterior.names == (*PATHS, SCALE, GAIN)
     assert fish.effects["frequency_scale"]["scale"] == pytest.approx(PACE, abs=5e-3)
-    assert fish.posterior.validity["tail_offset"] == [-0.35, 0.35]
+    assert fish.posterior.validity["ranges"]["tail_offset"] == [-0.35, 0.35]
 
 
 def test_parameters_that_no_channel_shows_are_not_free():

@@ -11,7 +11,6 @@ from scipy.spatial.transform import Rotation
 from fish_env.arrays import BoolArray, FloatArray
 from fish_env.data.schema import CommandSteps, Dataset
 from fish_env.data.units import unwrap_angle
-from fish_env.diagnosis.extended_file import extended_fish
 from fish_env.diagnosis.gain import ANGLES
 from fish_env.diagnosis.regimes import Localisation
 from fish_env.effects import catalogue
@@ -20,6 +19,7 @@ from fish_env.identification import open_loop
 from fish_env.identification.filtering import Filtered
 from fish_env.identification.runs import RunData
 from fish_env.identification.series import SeriesProblem, series_of
+from fish_env.identification.writing import identified_fish
 from fish_env.inference.effort import FULL
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.free import evaluated
@@ -221,7 +221,7 @@ def _series(
 
 def _simulator(fit: Fit, dataset: Dataset) -> Simulator:
     """The fish of a fit, swimming alone."""
-    fish = extended_fish(fit, dataset)
+    fish = identified_fish(fit)
     own = [effect for name, effect in series_of(fit).known.items() if name not in catalogue()]
     return Simulator(fish, LONGEST_STEP_S, user_effects=own)
 

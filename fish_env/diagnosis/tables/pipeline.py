@@ -14,7 +14,6 @@ from threadpoolctl import threadpool_limits
 from fish_env.arrays import IntArray
 from fish_env.data import split_runs
 from fish_env.data.schema import SteadyDataset
-from fish_env.diagnosis.extended_file import extended_fish_of_table
 from fish_env.diagnosis.next_experiment import plausible_sizes
 from fish_env.diagnosis.report import write_report
 from fish_env.diagnosis.report.steady import steady_series_from
@@ -26,6 +25,7 @@ from fish_env.diagnosis.writing import write_answer
 from fish_env.errors import DatasetError
 from fish_env.identification.tables.problem import TableProblem
 from fish_env.identification.tables.table import Table, table_of
+from fish_env.identification.writing import identified_fish
 from fish_env.inference.adequacy import Adequacy
 from fish_env.inference.attribution import Attribution
 from fish_env.inference.effort import effort_of
@@ -197,7 +197,7 @@ def _notes(
 def _write(diagnosis: TableDiagnosis, answer: dict[str, Any], folder: Path) -> None:
     accepted = diagnosis.accepted
     extends = diagnosis.verdict.name in EXTENDING
-    extended = extended_fish_of_table(accepted, diagnosis.problem) if extends else None
+    extended = identified_fish(accepted) if extends else None
     write_answer(answer, extended, folder)
     fits = diagnosis.attribution.baseline.fit, accepted
     final = diagnosis.gain.runs if diagnosis.gain else ()

@@ -4,24 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
 
-import numpy as np
-
-from fish_env.data.vocabulary import COMMANDS
 from fish_env.identification.whole_runs.noise import DRIFTS
 from fish_env.identification.whole_runs.prediction import (
-    MEANS,
-    PLANAR,
-    second_half,
     whole_runs_of,
 )
 from fish_env.identification.whole_runs.problem import FREQUENCY_SCALE, WholeRunProblem
-from fish_env.identification.writing import posterior_of, with_posterior
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.hypotheses import parameter_path
 from fish_env.inference.problem import Point
-from fish_env.params.schema import FishParams
 
 FIRST_STEPS, STEPS = 15, 40
 """Most Gauss-Newton steps under forgiving weights, and under those that count."""
@@ -96,31 +87,3 @@ def _effects_on(problem: WholeRunProblem, names: Sequence[str]) -> dict[str, flo
 def _begun(found: Fit) -> WholeRunProblem:
     """The problem of a fit with the runs' own numbers as it found them."""
     return whole_runs_of(found).started([e.own for e in found.filtered])
-
-
-def identified_fish(found: Fit, name: str) -> FishParams:
-    """The fish of a fit to whole runs, with its posterior and validity.
-
-    Args:
-        found: the fit.
-        name: name of the new fish.
-    """
-    problem = whole_runs_of(found)
-    posterior = posterior_of(found.names, found.estimates, found.covariance, validity(found))
-    source = (
-        f"identified from {problem.run_count} runs of {problem.dataset.name} over their whole "
-        "length"
-    )
-    return with_posterior(problem.fish, posterior, name, source)
-
-
-def validity(found: Fit) -> dict[str, Any]:
-    """Ranges of the commands and of second-half motion behind a fit, (lowest, highest), SI."""
-    problem = whole_runs_of(found)
-    commands = np.concatenate([run.commands[1] for run in problem.runs])
-    rows = {name: commands[:, i] for i, name in enumerate(COMMANDS)}
-    if set(PLANAR) <= set(problem.channels):
-        columns = [problem.channels.index(name) for name in PLANAR]
-        means = np.array([second_half(r.clock, r.measured[:, columns]) for r in problem.runs])
-        rows |= dict(zip(MEANS, means.T, strict=True))
-    return {name: [float(v.min()), float(v.max())] for name, v in rows.items()}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -231,8 +231,22 @@ def _from_posterior(fish: FishParams, model: ExtendedModel) -> Randomization:
             f"{fish.name} carries no posterior: use a file written by an identification, or 'prior'"
         )
     posterior = fish.posterior
-    bounds = _bounds(posterior.names, fish, model)
-    return _correlated(posterior.names, posterior.mean, posterior.covariance, *bounds)
+    declared = {effect.name for effect in model.declared}
+    # Effects on recordings alone change nothing here: their estimates are integrated out.
+    kept = [i for i, path in enumerate(posterior.names) if _moves(path, declared)]
+    names = tuple(posterior.names[i] for i in kept)
+    mean = np.asarray(posterior.mean, float)[kept]
+    covariance = np.asarray(posterior.covariance, float).reshape(2 * (len(posterior.mean),))
+    if not names:
+        raise ConfigError(
+            "randomization: the fish's posterior names no parameter of the motion; use 'prior'"
+        )
+    return _correlated(names, mean, covariance[np.ix_(kept, kept)], *_bounds(names, fish, model))
+
+
+def _moves(path: str, declared: Collection[str]) -> bool:
+    """Whether a path is a coefficient, or belongs to one of the declared effects."""
+    return not path.startswith(PREFIX) or path.removeprefix(PREFIX).partition(".")[0] in declared
 
 
 def _correlated(
@@ -244,8 +258,6 @@ def _correlated(
 ) -> Randomization:
     matrix = np.asarray(covariance, float)
     count = len(paths)
-    if not count:
-        raise ConfigError("randomization: the fish's posterior names no parameter; use 'prior'")
     sd = np.sqrt(np.diag(matrix))
     scale = np.where(sd > 0.0, sd, 1.0)
     correlation = matrix / np.outer(scale, scale) + np.diag(np.where(sd > 0.0, 1e-12, 1.0))

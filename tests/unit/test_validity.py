@@ -101,9 +101,9 @@ def test_an_extended_file_names_its_form_and_another_form_is_refused(tmp_path):
 def test_an_extended_file_with_any_effect_loads_into_the_environment(tmp_path, name, end):
     """At both ends of what a diagnosis may estimate: on the motion, on sensors, on clocks."""
     values = {p.name: p.plausible[end] for p in catalogue()[name].parameters}
-    paths = [f"effects.{name}.{p}" for p in values]
+    paths = ["mass.total", *(f"effects.{name}.{p}" for p in values)]
     rows = tuple(tuple(1e-8 * (i == j) for j in paths) for i in paths)
-    posterior = Posterior(tuple(paths), tuple(values.values()), rows, {"ranges": {}})
+    posterior = Posterior(tuple(paths), (2.0, *values.values()), rows, {"ranges": {}})
     fish = dataclasses.replace(
         load_fish("zheng-2021-a"), effects={name: values}, posterior=posterior
     )

@@ -47,7 +47,7 @@ def as_dict(diagnosis: Diagnosis) -> Plain:
         "fish": diagnosis.problem.fish.name,
         "left_out": list(effort_of(diagnosis.quick).left_out),
         "noise": _noise(diagnosis.accepted),
-        "noise_floor": [noise_floor.as_dict(floor) for floor in diagnosis.floors],
+        "noise_floor": _floors(diagnosis),
         "outliers": outliers.as_dict(diagnosis.outliers),
         "consistency": consistency.as_dict(diagnosis.consistency),
         "beats": _beats(diagnosis.inputs.logged),
@@ -108,6 +108,13 @@ def _noise(fit: Fit) -> Plain:
         "sensor_sd": dict(sensors),
         "disturbance": disturbance_entry(fit.noise),
     }
+
+
+def _floors(diagnosis: Diagnosis) -> list[Plain]:
+    """Noise of each channel from the data alone, beside what the filter of the answer uses."""
+    used = _noise(diagnosis.accepted)["sensor_sd"]
+    floors = map(noise_floor.as_dict, diagnosis.floors)
+    return [{**floor, "filter_sd": used.get(floor["channel"])} for floor in floors]
 
 
 def run_variation_entry(fit: Fit) -> list[Plain]:

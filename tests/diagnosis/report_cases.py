@@ -57,7 +57,7 @@ def answer(verdict: str = "cause", **changes: Any) -> dict[str, Any]:
         },
         "noise_floor": [{
             "channel": "yaw", "white": {"sd": 0.002, "ci95": [0.0019, 0.0021]},
-            "upper_bound": False,
+            "upper_bound": False, "filter_sd": 0.00217,
         }],
         "consistency": {"sentences": ["roll, p agree with each other."]},
         "misfit": {name: {**pair, "unit": "noise sd"} for name in CHANNELS},

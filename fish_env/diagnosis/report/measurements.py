@@ -37,24 +37,27 @@ def measurements(answer: Answer, series: ReportSeries | SteadySeries | None, alb
     agreed = (answer.get("consistency") or {}).get("sentences", [])
     sentences = "".join(f"<li>{text(sentence)}</li>" for sentence in agreed)
     rows = [_floor(floor) for floor in answer.get("noise_floor", [])]
-    heads = ("channel", "white noise (sd)", "95 % interval", "unit")
+    heads = ("channel", "noise in the filter (sd)", "from the data alone (sd)", "95 % interval",
+             "unit")  # fmt: skip
     return section(
         "The measurements themselves",
         f"<ul>{sentences}</ul>" if sentences else "",
-        folded("Noise of each channel, from the data alone", table(heads, rows)),
+        folded("Noise of each channel", table(heads, rows)),
         key="measurements",
     )
 
 
 def _floor(floor: Answer) -> tuple[str, ...]:
     unit, factor = shown_unit(floor["channel"])
-    white = floor["white"]
+    white, used = floor["white"], floor.get("filter_sd")
+    filtered = "–" if used is None else number(factor * used)
     if white is None:
-        return text(floor["channel"]), "–", "too few samples", text(unit)
+        return text(floor["channel"]), filtered, "–", "too few samples", text(unit)
     low, high = (factor * end for end in white["ci95"])
     bound = "at most " if floor.get("upper_bound") else ""
     return (
         text(floor["channel"]),
+        filtered,
         bound + number(factor * white["sd"]),
         f"{number(low)} to {number(high)}",
         text(unit),

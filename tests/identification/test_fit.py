@@ -121,7 +121,7 @@ def test_a_fit_becomes_a_fish_that_loads(fits, tmp_path):
     assert fish.get(PATHS[0]) == result.estimates[0]
     assert fish.posterior is not None
     np.testing.assert_allclose(fish.posterior.covariance, result.covariance, rtol=1e-9)
-    assert fish.posterior.validity["tail_frequency"][1] <= 2.2
+    assert fish.posterior.validity["ranges"]["tail_frequency"][1] <= 2.2
     Simulator(str(file)).run([{"t": 0.0}], duration_s=0.1)
     env = gym.make("RoboticFish3D-v0", fish=str(file), randomization="posterior")
     env.reset(seed=0)

@@ -7,11 +7,12 @@ from fish_env.params.io import list_fish, load_fish
 from fish_env.params.schema import FishParams
 from fish_env.simulator import InitialState, Simulator, schedule
 from fish_env.trajectory import Trajectory
+from fish_env.version import VERSION
 
 if TYPE_CHECKING:
     from fish_env.analysis import compare, diagnose, fit
 
-__version__ = "0.1.0"
+__version__ = VERSION
 
 register_envs()
 

@@ -19,6 +19,7 @@ from fish_env.envs.registration import ENV_ID
 from fish_env.errors import ConfigError
 from fish_env.files import write_text
 from fish_env.reading import Unreadable, read_json
+from fish_env.version import versioned
 
 RATES = ("success_rate", "failure_rate")
 MOST_BYTES = 20_000_000
@@ -99,7 +100,7 @@ def _interval(key: str, values: np.ndarray) -> Interval | None:
 def write_results(path: Path, results: Sequence[Result], **more: Any) -> None:
     """Writes results, and whatever else describes them, as JSON."""
     rows = [_as_json(result) for result in results]
-    write_text(path, json.dumps({**more, "results": rows}, indent=1) + "\n")
+    write_text(path, json.dumps(versioned({**more, "results": rows}), indent=1) + "\n")
 
 
 def _as_json(result: Result) -> dict[str, Any]:

@@ -17,6 +17,7 @@ from fish_env.diagnosis.writing import EXTENDED
 from fish_env.files import write_bytes
 from fish_env.identification.dataset_fit import DatasetFit
 from fish_env.params import FishParams, load_fish
+from fish_env.version import versioned
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -286,5 +287,5 @@ class DiagnoseResult(Result):
 def _write_json(file: str | Path, content: dict[str, Any]) -> Path:
     import json
 
-    write_bytes(file, (json.dumps(content, indent=1, allow_nan=False) + "\n").encode())
+    write_bytes(file, (json.dumps(versioned(content), indent=1, allow_nan=False) + "\n").encode())
     return Path(file)

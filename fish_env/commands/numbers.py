@@ -11,6 +11,7 @@ from rich.console import Console
 
 from fish_env.comparison.errors import plain
 from fish_env.files import STANDARD, write_text
+from fish_env.version import versioned
 
 
 def console_for(*outputs: Path | None) -> Console:
@@ -33,6 +34,7 @@ def write_json(console: Console, file: Path, content: Mapping[str, Any] | list[A
     Raises:
         OutputError: The file cannot be written.
     """
+    content = versioned(content) if isinstance(content, Mapping) else content
     write_text(file, json.dumps(plain(content), indent=1, allow_nan=False) + "\n")
     if str(file) != STANDARD:
         console.print(f"numbers: {file}", soft_wrap=True, markup=False)

@@ -19,6 +19,7 @@ from fish_env.data.vocabulary import CHANNELS, COMMANDS, FORMAT, OBSERVATIONS, Q
 from fish_env.errors import DatasetError
 from fish_env.files import FORBIDDEN, file_name, replacing, write_text
 from fish_env.params import list_fish
+from fish_env.version import stamped
 
 TABLE = "steady.csv"
 
@@ -146,7 +147,7 @@ def _write_description(
         **form,
     }
     text = yaml.safe_dump(content, sort_keys=False, allow_unicode=True, width=100)
-    write_text(folder / FILE_NAME, text)
+    write_text(folder / FILE_NAME, stamped(text))
 
 
 def fish_reference(fish: str, folder: Path) -> str:

@@ -34,6 +34,7 @@ from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import coefficient_sizes
 from fish_env.inference.screening import smallest_detectable
 from fish_env.rigidbody import consistency, noise_floor, outliers
+from fish_env.version import VERSION
 
 
 def as_dict(diagnosis: Diagnosis) -> Plain:
@@ -71,6 +72,7 @@ def shared_entries(diagnosis: Diagnosed) -> Plain:
     sizes = coefficient_sizes(screen.signals, lambda s: smallest_detectable(s, 0, screen.threshold))
     return {
         "format": FORMAT,
+        "version": VERSION,
         "dataset": diagnosis.dataset.name,
         "seed": diagnosis.seed,
         "quick": diagnosis.quick,
@@ -83,6 +85,7 @@ def shared_entries(diagnosis: Diagnosed) -> Plain:
         "run_variation": run_variation_entry(diagnosis.accepted),
         "budget": budget_entry(diagnosis.budget),
         "misfit": misfit_entry(diagnosis.misfit),
+        "fitted_runs": diagnosis.accepted.problem.run_count,
         "preconditions": [precondition_entry(p) for p in diagnosis.preconditions],
         "ranking": [_rank(ranked) for ranked in attribution.ranking],
         "unexplained": [] if diagnosis.adequacy.reached else _unexplained(diagnosis),

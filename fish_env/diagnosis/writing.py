@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from fish_env.diagnosis.headline import EXPERIMENT_FILE
 from fish_env.diagnosis.written import replace_part
 from fish_env.files import write_text
 from fish_env.params.io import fish_outputs, save_fish
@@ -22,7 +23,7 @@ def outputs(fish: FishParams, folder: Path) -> list[Path]:
         fish: the fish; the extended one has the same tables.
         folder: where they go.
     """
-    names = ("diagnosis.json", "report.html")
+    names = ("diagnosis.json", "report.html", EXPERIMENT_FILE)
     return [*(folder / name for name in names), *fish_outputs(fish, folder / EXTENDED).values()]
 
 

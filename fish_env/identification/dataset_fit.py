@@ -31,6 +31,7 @@ from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.hypotheses import PREFIX, effect_of, parameter_of
 from fish_env.params.io import load_fish, save_fish
 from fish_env.params.schema import FishParams
+from fish_env.version import versioned
 
 AUTO = "auto"
 
@@ -129,7 +130,7 @@ class DatasetFit:
         """
         save_fish(replace(self.fish, name=Path(path).stem), path)
         if results is not None:
-            write_text(results, json.dumps(self.as_dict(), indent=1) + "\n")
+            write_text(results, json.dumps(versioned(self.as_dict()), indent=1) + "\n")
 
 
 def fit_dataset(

@@ -10,6 +10,7 @@ from fish_env.errors import ParameterError
 from fish_env.files import write_text
 from fish_env.reading import Unreadable
 from fish_env.reading import read_yaml as read_any_yaml
+from fish_env.version import stamped
 
 
 class PlainDumper(yaml.SafeDumper):
@@ -47,4 +48,4 @@ def write_yaml(data: dict[str, Any], path: Path) -> None:
     text = yaml.dump(
         data, Dumper=PlainDumper, sort_keys=False, default_flow_style=None, allow_unicode=True
     )
-    write_text(path, text)
+    write_text(path, stamped(text))

@@ -12,6 +12,7 @@ from fish_env.files import write_text
 from fish_env.params import FishParams
 from fish_env.replay.motion import Group
 from fish_env.replay.packing import page_data
+from fish_env.version import generator
 
 STATIC = Path(__file__).with_name("static")
 VENDOR = ("vendor/three.min.js", "vendor/uplot.min.js")
@@ -37,6 +38,7 @@ def write_replay(
     page = _read("page.html")
     parts = {
         "title": html.escape(title),
+        "generator": generator(),
         "style": component_style(),
         "body": component(groups, fish, whole_page=True),
         "scripts": component_scripts(),

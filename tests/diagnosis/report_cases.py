@@ -60,6 +60,15 @@ def answer(verdict: str = "cause", **changes: Any) -> dict[str, Any]:
             "upper_bound": False, "filter_sd": 0.00217,
         }],
         "consistency": {"sentences": ["roll, p agree with each other."]},
+        "budget": {
+            "runs": ["r01"], "held_out": True, "misfit": 60.0, "left": 0.05, "left_ci95": None,
+            "shares": [
+                {"name": "servo_lag", "share": 0.8, "ci95": None},
+                {"name": "coefficients", "share": 0.17, "ci95": None},
+                {"name": "run_variation", "share": -0.02, "ci95": None},
+            ],
+        } if named else None,
+        "fitted_runs": 5,
         "misfit": {name: {**pair, "unit": "noise sd"} for name in CHANNELS},
         "gain": {
             "final_runs": ["r01"], "fit_percent": {"baseline": 40.0, "extended": 90.0},

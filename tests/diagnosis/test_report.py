@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from fish_env.diagnosis.answer import words
+from fish_env.diagnosis.headline import headline
 from fish_env.diagnosis.regimes import localise_fits
 from fish_env.diagnosis.report import series_from, write_report
 from fish_env.diagnosis.report.html import inline, text
@@ -32,7 +32,8 @@ def test_the_page_has_every_part(full):
         "The simulation lacks servo_lag", "0.05 to 0.058", "rf-replay", "r01 (kept for judging)",
         "Where the misfit sits", "tail phase 0 to 45 deg", "never visited", "Ranking",
         "could not have shown: surface_drag", "tether (0.61)", "0.004 m/s", "Next experiment",
-        "mass.total", "closes 96 %", "a note about this run", "one note",
+        "mass.total", "closes 96 %", "Error budget", "off by up to", "Next:",
+        "a note about this run", "one note",
         "roll, p agree with each other", "0.109 to 0.12",
     ):  # fmt: skip
         assert part in page, part
@@ -61,6 +62,7 @@ def test_figures_are_files_too(full):
         "ranking",
         "gain",
         "next_experiment",
+        "budget",
         "run_r01",
         "run_r02",
     }
@@ -73,7 +75,8 @@ def test_figures_are_files_too(full):
 def test_every_verdict_has_a_page_without_series(verdict, tmp_path):
     said = answer(verdict)
     page = write_report(said, None, tmp_path).read_text()
-    assert text(words(said)) in page
+    for line in (headline(said).verdict, headline(said).closed, headline(said).next_step):
+        assert text(line) in page
     assert 'class="rf-replay"' not in page
     assert ("What the extension gains" in page) == bool(said["gain"])
 
@@ -116,7 +119,7 @@ def test_a_quick_answer_draws_fewer_runs(tmp_path):
     assert not (tmp_path / "figures" / "run_r02.svg").exists()
     assert not (tmp_path / "figures" / "regimes.svg").exists()
     assert text(series.localisation.words()) in page
-    assert not list((tmp_path / "figures").glob("*.png"))
+    assert [file.name for file in (tmp_path / "figures").glob("*.png")] == ["paths.png"]
     assert "figures as PNG" in QUICK.left_out
     assert any("map of where" in words for words in QUICK.left_out)
     write_report(answer(), series, tmp_path)

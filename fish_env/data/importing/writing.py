@@ -7,6 +7,7 @@ from fish_env.data.importing.assemble import Imported
 from fish_env.data.importing.plan import Content, Plan, plan_text, used_sources
 from fish_env.data.writing import check_free, fish_reference, write_table
 from fish_env.files import write_text
+from fish_env.version import stamped
 
 MAPPING = "import.yaml"
 
@@ -32,7 +33,7 @@ def write_imported(imported: Imported, plan: Plan, folder: Path) -> list[Path]:
     written = list(files.values())
     if not (folder / MAPPING).exists():
         written.append(write_mapping(used_content(plan), folder))
-    write_text(folder / FILE_NAME, plan_text(_placed(imported.description, folder)))
+    write_text(folder / FILE_NAME, stamped(plan_text(_placed(imported.description, folder))))
     return [*written, folder / FILE_NAME]
 
 
@@ -45,7 +46,7 @@ def used_content(plan: Plan) -> Content:
 def write_mapping(content: Content, folder: Path) -> Path:
     """Writes a mapping as import.yaml into a folder, where no file of that name is."""
     check_free(folder, [MAPPING])
-    write_text(folder / MAPPING, plan_text(_placed(content, folder)))
+    write_text(folder / MAPPING, stamped(plan_text(_placed(content, folder))))
     return folder / MAPPING
 
 

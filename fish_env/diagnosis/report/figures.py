@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +13,7 @@ import numpy as np
 
 from fish_env.arrays import FloatArray
 from fish_env.data.vocabulary import COMMANDS
+from fish_env.diagnosis.headline import FEWEST_RUNS
 from fish_env.diagnosis.regimes import LEVEL, Localisation
 from fish_env.diagnosis.report.series import RunSeries, SteadySeries
 from fish_env.diagnosis.report.units import label, shown_unit
@@ -19,6 +21,7 @@ from fish_env.files import file_name, replacing
 from fish_env.inference.hypotheses import PARAMETER
 from fish_env.plotting.comparison import COMMAND_UNITS
 from fish_env.plotting.style import BLUE, DOTS_PER_INCH, MEASURED, VERMILION, drawing, keep_literal
+from fish_env.replay import Motion
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,6 +33,8 @@ BASELINE, EXTENDED = VERMILION, BLUE
 Plain = Mapping[str, Any]
 MAPS, PITCH = 4, 1.15
 """Maps of regimes beside each other, and from one to the next in widths of a map."""
+LEADING = "paths"
+"""The figure that is always a PNG too."""
 WIDE = 30.0
 """Largest ratio of bars on a linear axis."""
 LOOKS: dict[str, dict[str, Any]] = {
@@ -37,6 +42,22 @@ LOOKS: dict[str, dict[str, Any]] = {
     "baseline": {"color": BASELINE, "ls": "--"},
     "extended": {"color": EXTENDED},
 }
+PATHS: dict[str, dict[str, Any]] = {
+    "measured": LOOKS["measured"],
+    "simulated": LOOKS["baseline"],
+    "refitted": LOOKS["extended"],
+    "extended": LOOKS["extended"],
+}
+OVER_TIME = ("z", "yaw", "pitch", "roll", "r", "q", "p", "u", "v", "w", "x", "y")
+"""Channels that are drawn over time beside the paths: the first that was measured."""
+BUDGET_NAMES = {
+    "coefficients": "re-estimated coefficients",
+    "run_variation": "run-to-run variation",
+}
+SHADES = (
+    (EXTENDED, ""), (BASELINE, "//"), ("#009e73", ".."), ("#cc79a7", "xx"), ("#e69f00", "--"),
+)  # fmt: skip
+"""Colours and hatches of shares, told apart in black and white too."""
 LEFT_OUT_GAIN = "log score on {} left out, above the refitted baseline's"
 
 
@@ -79,7 +100,7 @@ def _saved(figure: Figure, album: Album, name: str) -> Path:
     with replacing(vector) as part:
         figure.savefig(part)
     album.written.append(vector)
-    if album.bitmaps:
+    if album.bitmaps or name == LEADING:
         bitmap = album.folder / f"{name}.png"
         with replacing(bitmap) as part:
             figure.savefig(part, dpi=DOTS_PER_INCH)
@@ -88,26 +109,88 @@ def _saved(figure: Figure, album: Album, name: str) -> Path:
 
 
 def draw_paths(runs: Sequence[RunSeries], album: Album) -> Path:
-    """Paths of whole runs from above, and their depth over time."""
-    with _page(0.6 + 2.6 * max(len(runs), 2), 4.4) as figure:
-        axes = figure.subplots(2, len(runs), squeeze=False, height_ratios=(3, 2))
-        for (above, depth), run in zip(axes.T, runs, strict=True):
-            for motion in run.motions:
-                frames = motion.frames
-                look = LOOKS[motion.role]
-                above.plot(frames.position[:, 1], frames.position[:, 0], label=motion.role, **look)
-                time = frames.start_s + frames.step_s * np.arange(len(frames.position))
-                depth.plot(time, frames.position[:, 2], **look)
-            above.set_title(run.id, loc="left")
-            above.set_aspect("equal", adjustable="datalim")
-            above.set_xlabel("y, east (m)")
-            depth.set_xlabel("time (s)")
-            depth.invert_yaxis()
-        axes[0, 0].set_ylabel("x, north (m)")
-        axes[1, 0].set_ylabel("z, depth (m)")
+    """Whole runs: measured, simulated as the fish was given, and by the best explanation.
+
+    From above where the position was measured, and one channel over time; else two channels.
+    """
+    flat = all({"x", "y"} <= set(run.measured) for run in runs)
+    both = [n for n in OVER_TIME if all(n in run.measured for run in runs)]
+    timed = both[: 1 if flat else 2]
+    heights = (3,) * flat + (2,) * len(timed)
+    with _page(0.6 + 2.6 * max(len(runs), 2), 0.6 + 0.85 * sum(heights)) as figure:
+        axes = figure.subplots(len(heights), len(runs), squeeze=False, height_ratios=heights)
+        for column, run in zip(axes.T, runs, strict=True):
+            for word, motion in _shown(run).items():
+                if flat:
+                    path = motion.frames.position
+                    column[0].plot(path[:, 1], path[:, 0], label=word, **PATHS[word])
+                for ax, name in zip(column[int(flat) :], timed, strict=True):
+                    values = shown_unit(name)[1] * motion.channels[name]
+                    ax.plot(motion.time_s, values, label=word, **PATHS[word])
+            column[0].set_title(_title(run, flat), loc="left", fontsize=9)
+            column[-1].set_xlabel("time (s)")
+            if flat:
+                column[0].set_aspect("equal", adjustable="datalim")
+                column[0].set_xlabel("y, east (m)")
+            if "z" in timed:
+                column[int(flat)].invert_yaxis()
+        names = ["x, north (m)"] * flat + [label(name) for name in timed]
+        for ax, name in zip(axes[:, 0], names, strict=True):
+            ax.set_ylabel(name)
         handles, words = axes[0, 0].get_legend_handles_labels()
         figure.legend(handles, words, loc="outside upper center", ncols=3)
         return _saved(figure, album, "paths")
+
+
+def _shown(run: RunSeries) -> dict[str, Motion]:
+    """Motions of the first picture by their word in the legend."""
+    measured, *models = run.motions
+    shown = {"measured": measured}
+    if run.given is not None:
+        shown["simulated"] = run.given
+    if models:
+        shown["extended" if models[-1].role == "extended" else "refitted"] = models[-1]
+    return shown
+
+
+def _title(run: RunSeries, flat: bool) -> str:
+    name = f"{run.id} (held out)" if run.final else run.id
+    if not flat:
+        return name
+    off = [f"{word} {100 * _off(run, m):.1f} cm" for word, m in list(_shown(run).items())[1:]]
+    return f"{name}\noff by up to: {', '.join(off)}" if off else name
+
+
+def _off(run: RunSeries, motion: Motion) -> float:
+    """Largest horizontal distance from the measured position, m."""
+    count = len(motion.time_s)
+    gaps = [motion.channels[n] - run.measured[n][-count:] for n in ("x", "y")]
+    return float(np.nanmax(np.hypot(*gaps)))
+
+
+def draw_budget(budget: Plain, album: Album) -> Path:
+    """The error budget as one bar of shares, largest first, and what is left."""
+    parts = {item["name"].removeprefix(PARAMETER): item["share"] for item in budget["shares"]}
+    shares = {BUDGET_NAMES.get(n, n): max(v, 0.0) for n, v in parts.items()}
+    shares = dict(sorted(shares.items(), key=lambda pair: -pair[1]))
+    shares["left"] = max(budget["left"], 0.0)
+    total, begin = sum(shares.values()) or 1.0, 0.0
+    with _page(7.0, 1.1 + 0.2 * -(-len(shares) // 2)) as figure:
+        ax = figure.subplots()
+        for (name, share), (colour, hatch) in zip(shares.items(), cycle(SHADES)):
+            if name == "left":
+                colour, hatch = "#dddddd", ""
+            percent = 100.0 * share / total
+            ax.barh(0, percent, left=begin, ec="white", lw=0.8, height=0.8,
+                    label=f"{name}: {percent:.0f} %", color=colour, hatch=hatch)  # fmt: skip
+            begin += percent
+        ax.set_xlim(0.0, 100.0)
+        ax.set_yticks([])
+        ax.spines["left"].set_visible(False)
+        ax.grid(False)
+        ax.set_xlabel("share of the error of the simulation as given (%)")
+        figure.legend(loc="outside upper left", ncols=2)
+        return _saved(figure, album, "budget")
 
 
 def draw_run(run: RunSeries, window_s: float, album: Album) -> Path:
@@ -204,12 +287,14 @@ def draw_ranking(answer: Plain, album: Album) -> Path:
     accepted = {cause["name"] for cause in answer["causes"]}
     meaning = LEFT_OUT_GAIN.format("conditions" if answer.get("kind") == "steady" else "runs")
     gains = [row["score"] for row in rows]
+    over_runs = answer.get("fitted_runs", FEWEST_RUNS) >= FEWEST_RUNS
     with _page(7.0, 0.9 + 0.32 * len(rows)) as figure:
         ax = figure.subplots()
         for i, (row, gain) in enumerate(zip(rows, gains, strict=True)):
-            colour = EXTENDED if row["name"] in accepted else "#8a8a8a"
-            ax.barh(i, gain, color=colour, height=0.66)
-            if row.get("ci95"):
+            found = row["name"] in accepted
+            colour, hatch = (EXTENDED, "") if found else ("#8a8a8a", "//")
+            ax.barh(i, gain, height=0.66, ec="white", lw=0, color=colour, hatch=hatch)
+            if row.get("ci95") and over_runs:
                 ax.plot(row["ci95"], [i, i], color=MEASURED, lw=1.4, marker="|")
         names = [row["name"].removeprefix(PARAMETER) for row in rows]
         ax.set_yticks(range(len(rows)), names)

@@ -60,10 +60,17 @@ def table(heads: Sequence[str], rows: Sequence[Sequence[str]], caption: str = ""
     )
 
 
-def figure(svg: Path, caption: str) -> str:
-    """A drawing inside the page; its colours follow the reader's ground."""
+def figure(svg: Path, caption: str, kind: str = "") -> str:
+    """A drawing inside the page; its colours follow the reader's ground.
+
+    Args:
+        svg: The drawing.
+        caption: Below it, and for readers who do not see it.
+        kind: Class of the figure; "rp-fit" shrinks it to a phone's width.
+    """
+    name = f' class="{kind}"' if kind else ""
     return (
-        f'<figure role="img" aria-label="{html.escape(caption, quote=True)}">'
+        f'<figure{name} role="img" aria-label="{html.escape(caption, quote=True)}">'
         f'<div class="rp-scroll" tabindex="0">{inline(svg.read_text(encoding="utf-8"))}</div>'
         f"<figcaption>{text(caption)}</figcaption></figure>"
     )

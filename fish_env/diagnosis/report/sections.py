@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fish_env.diagnosis.answer import words
+from fish_env.diagnosis.headline import EXPERIMENT_FILE, FEWEST_RUNS, headline
 from fish_env.diagnosis.report import figures as draw
 from fish_env.diagnosis.report.figures import Album
 from fish_env.diagnosis.report.html import (
@@ -30,29 +30,48 @@ Answer = Mapping[str, Any]
 Series = ReportSeries | SteadySeries | None
 MOST_DRAWN = 2
 """Runs with a drawing of their own; the replay has them all."""
-VERDICTS = {
-    "inputs": "The data, or their description, are wrong",
-    "no_misfit": "Nothing is wrong that these runs could show",
-    "parameters": "Right structure, wrong numbers",
-    "cause": "A cause is found",
-    "ambiguous": "Several explanations fit alike",
-    "partial": "Known causes act, beside something unknown",
-    "outside_library": "Something no known cause explains",
-    "not_excited": "These runs cannot show it",
-}
+MOST_PATHS = 3
+"""Runs in the first picture."""
 
 
 def verdict(answer: Answer, series: Series, album: Album) -> str:
-    """Heading: the verdict in two sentences."""
-    name = str(answer["verdict"])
-    facts = [f"dataset {answer.get('dataset', '?')}", f"fish {answer.get('fish', '?')}"]
-    if answer.get("quick"):
-        facts.append(f"a first look, without {'; '.join(answer.get('left_out', []))}")
+    """Heading: the verdict, the closed share of the gap, what to do next, and the caveats."""
+    name, said = str(answer["verdict"]), headline(answer)
+    facts = [
+        f"verdict {name}", f"dataset {answer.get('dataset', '?')}",
+        f"fish {answer.get('fish', '?')}",
+    ]  # fmt: skip
     return (
         f'<header class="rp-verdict rp-{text(name)}"><p class="rp-facts">{text(" · ".join(facts))}'
-        f"</p><h1>{text(VERDICTS.get(name, name))}</h1>"
-        f'<p class="rp-words">{text(words(dict(answer)))}</p></header>'
+        f"</p><h1>{text(said.verdict)}</h1>{paragraph(said.closed, 'rp-words')}"
+        f'<p class="rp-words"><b>Next:</b> {text(said.next_step)}</p>'
+        f"{paragraph(said.caveats, 'rp-note')}</header>"
     )
+
+
+def overview(answer: Answer, series: Series, album: Album) -> str:
+    """The first picture: measured, simulated as given, and by the best explanation."""
+    if not isinstance(series, ReportSeries) or not series.runs:
+        return ""
+    runs = series.runs[:MOST_PATHS]
+    models = "the extended model" if runs[0].extended else "the refitted simulation"
+    caption = (
+        f"Measured runs, the simulation as it was given, and {models}. Both swim alone over the "
+        f"whole run, from {SETTLED_S:g} s after its start."
+    )
+    return figure(draw.draw_paths(runs, album), caption, "rp-fit")
+
+
+def budget(answer: Answer, series: Series, album: Album) -> str:
+    """The error budget as a bar."""
+    found = answer.get("budget")
+    if not found:
+        return ""
+    noun, count = _noun(answer), len(found["runs"])
+    where = f"{count} {'held-out' if found['held_out'] else 'fitted'} {noun}{'s' * (count != 1)}"
+    caption = f"What the error of the simulation as given comes from, on {where}."
+    picture = figure(draw.draw_budget(found, album), caption, "rp-fit")
+    return section("Error budget", picture, key="budget")
 
 
 def cause_values(answer: Answer, series: Series, album: Album) -> str:
@@ -78,8 +97,6 @@ def swimming(answer: Answer, series: Series, album: Album) -> str:
         return ""
     groups = [Group(_run_name(r.id, r.final), r.motions) for r in series.runs]
     notes = [f"{run.id}: {note}" for run in series.runs for note in run.notes]
-    drawn = [run for run in _drawn(answer, series) if {"x", "y"} <= set(run.measured)]
-    caption = "The same paths from above, and their depth."
     return section(
         "How it swims",
         paragraph(
@@ -88,7 +105,6 @@ def swimming(answer: Answer, series: Series, album: Album) -> str:
             "predictions further down start afresh every few seconds."
         ),
         component(groups, series.fish, "runs"),
-        figure(draw.draw_paths(drawn, album), caption) if drawn else "",
         *(paragraph(note, "rp-note") for note in notes),
         key="replay",
     )
@@ -184,9 +200,11 @@ def _gain_words(found: Answer, noun: str) -> str:
         )
     if share:
         low, high = share["ci95"]
+        many = len(found.get("final_runs", ())) >= FEWEST_RUNS
+        interval = f" (95 %: {100 * low:.0f} to {100 * high:.0f} %)" if many else ""
         said.append(
             f"It closes {100 * share['estimate']:.0f} % of the gap between the refitted baseline "
-            f"and the noise (95 %: {100 * low:.0f} to {100 * high:.0f} %)."
+            f"and the noise{interval}."
         )
     return paragraph(" ".join(said))
 
@@ -256,10 +274,15 @@ def ranking(answer: Answer, series: Series, album: Album) -> str:
     if not answer.get("ranking"):
         return ""
     caption = (
-        "How much better each refitted cause foretells what was left out of the fit; "
-        "blue: accepted; lines: 95 % intervals over runs."
+        "How much better each refitted cause predicts what was left out of the fit. "
+        "Full bars: accepted. Hatched bars: rejected."
+        + (" Lines: 95 % intervals over runs." if _many_fitted(answer) else "")
     )
     return section("Ranking", figure(draw.draw_ranking(answer, album), caption), key="ranking")
+
+
+def _many_fitted(answer: Answer) -> bool:
+    return int(answer.get("fitted_runs", FEWEST_RUNS)) >= FEWEST_RUNS
 
 
 def experiment(answer: Answer, series: Series, album: Album) -> str:
@@ -279,7 +302,10 @@ def experiment(answer: Answer, series: Series, album: Album) -> str:
     name = str(proposal.get("manoeuvre", "the schedule below"))
     return section(
         "Next experiment",
-        paragraph(f"Fly “{name}” from rest{goal}."),
+        paragraph(
+            f"Fly “{name}” from rest{goal}. {EXPERIMENT_FILE} holds it in SI units (rad, Hz, m); "
+            "each row holds until the next."
+        ),
         figure(draw.draw_schedule(schedule, album), f"Commands of “{name}”."),
         table(heads, rows, "Each row holds until the next"),
         key="next",
@@ -319,6 +345,9 @@ def coefficients(answer: Answer, series: Series, album: Album) -> str:
 def about(answer: Answer, series: Series, album: Album) -> str:
     """Noise, notes, and how this was made."""
     lines = [str(note) for note in answer.get("notes", [])]
+    lines += [str(doubt) for doubt in answer.get("doubts", ())]
+    if answer.get("quick"):
+        lines.append(f"Quick mode leaves out: {'; '.join(answer.get('left_out', []))}.")
     d = (answer.get("noise") or {}).get("disturbance", {})
     if "force_sd" in d:
         lines.append(

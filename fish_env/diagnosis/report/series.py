@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -51,6 +53,8 @@ class RunSeries:
             models swim alone from the filtered state one second after the start.
         fit_percent: model -> fit of its predictions, as :mod:`fish_env.diagnosis.gain` measures it.
         notes: what could not be drawn.
+        given: the fish as it was given, before any fit, over the whole run like the models in
+            `motions`; None where it cannot be simulated.
     """
 
     id: str
@@ -62,6 +66,7 @@ class RunSeries:
     motions: tuple[Motion, ...]
     fit_percent: Mapping[str, float]
     notes: tuple[str, ...] = ()
+    given: Motion | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,12 +135,14 @@ def series_from(
     }  # fmt: skip
     settled = {name: evaluated(shown, fit.point, fit.noise) for name, fit in models.items()}
     simulators = {name: _simulator(fit, dataset) for name, fit in models.items()}
+    as_given = Simulator(problem.fish, LONGEST_STEP_S, user_effects=_own_effects(problem))
     runs = []
     for i, run in enumerate(shown.runs):
         states = {name: results[i] for name, (_, results) in settled.items()}
         own = {name: varied.runs[i] for name, (varied, _) in settled.items()}
         predicted = {n: predicted_windows(shown, own[n], models[n], states[n]) for n in models}
-        runs.append(_series(shown, run, predicted, simulators, states, i < len(judged)))
+        final = i < len(judged)
+        runs.append(_series(shown, run, predicted, simulators, as_given, states, final))
     return ReportSeries(problem.fish, tuple(runs), localisation)
 
 
@@ -196,10 +203,11 @@ def _series(
     run: RunData,
     predicted: Mapping[str, Predicted],
     simulators: Mapping[str, Simulator],
+    as_given: Simulator,
     states: Mapping[str, Filtered],
     final: bool,
 ) -> RunSeries:
-    measured = _measured(problem, run)
+    measured, given = _measured(problem, run), None
     steps = CommandSteps(*run.commands)
     best = list(states)[-1]
     phase = float(states[best].states[0, 13])
@@ -213,17 +221,23 @@ def _series(
             notes.append(f"{name}: swimming alone over the whole run, {error}")
     extended = predicted["extended"].channels if "extended" in predicted else {}
     fits = {name: own.fit_percent for name, own in predicted.items()}
+    with suppress(SimulationDiverged):
+        given = _whole_run(as_given, run, steps, states["baseline"], "other", measured)
     return RunSeries(
         run.id, final, run.clock, measured, predicted["baseline"].channels, extended,
-        tuple(motions), fits, tuple(notes),
+        tuple(motions), fits, tuple(notes), given,
     )  # fmt: skip
 
 
 def _simulator(fit: Fit, dataset: Dataset) -> Simulator:
     """The fish of a fit, swimming alone."""
-    fish = identified_fish(fit)
-    own = [effect for name, effect in series_of(fit).known.items() if name not in catalogue()]
-    return Simulator(fish, LONGEST_STEP_S, user_effects=own)
+    own = _own_effects(series_of(fit))
+    return Simulator(identified_fish(fit), LONGEST_STEP_S, user_effects=own)
+
+
+def _own_effects(problem: SeriesProblem) -> list[Any]:
+    """Effects of the user's own, which the catalogue does not have."""
+    return [effect for name, effect in problem.known.items() if name not in catalogue()]
 
 
 def _whole_run(

@@ -17,6 +17,7 @@ from fish_env.studies.paper.statements import (
     all_statements,
     with_servo_lag,
 )
+from fish_env.version import versioned
 
 COLUMNS = ("motion", "statement", "criterion", "this model", "verdict")
 
@@ -113,5 +114,5 @@ def write_report(study: Study, folder: Path) -> list[Path]:
     """Writes `statements.md` and `paper.json`; returns their paths."""
     words, numbers = folder / "statements.md", folder / "paper.json"
     write_text(words, statements_markdown(study))
-    write_text(numbers, json.dumps(study_json(study), indent=1, allow_nan=False) + "\n")
+    write_text(numbers, json.dumps(versioned(study_json(study)), indent=1, allow_nan=False) + "\n")
     return [words, numbers]

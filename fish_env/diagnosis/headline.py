@@ -1,0 +1,167 @@
+"""The answer of a diagnosis in four lines: verdict, closed share of the gap, next step, caveats."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from fish_env.inference.hypotheses import PARAMETER
+from fish_env.inference.policy import POLICY
+
+Answer = Mapping[str, Any]
+EXPERIMENT_FILE = "next_experiment.csv"
+FEWEST_RUNS = 3
+"""Runs from which on an interval over runs is shown; the error budget has the same limit."""
+MOST_NAMED = 3
+
+
+@dataclass(frozen=True)
+class Headline:
+    """What a reader sees first.
+
+    Attributes:
+        verdict: What is wrong with the simulation, in one sentence.
+        closed: How much of the gap between the refitted simulation and the noise is closed.
+        next_step: What to do next.
+        caveats: What limits the answer, in one line; empty where nothing does.
+    """
+
+    verdict: str
+    closed: str
+    next_step: str
+    caveats: str
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """All lines that say something, in the order of reading."""
+        said = (self.verdict, self.closed, f"Next: {self.next_step}", self.caveats)
+        return tuple(line for line in said if line)
+
+
+def headline(answer: Answer) -> Headline:
+    """The first lines of a report.
+
+    Args:
+        answer: Content of ``diagnosis.json``; what it lacks is left out.
+    """
+    return Headline(_verdict(answer), _closed(answer), _next_step(answer), _caveats(answer))
+
+
+def _verdict(answer: Answer) -> str:
+    if answer["verdict"] == "inputs":
+        told = " ".join(fault["words"] for fault in answer.get("inputs", ()) if fault["decisive"])
+        rest = _verdict({**answer, "verdict": answer.get("verdict_once_corrected", "no_misfit")})
+        return f"{told or 'The data or their description are wrong.'} Once corrected: {rest}"
+    named = _joined(map(_cause, answer["causes"]), "and")
+    others = _joined((_joined(map(_cause, o), "and") for o in answer["alternatives"]), "or")
+    return {
+        "no_misfit": "No model error is detectable in these data.",
+        "not_excited": "No model error is detectable, but these data could not show most effects.",
+        "parameters": f"The structure of the model holds, but its numbers are wrong: {named}.",
+        "cause": f"The simulation lacks {named}.",
+        "ambiguous": f"The simulation lacks {named}, or instead {others}.",
+        "partial": f"The simulation lacks {named}, and something that no known effect explains.",
+        "outside_library": "Something is missing that no known effect explains.",
+    }[answer["verdict"]]
+
+
+def _cause(cause: Answer) -> str:
+    name = cause["name"].removeprefix(PARAMETER)
+    values = [
+        f"{'' if key == 'value' else key.replace('_', ' ') + ' '}{p['estimate']:.3g} "
+        f"{'' if p['unit'] in ('-', '1') else p['unit']}".strip()
+        for key, p in cause["parameters"].items()
+    ]
+    shown = ", ".join(values[:MOST_NAMED]) + (", …" if len(values) > MOST_NAMED else "")
+    return f"{name} ({shown})" if shown else name
+
+
+def _joined(parts: Any, word: str) -> str:
+    *first, last = list(parts) or [""]
+    return f"{', '.join(first)} {word} {last}" if first else last
+
+
+def _closed(answer: Answer) -> str:
+    gain = answer.get("gain")
+    if not gain:
+        return (
+            "The gain is not measured: too few runs to hold some out." if answer["causes"] else ""
+        )
+    share = gain.get("share_of_reachable")
+    if not share:
+        return "The refitted simulation leaves no gap to the noise that could be closed."
+    percent = 100.0 * min(max(share["estimate"], 0.0), 1.0)
+    count, noun = len(gain["final_runs"]), _noun(answer)
+    low, high = (100.0 * end for end in share["ci95"])
+    interval = f" (95 % interval: {low:.0f} to {high:.0f} %)" if count >= FEWEST_RUNS else ""
+    return (
+        f"The extended model closes {percent:.0f} % of the gap between the refitted simulation and "
+        f"the noise{interval}, on {count} held-out {noun}{'s' * (count != 1)}."
+    )
+
+
+def _noun(answer: Answer) -> str:
+    return "condition" if answer.get("kind") == "steady" else "run"
+
+
+def _doubtful(answer: Answer) -> bool:
+    share = ((answer.get("gain") or {}).get("share_of_reachable") or {}).get("estimate")
+    return bool(answer["causes"]) and share is not None and share < POLICY.least_share
+
+
+def _next_step(answer: Answer) -> str:
+    verdict, proposal = answer["verdict"], answer.get("next_experiment") or {}
+    fly = ""
+    if proposal.get("schedule"):
+        aims = list(proposal.get("separates", ()))
+        fly = (
+            f"fly “{proposal.get('manoeuvre', 'the schedule')}” ({EXPERIMENT_FILE}), add the run "
+            "to the dataset and diagnose again"
+        )
+        if aims:
+            seen = "it separates the explanations" if verdict == "ambiguous" else "it would show "
+            more = len(aims) - MOST_NAMED
+            seen += "" if verdict == "ambiguous" else ", ".join(aims[:MOST_NAMED])
+            fly += f"; {seen}" + (f" and {more} more" if more > 0 and "show" in seen else "")
+        fly += "."
+    if verdict == "inputs":
+        faults = [f for f in answer.get("inputs", ()) if f["decisive"]]
+        fixes = "; ".join(f"`{fault['fix']}`" for fault in faults)
+        return f"correct dataset.yaml ({fixes}) and diagnose again."
+    if answer.get("quick") and verdict in ("outside_library", "partial"):
+        return "diagnose again without --quick."
+    if verdict == "ambiguous":
+        return fly or "record more varied runs and diagnose again."
+    if _doubtful(answer):
+        return "do not use the extended model; record more runs and diagnose again."
+    if verdict in ("cause", "parameters", "partial"):
+        return "simulate and train with extended.yaml, a fish file with what was found."
+    if verdict == "outside_library":
+        return "read “Where the misfit sits”, then add an effect of your own from a Python file."
+    return fly or "use the refitted coefficients; nothing needs to be added."
+
+
+def _caveats(answer: Answer) -> str:
+    found = []
+    if answer.get("quick"):
+        found.append("quick mode: rival causes are not compared and weak causes may be missed")
+    if _doubtful(answer):
+        found.append("held-out predictions hardly improve, so the named cause is doubtful")
+    gain = answer.get("gain")
+    if gain and 0 < len(gain["final_runs"]) < FEWEST_RUNS:
+        noun = _noun(answer)
+        count = len(gain["final_runs"])
+        found.append(f"{count} held-out {noun}{'s' * (count != 1)} give no interval over {noun}s")
+    blind = sum(not p["excited"] for p in answer.get("preconditions", ()))
+    if blind:
+        known = len(answer["preconditions"])
+        found.append(f"these data could not show {blind} of {known} known effects")
+    unsure = sum(not fault["decisive"] for fault in answer.get("inputs", ()))
+    if unsure:
+        found.append(
+            f"{unsure} possible mistake{'s' * (unsure > 1)} in the data (see Input checks)"
+        )
+    if answer.get("doubts"):
+        found.append("some numbers are implausible (see About these numbers)")
+    return f"Caveats: {'; '.join(found)}." if found else ""

@@ -1,6 +1,10 @@
 """Every error a user of the package can meet, each saying what to change."""
 
+import re
 from collections.abc import Sequence
+from importlib import metadata
+
+_EXTRA = re.compile(r"extra == ['\"]([^'\"]+)['\"]")
 
 
 class RoboticFishError(Exception):
@@ -74,5 +78,19 @@ def missing_extra(purpose: str, package: str, extra: str) -> MissingExtraError:
     """
     return MissingExtraError(
         f"{purpose} needs the package '{package}', which is not installed. "
-        f'Install it with: pip install "robotic-fish[{extra}]"'
+        f"Install it with: {_pip_line(extra) or f'pip install {package}'}"
     )
+
+
+def _pip_line(extra: str) -> str:
+    """The line that installs what an extra asks for; empty where the package is not installed.
+
+    The project is on no package index, so its extras cannot be named there. Their contents can.
+    """
+    try:
+        wanted = metadata.requires("robotic-fish") or []
+    except metadata.PackageNotFoundError:
+        return ""
+    parts = (line.partition(";") for line in wanted)
+    names = [name.strip() for name, _, marker in parts if _EXTRA.findall(marker) == [extra]]
+    return f"pip install {' '.join(f'{chr(34)}{name}{chr(34)}' for name in names)}" if names else ""

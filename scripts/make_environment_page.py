@@ -46,7 +46,7 @@ SB3 = """\
 ## Stable-Baselines3
 
 `FishVecEnv` is the same batch as an SB3 `VecEnv`; it comes with
-`pip install "robotic-fish[train]"`.
+`pip install ".[train]"`.
 
 ```python
 from stable_baselines3 import PPO

@@ -21,6 +21,7 @@ from fish_env.errors import DatasetError
 from fish_env.params import load_fish
 
 DATASET = "msu-steady"
+TRIALS = "demo-trials"
 Part = Callable[[Console, Path], list[Path]]
 
 
@@ -43,8 +44,32 @@ def compare_with_a_real_fish(console: Console, out: Path) -> list[Path]:
         return draw_steady(comparison, out)
 
 
+def diagnose_trials(console: Console, out: Path) -> list[Path]:
+    """Diagnoses six runs of a robot with a hidden fault; returns the report and its picture."""
+    from fish_env.diagnosis.headline import headline
+    from fish_env.diagnosis.pipeline import diagnose
+
+    console.print(
+        "Six runs of 10 s from a stand-in for a robot. Its data are simulated, with noise, and it "
+        "has one fault that the simulation does not know. What is it?"
+    )
+    folder = out / "diagnosis"
+    with console.status("reading") as status:
+        answer = diagnose(
+            TRIALS, folder, quick=True, progress=lambda step: status.update(f"{step}")
+        )
+    verdict, *others = headline(answer).lines
+    console.print(verdict, style="bold", highlight=False, markup=False)
+    for line in others:
+        console.print(line, highlight=False, markup=False)
+    return [folder / "report.html", folder / "figures" / "paths.png"]
+
+
 GROUP = "robofish.demo"
-PARTS: dict[str, Part] = {"A real fish and its simulation": compare_with_a_real_fish}
+PARTS: dict[str, Part] = {
+    "What does the simulation get wrong?": diagnose_trials,
+    "A real fish and its simulation": compare_with_a_real_fish,
+}
 """Title -> what is done, in this order."""
 
 
@@ -55,17 +80,17 @@ def all_parts() -> dict[str, Part]:
 
 
 def run_demo(console: Console, out: Path) -> None:
-    """Runs every part of the demonstration and names the pictures it wrote.
+    """Runs every part of the demonstration and names the report and the pictures it wrote.
 
     Args:
         console: Where words and progress go.
-        out: Folder for pictures.
+        out: Folder for the report and the pictures.
     """
     begun, pictures, parts = time.monotonic(), list[Path](), all_parts()
     for number, (title, part) in enumerate(parts.items(), 1):
         console.print(Rule(f"{number} of {len(parts)}: {title}", align="left"))
         pictures += part(console, out)
-    console.print(Rule("Pictures", align="left"))
+    console.print(Rule("Open these files", align="left"))
     for picture in pictures:
         console.print(str(picture), soft_wrap=True)
     console.print(f"{time.monotonic() - begun:.0f} s", style="dim")

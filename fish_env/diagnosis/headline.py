@@ -152,7 +152,8 @@ def _caveats(answer: Answer) -> str:
     if gain and 0 < len(gain["final_runs"]) < FEWEST_RUNS:
         noun = _noun(answer)
         count = len(gain["final_runs"])
-        found.append(f"{count} held-out {noun}{'s' * (count != 1)} give no interval over {noun}s")
+        held = f"one held-out {noun} gives" if count == 1 else f"{count} held-out {noun}s give"
+        found.append(f"{held} no interval over {noun}s")
     blind = sum(not p["excited"] for p in answer.get("preconditions", ()))
     if blind:
         known = len(answer["preconditions"])

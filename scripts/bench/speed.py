@@ -5,7 +5,7 @@
 
 Every contender takes random actions drawn beforehand and restarts the episodes that end. All run
 in one process and in turn, so that other work on the machine slows all of them alike. Peers come
-with ``pip install robotic-fish[bench]``; one that is not installed is listed as missing.
+with ``pip install ".[bench]"``; one that is not installed is listed as missing.
 """
 
 from __future__ import annotations

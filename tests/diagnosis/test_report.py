@@ -32,7 +32,7 @@ def test_the_page_has_every_part(full):
         "The simulation lacks servo_lag", "0.05 to 0.058", "rf-replay", "r01 (kept for judging)",
         "Where the misfit sits", "tail phase 0 to 45 deg", "never visited", "Ranking",
         "could not have shown: surface_drag", "tether (0.61)", "0.004 m/s", "Next experiment",
-        "mass.total", "closes 96 %", "Error budget", "off by up to", "Next:",
+        "mass.total", "closes 96 %", "Error budget", "cm off", "Next:",
         "a note about this run", "one note",
         "roll, p agree with each other", "0.109 to 0.12",
     ):  # fmt: skip

@@ -142,4 +142,4 @@ def test_without_the_extra_the_error_says_what_to_install():
         [sys.executable, "-c", CODE], capture_output=True, text=True, check=True
     )
     assert "MissingExtraError" in result.stdout
-    assert 'pip install "robotic-fish[train]"' in result.stdout
+    assert 'pip install "stable-baselines3' in result.stdout

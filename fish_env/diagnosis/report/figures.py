@@ -157,8 +157,8 @@ def _title(run: RunSeries, flat: bool) -> str:
     name = f"{run.id} (held out)" if run.final else run.id
     if not flat:
         return name
-    off = [f"{word} {100 * _off(run, m):.1f} cm" for word, m in list(_shown(run).items())[1:]]
-    return f"{name}\noff by up to: {', '.join(off)}" if off else name
+    models = list(_shown(run).items())[1:]
+    return "\n".join([name, *(f"{w}: up to {100 * _off(run, m):.1f} cm off" for w, m in models)])
 
 
 def _off(run: RunSeries, motion: Motion) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 from fish_env.arrays import FloatArray
 from fish_env.envs.robotic_fish_3d import RoboticFish3DEnv
 from fish_env.rendering import Scene, write_video
-from fish_env.replay import Group, motion_from_trajectory, write_replay
+from fish_env.replay import Group, motion_from_trajectory, motion_of_goals, write_replay
 from fish_env.trajectory import Trajectory
 
 REPLAY_HZ = 50.0
@@ -30,13 +30,17 @@ class Keeper:
         self._keep_scenes = scenes
         self._states: list[list[float]] = []
         self._inputs: list[FloatArray] = []
+        self._goals: list[list[float]] = []
 
     def __call__(self) -> None:
         """Keep the present state."""
         self._states.append(list(self.fish.state.values()))
         self._inputs.append(self.fish.actuators)
+        scene = self.fish.scene()
+        if scene.goal is not None:
+            self._goals.append([scene.goal.depth, scene.goal.heading, scene.goal.speed])
         if self._keep_scenes:
-            self.scenes.append(self.fish.scene())
+            self.scenes.append(scene)
 
     def trajectory(self) -> Trajectory:
         """The motion, with straight lines between control steps."""
@@ -64,9 +68,15 @@ class Keeper:
         return write_video(path, self.scenes, self.fish.setting)
 
     def write_replay(self, path: Path, name: str) -> Path:
-        """Writes a page with the swimming fish."""
+        """Writes a page with the swimming fish, and a second fish at its goal."""
         motion = motion_from_trajectory(self.trajectory(), name)
-        groups = [Group(name, (motion,))]
+        shown = [motion]
+        if len(self._goals) == len(self._states):
+            period = self.fish.options.config.control_period
+            times = np.linspace(period, period * len(self._goals), len(self._goals))
+            goals = dict(zip(("z", "yaw", "speed"), np.array(self._goals).T, strict=True))
+            shown.append(motion_of_goals(motion, times, goals))
+        groups = [Group(name, tuple(shown))]
         return write_replay(groups, self.fish.options.model.fish, path, f"Replay of {name}")
 
 

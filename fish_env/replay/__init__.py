@@ -6,6 +6,7 @@ from fish_env.replay.motion import (
     motion_from_channels,
     motion_from_run,
     motion_from_trajectory,
+    motion_of_goals,
 )
 from fish_env.replay.page import component, component_scripts, component_style, write_replay
 
@@ -18,5 +19,6 @@ __all__ = [
     "motion_from_channels",
     "motion_from_run",
     "motion_from_trajectory",
+    "motion_of_goals",
     "write_replay",
 ]

@@ -16,7 +16,7 @@ from fish_env.model.state import INPUTS
 from fish_env.replay.frames import Frames, filled, frames_of
 from fish_env.trajectory import Trajectory
 
-Role = Literal["measured", "baseline", "extended", "other"]
+Role = Literal["measured", "baseline", "extended", "goal", "other"]
 POSITION, ATTITUDE = ("x", "y", "z"), ("roll", "pitch", "yaw")
 SHOWN = (*POSITION, *ATTITUDE, "u", "v", "w", "p", "q", "r")
 
@@ -127,6 +127,39 @@ def motion_from_channels(
     )
     notes = _notes(known, commands, tail_phase)
     return Motion(name, role, frames, time_s, with_speed(known), notes)
+
+
+def motion_of_goals(fish: Motion, time_s: FloatArray, goals: Mapping[str, FloatArray]) -> Motion:
+    """What a fish was to do, beside what it did: a second fish at the goal's depth and heading.
+
+    Args:
+        fish: The fish. The goals have no place in the plane, so they are drawn at its place.
+        time_s: Times of the goals, (n,), s.
+        goals: ``z`` (m), ``yaw`` (rad, may jump by whole turns) and ``speed`` (m/s), each (n,).
+    """
+    frames = fish.frames
+    clock = frames.start_s + frames.step_s * np.arange(len(frames.position))
+    depth, heading = (
+        np.interp(clock, time_s, values) for values in (goals["z"], np.unwrap(goals["yaw"]))
+    )
+    level = Rotation.from_euler("ZYX", np.outer(heading, (1.0, 0.0, 0.0)))
+    ghost = Frames(
+        frames.start_s,
+        frames.step_s,
+        np.column_stack([frames.position[:, :2], depth]),
+        level.as_quat(scalar_first=True),
+        np.zeros(len(clock)),
+        np.zeros((len(clock), 2)),
+    )
+    near = 2.0 * np.pi * np.round((_mean(fish, "yaw") - heading.mean()) / (2.0 * np.pi))
+    channels = {**goals, "yaw": np.unwrap(goals["yaw"]) + near}
+    note = "goal depth and heading are drawn at the fish's place in the plane"
+    return Motion("goal", "goal", ghost, time_s, channels, (note,))
+
+
+def _mean(motion: Motion, name: str) -> float:
+    values = motion.channels.get(name)
+    return 0.0 if values is None else float(np.nanmean(np.unwrap(values)))
 
 
 def with_speed(channels: Mapping[str, FloatArray]) -> dict[str, FloatArray]:

@@ -23,6 +23,7 @@ COLOURS: dict[str, tuple[str, str]] = {
     "measured": ("#222222", "#f0f0f0"),
     "baseline": ("#D55E00", "#F08A3C"),
     "extended": ("#0072B2", "#56B4E9"),
+    "goal": ("#009E73", "#2CC8A0"),
 }
 """On a light and on a dark ground; after Okabe and Ito, apart for every kind of colour vision."""
 OTHERS = (
@@ -127,7 +128,8 @@ def _thinned(count: int) -> slice:
 
 def _plots(group: Group) -> list[Plain]:
     """Channels to plot: those that every motion has before the others, the telling ones shown."""
-    sets = [set(motion.channels) for motion in group.motions]
+    fish = [m for m in group.motions if m.role != "goal"] or group.motions
+    sets = [set(motion.channels) for motion in fish]
     common, present = set.intersection(*sets), set.union(*sets)
     order = [name for name in (*_ORDER, "tail_angle") if name in present]
     order.sort(key=lambda name: name not in common)

@@ -1,5 +1,8 @@
 """`robofish swim` writes what it was asked for, and says what is missing."""
 
+import base64
+import json
+import re
 from pathlib import Path
 
 import gymnasium as gym
@@ -40,7 +43,19 @@ def test_it_swims_a_task_and_writes_a_replay(tmp_path):
         "tracking.png",
         "actuators.png",
     }
-    assert "</html>" in page.read_text(encoding="utf-8")
+    data = re.search(
+        r'<script type="application/json"[^>]*>(.*?)</script>', page.read_text("utf-8")
+    )
+    assert data is not None
+    fish, goal = json.loads(data[1])["groups"][0]["tracks"]
+    assert goal["role"] == "goal"
+    assert {"z", "yaw", "speed"} == set(goal["channels"])
+    depths = [unpacked(track["channels"]["z"])[-100:] for track in (fish, goal)]
+    assert abs(np.mean(depths[0]) - np.mean(depths[1])) < 0.05, "the fish is at its goal in the end"
+
+
+def unpacked(text: str) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(text), "<f4")
 
 
 @pytest.mark.slow

@@ -43,7 +43,7 @@ Robofish.Plots = class {
       stroke: this.ink, grid: { stroke: this.rule, width: 1 }, ticks: { stroke: this.rule },
       font: "11px system-ui, sans-serif",
     };
-    const dashes = { baseline: [7, 4], measured: undefined };
+    const dashes = { baseline: [7, 4], goal: [2, 3], measured: undefined };
     return {
       width: Math.max(this.holder.clientWidth, 200),
       height: Robofish.PLOT_HEIGHT,

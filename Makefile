@@ -8,14 +8,14 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint docs bench benchmark-diagnosis benchmark-realistic benchmark-power benchmark-time benchmark-agents benchmark-loop fuzz clean
+.PHONY: help setup demo test lint docs bench benchmark-diagnosis benchmark-realistic benchmark-power benchmark-time benchmark-agents benchmark-loop fuzz check-release clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 28
 
 setup: $(VENV)/.with-dev  ## create .venv and install everything that tests and training need
 
-demo: $(VENV)/.with-base  ## compare a real fish with its simulation and swim the environment
+demo: $(VENV)/.with-base  ## diagnose a small data set, compare a real fish, swim the environment
 	$(BIN)/robofish demo
 
 test: setup lint  ## check style, types and layering, then run the tests
@@ -62,6 +62,10 @@ benchmark-agents: setup  ## measure controllers and shipped policies on the froz
 
 benchmark-loop: setup  ## measure hidden fish, diagnose, learn on what was found, judge on them
 	$(BIN)/python -m scripts.measure_to_policy
+
+check-release: setup  ## build the wheel twice and compare, and go through the checklists of a release
+	$(BIN)/python -m scripts.check_wheels
+	$(BIN)/python -m scripts.check_project
 
 FUZZ_EXAMPLES ?= 2000
 fuzz: setup  ## try FUZZ_EXAMPLES hostile inputs in each test of the readers (2000: about an hour)

@@ -18,6 +18,7 @@ from fish_env.identification.dataset_fit import fit_dataset
 from fish_env.params import FishParams, as_fish
 
 if TYPE_CHECKING:
+    import numpy as np
     import pandas as pd
 
     Frames = pd.DataFrame | Mapping[str, pd.DataFrame | Mapping[str, pd.DataFrame]]
@@ -94,7 +95,7 @@ def diagnose(
     *,
     out: str | Path | None = None,
     quick: bool = False,
-    seed: int = 0,
+    rng: int | np.random.Generator = 0,
     measured_beats: bool = False,
     described: Described = None,
     trust_effects: bool = False,
@@ -108,7 +109,8 @@ def diagnose(
         out: Folder for the report and the extended fish; without it they are kept as long as the
             result, and `save` writes them.
         quick: A first look: fewer runs, no rival causes.
-        seed: Of the split into runs and of the null distributions.
+        rng: Seed of the split into runs and of the null distributions, or a generator that one is
+            drawn from. The seed stands in the answer.
         measured_beats: Take the tail's frequencies from the hull's swaying, not as commanded.
         described: As for :func:`compare`.
         trust_effects: As for :func:`compare`.
@@ -120,6 +122,7 @@ def diagnose(
     source = data if isinstance(data, str | Path) else as_dataset(data, fish, described)
     kept = TemporaryDirectory(prefix="robofish-") if out is None else None
     folder = Path(out) if kept is None else Path(kept.name)  # type: ignore[arg-type]
+    seed = rng if isinstance(rng, int) else int(rng.integers(2**31))
     with progress_bar(progress, "diagnosing") as tell:
         answer = diagnosis.diagnose(
             source, folder, seed, quick, fish, tell, measured_beats, trust_effects

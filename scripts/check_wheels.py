@@ -1,4 +1,4 @@
-"""Builds the wheel twice from clean copies and compares the bytes: `python -m scripts.check_wheels`.
+"""Builds the wheel twice from clean copies and compares: `python -m scripts.check_wheels`.
 
 Each copy holds the files under version control, as they are in the working tree, with other times
 and in a folder of another name. So neither times nor places may stand in the wheel.

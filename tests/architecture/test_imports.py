@@ -14,6 +14,7 @@ LINTER = Path(sys.executable).with_name("lint-imports")
 # What agents act on; the one style of pictures and the options of commands, so that theirs look
 # alike; and the one way to read files.
 OPEN_TO_AGENTS = {
+    "version",
     "arrays",
     "commands",
     "errors",

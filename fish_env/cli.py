@@ -320,9 +320,7 @@ def paper(
 
 @app.command()
 def demo(
-    out: Annotated[Path, typer.Option(help="Folder for the report and pictures.")] = Path(
-        "out/demo"
-    ),
+    out: Annotated[Path, typer.Option(help="Folder for report, pictures.")] = Path("out/demo"),
 ) -> None:
     """Show what the package does, in a minute or two: a diagnosis, a comparison, a swim.
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from itertools import cycle
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +20,6 @@ from fish_env.files import file_name, replacing
 from fish_env.inference.hypotheses import PARAMETER
 from fish_env.plotting.comparison import COMMAND_UNITS
 from fish_env.plotting.style import BLUE, DOTS_PER_INCH, MEASURED, VERMILION, drawing, keep_literal
-from fish_env.replay import Motion
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,22 +40,6 @@ LOOKS: dict[str, dict[str, Any]] = {
     "baseline": {"color": BASELINE, "ls": "--"},
     "extended": {"color": EXTENDED},
 }
-PATHS: dict[str, dict[str, Any]] = {
-    "measured": LOOKS["measured"],
-    "simulated": LOOKS["baseline"],
-    "refitted": LOOKS["extended"],
-    "extended": LOOKS["extended"],
-}
-OVER_TIME = ("z", "yaw", "pitch", "roll", "r", "q", "p", "u", "v", "w", "x", "y")
-"""Channels that are drawn over time beside the paths: the first that was measured."""
-BUDGET_NAMES = {
-    "coefficients": "re-estimated coefficients",
-    "run_variation": "run-to-run variation",
-}
-SHADES = (
-    (EXTENDED, ""), (BASELINE, "//"), ("#009e73", ".."), ("#cc79a7", "xx"), ("#e69f00", "--"),
-)  # fmt: skip
-"""Colours and hatches of shares, told apart in black and white too."""
 LEFT_OUT_GAIN = "log score on {} left out, above the refitted baseline's"
 
 
@@ -77,7 +59,7 @@ class Album:
 
 
 @contextmanager
-def _page(width: float, height: float) -> Iterator[Figure]:
+def sheet(width: float, height: float) -> Iterator[Figure]:
     """A figure whose SVG keeps its words as text and gets the same names every time."""
     import matplotlib
 
@@ -88,7 +70,7 @@ def _page(width: float, height: float) -> Iterator[Figure]:
         yield figure
 
 
-def _saved(figure: Figure, album: Album, name: str) -> Path:
+def saved(figure: Figure, album: Album, name: str) -> Path:
     """Writes the figure and returns the path of the SVG."""
     keep_literal(figure)
     vector = album.folder / f"{name}.svg"
@@ -108,97 +90,12 @@ def _saved(figure: Figure, album: Album, name: str) -> Path:
     return vector
 
 
-def draw_paths(runs: Sequence[RunSeries], album: Album) -> Path:
-    """Whole runs: measured, simulated as the fish was given, and by the best explanation.
-
-    From above where the position was measured, and one channel over time; else two channels.
-    """
-    flat = all({"x", "y"} <= set(run.measured) for run in runs)
-    both = [n for n in OVER_TIME if all(n in run.measured for run in runs)]
-    timed = both[: 1 if flat else 2]
-    heights = (3,) * flat + (2,) * len(timed)
-    with _page(0.6 + 2.6 * max(len(runs), 2), 0.6 + 0.85 * sum(heights)) as figure:
-        axes = figure.subplots(len(heights), len(runs), squeeze=False, height_ratios=heights)
-        for column, run in zip(axes.T, runs, strict=True):
-            for word, motion in _shown(run).items():
-                if flat:
-                    path = motion.frames.position
-                    column[0].plot(path[:, 1], path[:, 0], label=word, **PATHS[word])
-                for ax, name in zip(column[int(flat) :], timed, strict=True):
-                    values = shown_unit(name)[1] * motion.channels[name]
-                    ax.plot(motion.time_s, values, label=word, **PATHS[word])
-            column[0].set_title(_title(run, flat), loc="left", fontsize=9)
-            column[-1].set_xlabel("time (s)")
-            if flat:
-                column[0].set_aspect("equal", adjustable="datalim")
-                column[0].set_xlabel("y, east (m)")
-            if "z" in timed:
-                column[int(flat)].invert_yaxis()
-        names = ["x, north (m)"] * flat + [label(name) for name in timed]
-        for ax, name in zip(axes[:, 0], names, strict=True):
-            ax.set_ylabel(name)
-        handles, words = axes[0, 0].get_legend_handles_labels()
-        figure.legend(handles, words, loc="outside upper center", ncols=3)
-        return _saved(figure, album, "paths")
-
-
-def _shown(run: RunSeries) -> dict[str, Motion]:
-    """Motions of the first picture by their word in the legend."""
-    measured, *models = run.motions
-    shown = {"measured": measured}
-    if run.given is not None:
-        shown["simulated"] = run.given
-    if models:
-        shown["extended" if models[-1].role == "extended" else "refitted"] = models[-1]
-    return shown
-
-
-def _title(run: RunSeries, flat: bool) -> str:
-    name = f"{run.id} (held out)" if run.final else run.id
-    if not flat:
-        return name
-    models = list(_shown(run).items())[1:]
-    return "\n".join([name, *(f"{w}: up to {100 * _off(run, m):.1f} cm off" for w, m in models)])
-
-
-def _off(run: RunSeries, motion: Motion) -> float:
-    """Largest horizontal distance from the measured position, m."""
-    count = len(motion.time_s)
-    gaps = [motion.channels[n] - run.measured[n][-count:] for n in ("x", "y")]
-    return float(np.nanmax(np.hypot(*gaps)))
-
-
-def draw_budget(budget: Plain, album: Album) -> Path:
-    """The error budget as one bar of shares, largest first, and what is left."""
-    parts = {item["name"].removeprefix(PARAMETER): item["share"] for item in budget["shares"]}
-    shares = {BUDGET_NAMES.get(n, n): max(v, 0.0) for n, v in parts.items()}
-    shares = dict(sorted(shares.items(), key=lambda pair: -pair[1]))
-    shares["left"] = max(budget["left"], 0.0)
-    total, begin = sum(shares.values()) or 1.0, 0.0
-    with _page(7.0, 1.1 + 0.2 * -(-len(shares) // 2)) as figure:
-        ax = figure.subplots()
-        for (name, share), (colour, hatch) in zip(shares.items(), cycle(SHADES)):
-            if name == "left":
-                colour, hatch = "#dddddd", ""
-            percent = 100.0 * share / total
-            ax.barh(0, percent, left=begin, ec="white", lw=0.8, height=0.8,
-                    label=f"{name}: {percent:.0f} %", color=colour, hatch=hatch)  # fmt: skip
-            begin += percent
-        ax.set_xlim(0.0, 100.0)
-        ax.set_yticks([])
-        ax.spines["left"].set_visible(False)
-        ax.grid(False)
-        ax.set_xlabel("share of the error of the simulation as given (%)")
-        figure.legend(loc="outside upper left", ncols=2)
-        return _saved(figure, album, "budget")
-
-
 def draw_run(run: RunSeries, window_s: float, album: Album) -> Path:
     """Channels of a run over time: measured, and predicted over windows."""
     names = list(run.measured)
     columns = 2 if len(names) > 4 else 1
     rows = -(-len(names) // columns)
-    with _page(8.6 if columns == 2 else 7.0, 0.6 + 1.3 * rows) as figure:
+    with sheet(8.6 if columns == 2 else 7.0, 0.6 + 1.3 * rows) as figure:
         axes = figure.subplots(rows, columns, squeeze=False, sharex=True)
         for ax, name in zip(axes.T.ravel(), names, strict=False):
             _draw_channel(ax, run, name, window_s)
@@ -210,7 +107,7 @@ def draw_run(run: RunSeries, window_s: float, album: Album) -> Path:
             bottom.tick_params(labelbottom=True)
         handles, words = axes[0, 0].get_legend_handles_labels()
         figure.legend(handles, words, loc="outside upper center", ncols=3)
-        return _saved(figure, album, f"run_{file_name(run.id)}")
+        return saved(figure, album, f"run_{file_name(run.id)}")
 
 
 def _draw_channel(ax: Axes, run: RunSeries, name: str, window_s: float) -> None:
@@ -237,7 +134,7 @@ def draw_regimes(found: Localisation, album: Album) -> Path:
     energies = np.concatenate([table.ravel() for table in found.energy.values()])
     top = float(np.sqrt(np.max(energies, initial=1.0, where=np.isfinite(energies))))
     norm = LogNorm(0.7, max(top, 1.5))
-    with _page(9.4, (0.9 + 0.2 * len(found.channels)) * len(lines) + 0.8) as figure:
+    with sheet(9.4, (0.9 + 0.2 * len(found.channels)) * len(lines) + 0.8) as figure:
         # One axes for a line of maps: many axes take long to lay out.
         axes = figure.subplots(len(lines), 1, squeeze=False).ravel()
         for ax, line in zip(axes, lines, strict=True):
@@ -260,7 +157,7 @@ def draw_regimes(found: Localisation, album: Album) -> Path:
         marks = [mark for mark in (1, 2, 3, 5, 10, 20, 30, 50, 100) if mark <= top]
         bar.set_ticks(marks or [1], labels=[str(mark) for mark in marks or [1]])
         bar.minorticks_off()
-        return _saved(figure, album, "regimes")
+        return saved(figure, album, "regimes")
 
 
 def _draw_map(
@@ -288,7 +185,7 @@ def draw_ranking(answer: Plain, album: Album) -> Path:
     meaning = LEFT_OUT_GAIN.format("conditions" if answer.get("kind") == "steady" else "runs")
     gains = [row["score"] for row in rows]
     over_runs = answer.get("fitted_runs", FEWEST_RUNS) >= FEWEST_RUNS
-    with _page(7.0, 0.9 + 0.32 * len(rows)) as figure:
+    with sheet(7.0, 0.9 + 0.32 * len(rows)) as figure:
         ax = figure.subplots()
         for i, (row, gain) in enumerate(zip(rows, gains, strict=True)):
             found = row["name"] in accepted
@@ -304,20 +201,20 @@ def draw_ranking(answer: Plain, album: Album) -> Path:
         ax.axvline(0.0, color=MEASURED, lw=0.8)
         ax.set_xlabel(meaning)
         ax.grid(axis="y", visible=False)
-        return _saved(figure, album, "ranking")
+        return saved(figure, album, "ranking")
 
 
 def draw_confusability(names: Sequence[str], cosines: FloatArray, album: Album) -> Path:
     """Cosine between the signals of every two causes, after a refit of the baseline."""
     side = 1.6 + 0.2 * len(names)
-    with _page(side + 1.2, side) as figure:
+    with sheet(side + 1.2, side) as figure:
         ax = figure.subplots()
         image = ax.imshow(np.abs(cosines), cmap="cividis", vmin=0.0, vmax=1.0)
         ax.grid(False)
         ax.set_xticks(range(len(names)), names, rotation=90, fontsize=7)
         ax.set_yticks(range(len(names)), names, fontsize=7)
         figure.colorbar(image, ax=ax, shrink=0.7).set_label("likeness (1: the same signal)")
-        return _saved(figure, album, "confusability")
+        return saved(figure, album, "confusability")
 
 
 def draw_misfit(answer: Plain, album: Album) -> Path:
@@ -326,7 +223,7 @@ def draw_misfit(answer: Plain, album: Album) -> Path:
     pairs = [answer["misfit"][name] for name in names]
     extended = any(pair["baseline"] != pair["extended"] for pair in pairs)
     word = "extended" if answer["causes"] else "best explanation tried"
-    with _page(7.0, 2.6) as figure:
+    with sheet(7.0, 2.6) as figure:
         ax = figure.subplots()
         place = np.arange(len(names))
         width = 0.38 if extended else 0.6
@@ -343,12 +240,12 @@ def draw_misfit(answer: Plain, album: Album) -> Path:
         ax.grid(axis="x", visible=False)
         ax.legend(loc="upper right", ncols=3)
         ax.set_ylim(0.0, 1.25 * max([*before, 1.0]))
-        return _saved(figure, album, "misfit")
+        return saved(figure, album, "misfit")
 
 
 def draw_gain(runs: Mapping[str, tuple[float, float]], album: Album) -> Path:
     """Fit percent of each final run: from the refitted baseline to the extended model."""
-    with _page(7.0, 1.0 + 0.34 * len(runs)) as figure:
+    with sheet(7.0, 1.0 + 0.34 * len(runs)) as figure:
         ax = figure.subplots()
         for i, (before, after) in enumerate(runs.values()):
             ax.annotate(
@@ -362,7 +259,7 @@ def draw_gain(runs: Mapping[str, tuple[float, float]], album: Album) -> Path:
         ax.axvline(100.0, color=MEASURED, lw=1.0, ls=":")
         ax.set_xlabel("fit of predictions over windows (%, 100: perfect)")
         figure.legend(loc="outside upper center", ncols=2)
-        return _saved(figure, album, "gain")
+        return saved(figure, album, "gain")
 
 
 def draw_schedule(schedule: Sequence[Mapping[str, float]], album: Album) -> Path:
@@ -371,7 +268,7 @@ def draw_schedule(schedule: Sequence[Mapping[str, float]], album: Album) -> Path
     shown = varied or ["tail_amplitude", "tail_frequency"]
     times = np.array([row["t"] for row in schedule])
     hold = float(np.median(np.diff(times))) if len(times) > 1 else 5.0
-    with _page(7.0, 0.5 + 1.15 * len(shown)) as figure:
+    with sheet(7.0, 0.5 + 1.15 * len(shown)) as figure:
         axes = figure.subplots(len(shown), 1, squeeze=False, sharex=True).ravel()
         for ax, name in zip(axes, shown, strict=True):
             unit, factor = COMMAND_UNITS[name]
@@ -382,7 +279,7 @@ def draw_schedule(schedule: Sequence[Mapping[str, float]], album: Album) -> Path
             ax.margins(y=0.15)
         axes[-1].set_xlabel("time (s)")
         figure.align_ylabels()
-        return _saved(figure, album, "next_experiment")
+        return saved(figure, album, "next_experiment")
 
 
 def draw_steady(series: SteadySeries, album: Album) -> Path:
@@ -392,7 +289,7 @@ def draw_steady(series: SteadySeries, album: Album) -> Path:
     if series.extended:
         models["extended"] = (series.extended, EXTENDED, "o")
     kept = series.left_out if series.left_out.size else np.zeros(len(series.conditions), bool)
-    with _page(3.1 * len(names) + 0.4, 3.6) as figure:
+    with sheet(3.1 * len(names) + 0.4, 3.6) as figure:
         axes = figure.subplots(1, len(names), squeeze=False).ravel()
         for ax, name in zip(axes, names, strict=True):
             factor = shown_unit(name)[1]
@@ -411,4 +308,4 @@ def draw_steady(series: SteadySeries, album: Album) -> Path:
             ax.set_ylabel(f"predicted {label(name)}")
         handles, words = axes[0].get_legend_handles_labels()
         figure.legend(handles, words, loc="outside upper center", ncols=4)
-        return _saved(figure, album, "steady")
+        return saved(figure, album, "steady")

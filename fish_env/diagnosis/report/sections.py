@@ -19,6 +19,7 @@ from fish_env.diagnosis.report.html import (
     table,
     text,
 )
+from fish_env.diagnosis.report.opening import draw_budget, draw_paths
 from fish_env.diagnosis.report.remainder import asked_for, residual_model
 from fish_env.diagnosis.report.series import SETTLED_S, ReportSeries, RunSeries, SteadySeries
 from fish_env.diagnosis.report.units import shown_unit
@@ -59,7 +60,7 @@ def overview(answer: Answer, series: Series, album: Album) -> str:
         f"Measured runs, the simulation as it was given, and {models}. Both swim alone over the "
         f"whole run, from {SETTLED_S:g} s after its start."
     )
-    return figure(draw.draw_paths(runs, album), caption, "rp-fit")
+    return figure(draw_paths(runs, album), caption, "rp-fit")
 
 
 def budget(answer: Answer, series: Series, album: Album) -> str:
@@ -70,7 +71,7 @@ def budget(answer: Answer, series: Series, album: Album) -> str:
     noun, count = _noun(answer), len(found["runs"])
     where = f"{count} {'held-out' if found['held_out'] else 'fitted'} {noun}{'s' * (count != 1)}"
     caption = f"What the error of the simulation as given comes from, on {where}."
-    picture = figure(draw.draw_budget(found, album), caption, "rp-fit")
+    picture = figure(draw_budget(found, album), caption, "rp-fit")
     return section("Error budget", picture, key="budget")
 
 

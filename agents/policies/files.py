@@ -6,14 +6,8 @@ finiteness and a checksum before it is used.
 
 from __future__ import annotations
 
-import hashlib
 import io
 import json
-import math
-import struct
-import tokenize
-import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,6 +18,7 @@ import numpy.typing as npt
 
 from agents.policies.history import HistorySpec
 from agents.policies.network import ACTIVATIONS, OUTPUTS, Network
+from fish_env.archives import UNREADABLE, Arrays, digest, read_arrays
 from fish_env.envs.layout import OBSERVATION
 from fish_env.envs.registration import ENV_ID
 from fish_env.errors import ConfigError
@@ -35,12 +30,6 @@ ACTIONS = 5
 MOST_LAYERS = 20
 MOST_BYTES = 20_000_000
 """A policy file is some tens of kilobytes; a larger archive is not unpacked."""
-UNREADABLE = (
-    zipfile.BadZipFile, zlib.error, EOFError, OSError, ValueError, KeyError, RuntimeError,
-    TypeError, OverflowError, MemoryError, struct.error, tokenize.TokenError, SyntaxError,
-)  # fmt: skip
-"""What a damaged archive raises; RuntimeError where it seems encrypted or of a later ZIP."""
-Arrays = Mapping[str, npt.NDArray[Any]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +74,7 @@ def write_policy(policy: PolicyFile, path: Path) -> None:
     }
     document = json.dumps(text, sort_keys=True)
     buffer = io.BytesIO()
-    np.savez(buffer, about=np.array(document), digest=np.array(_digest(document, arrays)), **arrays)
+    np.savez(buffer, about=np.array(document), digest=np.array(digest(document, arrays)), **arrays)
     write_bytes(path, buffer.getvalue())
 
 
@@ -107,7 +96,7 @@ def read_policy(path: str | Path) -> PolicyFile:
         raise ConfigError(f"{file}: not a policy file of the format {FORMAT}")
     _check_environment(file, about)
     numbers = {name: value for name, value in arrays.items() if name not in ("about", "digest")}
-    if _text(file, arrays, "digest") != _digest(document, numbers):
+    if _text(file, arrays, "digest") != digest(document, numbers):
         raise ConfigError(f"{file}: its checksum does not fit; it was changed or is damaged")
     try:
         return _build(about, numbers)
@@ -127,46 +116,6 @@ def _unpack(file: Path) -> dict[str, npt.NDArray[Any]]:
         raise ConfigError(
             f"{file}: not a readable policy file ({error}); it is truncated, damaged or foreign"
         ) from None
-
-
-def read_arrays(content: bytes, most: int) -> dict[str, npt.NDArray[Any]]:
-    """Unpacks NumPy's archive without pickles, in bounded memory.
-
-    Args:
-        content: of the file.
-        most: bytes that may be unpacked; a header that asks for more is refused, whatever the
-            archive says of its sizes.
-
-    Raises:
-        ValueError, KeyError, BadZipFile: no such archive, damaged, or larger.
-    """
-    arrays = dict[str, npt.NDArray[Any]]()
-    with zipfile.ZipFile(io.BytesIO(content)) as archive:
-        left = most
-        for member in archive.infolist():
-            with archive.open(member) as stream:
-                packed = stream.read(left + 1)
-            left -= len(packed)
-            if left < 0:
-                raise ValueError(f"more than {most / 1e6:g} MB unpacked")
-            if not member.filename.endswith(".npy"):
-                raise ValueError(f"{member.filename!r} is no array")
-            _check_size(packed, most)
-            array = np.lib.format.read_array(io.BytesIO(packed), allow_pickle=False)
-            arrays[member.filename.removesuffix(".npy")] = array
-    return arrays
-
-
-def _check_size(packed: bytes, most: int) -> None:
-    """Refuses a header that promises more than the file holds, before memory is taken for it."""
-    stream = io.BytesIO(packed)
-    version = np.lib.format.read_magic(stream)
-    read = np.lib.format.read_array_header_1_0
-    if version != (1, 0):
-        read = np.lib.format.read_array_header_2_0
-    shape, _, kind = read(stream)
-    if math.prod(shape) * kind.itemsize > most or any(size < 0 for size in shape):
-        raise ValueError(f"an array of shape {shape}")
 
 
 def _text(file: Path, arrays: Arrays, name: str) -> str:
@@ -235,12 +184,3 @@ def _check_network(network: Network, seen: int) -> None:
     )
     if not all(np.all(np.isfinite(array)) for array in numbers) or np.any(network.scale <= 0.0):
         raise ValueError("numbers that are not finite, or a scale that is not positive")
-
-
-def _digest(document: str, arrays: Arrays) -> str:
-    sums = hashlib.sha256(document.encode())
-    for name in sorted(arrays):
-        value = np.ascontiguousarray(arrays[name])
-        sums.update(f"{name} {value.dtype.str} {value.shape}".encode())
-        sums.update(value.tobytes())
-    return sums.hexdigest()

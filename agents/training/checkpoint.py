@@ -11,12 +11,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from agents.policies.files import UNREADABLE
 from agents.training.config import TrainConfig
 from agents.training.learner_state import learner_state, restore_learner
 from agents.training.model import Model, make_model
 from agents.training.plain import read_plain, write_plain
 from agents.training.stack import Stack
+from fish_env.archives import UNREADABLE
 from fish_env.errors import ConfigError
 
 FORMAT = "robofish-checkpoint-2"

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from agents.policies.files import read_arrays
+from fish_env.archives import read_arrays
 from fish_env.files import replacing
 from fish_env.reading import Unreadable, parse_json, read_bytes
 

@@ -20,6 +20,7 @@ from hypothesis import strategies as st
 from agents.policies.files import read_policy
 from agents.policies.pretrained import shipped
 from agents.training.plain import read_plain, write_plain
+from fish_env.archives import UNREADABLE, digest
 from fish_env.envs.options import env_options
 from fish_env.params.io import config_root
 from tests.fixtures.measured_data import DESCRIPTION, RUN, STEADY, TABLE, write_folder
@@ -191,12 +192,10 @@ def test_forged_policies(tmp_path_factory, key, value):
 
 
 def forged(file: Path, about: dict, arrays: dict) -> Path:
-    from agents.policies.files import _digest
-
     document = json.dumps(about)
     numbers = {name: value for name, value in arrays.items() if name not in ("about", "digest")}
-    digest = np.array(_digest(document, numbers))
-    np.savez(file, about=np.array(document), digest=digest, **numbers)
+    checksum = np.array(digest(document, numbers))
+    np.savez(file, about=np.array(document), digest=checksum, **numbers)
     return file
 
 
@@ -204,8 +203,6 @@ def forged(file: Path, about: dict, arrays: dict) -> Path:
 @given(data=st.data())
 def test_damaged_checkpoints(tmp_path_factory, data):
     """Reading plain values raises what `load_checkpoint` words, and nothing else."""
-    from agents.policies.files import UNREADABLE
-
     file = tmp_path_factory.getbasetemp() / "checkpoint.zip"
     write_plain({"format": "x", "weights": np.arange(50.0), "deep": {"a": [1, 2]}}, file)
     content = bytearray(file.read_bytes())

@@ -15,6 +15,7 @@ from fish_env.envs import start
 from fish_env.envs.layout import GOAL, MAX_BEAT_S, OBSERVATION, OUTPUTS, SENSORS, Failure
 from fish_env.envs.options import EnvOptions
 from fish_env.errors import ConfigError
+from fish_env.model.compose import cache_folder
 from fish_env.model.grid import Grid
 from fish_env.model.history import forget, history_rows
 from fish_env.model.runtime import Kernels, kernels, run_in_threads
@@ -65,6 +66,11 @@ def _step_kernels(options: EnvOptions) -> Kernels:
     """The physics of these options with the environment step behind it."""
     composition = options.model.kernels.composition
     return kernels(replace(composition, templates=(*composition.templates, STEP_TEMPLATE)))
+
+
+def physics_of(options: EnvOptions) -> str:
+    """What a step of these options computes with: a hash of all kernel sources and of numba."""
+    return cache_folder(_step_kernels(options).composition).name
 
 
 def _control_step(options: EnvOptions) -> Grid:

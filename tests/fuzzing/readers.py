@@ -15,6 +15,7 @@ from agents.training.config import load_train_config
 from fish_env.commands.case import read_case
 from fish_env.data import load_dataset
 from fish_env.envs.config import load_env_config
+from fish_env.envs.record import read_episode
 from fish_env.errors import RoboticFishError
 from fish_env.params import fish_files, load_fish
 from fish_env.replay.reading import read_replay_file
@@ -35,6 +36,7 @@ READERS: dict[str, tuple[Callable[[Path], Any], str]] = {
     "replay": (read_replay_file, ".csv"),
     "waypoints": (read_waypoints, ".csv"),
     "policy": (read_policy, ".npz"),
+    "episode": (read_episode, ".npz"),
 }
 
 

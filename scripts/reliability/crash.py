@@ -1,0 +1,219 @@
+"""Kills trainings, diagnoses and suites over and over, and compares what comes of them.
+
+    python -m scripts.reliability.crash               # 30 kills of each, into results/
+    python -m scripts.reliability.crash --only train --kills 5
+
+Each work runs in a process of its own, which gets SIGKILL: at a random moment, or while a file is
+being written. It is then started again in the same folder, until it ends by itself. What it leaves
+must equal what a process leaves that nobody killed. A difference ends the rig with status 1.
+There is no sweep to kill yet.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import sys
+import tempfile
+import time
+import traceback
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+# Before anything is imported that makes threads: processes are forked from this one.
+for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
+    os.environ[variable] = "1"
+
+import numpy as np  # noqa: E402
+
+from fish_env.files import PART  # noqa: E402
+from scripts.bench import harness  # noqa: E402
+from scripts.reliability.crash_works import WORKS, Work  # noqa: E402
+from scripts.results import RESULTS, write_dated  # noqa: E402
+
+MOMENTS = ("at a random moment", "while writing")
+ERRORS = "errors.txt"
+PATIENCE_S = 600.0
+"""A work that takes longer hangs."""
+AFTER_PART_S = 0.004
+"""A kill while writing comes so long after a new file was seen, at most."""
+
+
+@dataclass
+class Score:
+    """What became of the kills of one work.
+
+    Attributes:
+        kills: how many, by moment.
+        ends: works that ended after kills and were compared.
+        different: what was not as without kills, in words.
+        parts: unfinished files that kills left behind.
+        uninterrupted_s: how long the work takes if nobody kills it.
+    """
+
+    kills: dict[str, int] = field(default_factory=lambda: dict.fromkeys(MOMENTS, 0))
+    ends: int = 0
+    different: list[str] = field(default_factory=list)
+    parts: int = 0
+    uninterrupted_s: float = 0.0
+
+    def as_dict(self) -> dict[str, Any]:
+        """For a result."""
+        return {"killed": sum(self.kills.values()), **vars(self)}
+
+
+def start(work: Work, folder: Path) -> int:
+    """Starts a work in a new process; errors go to a file beside the folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    process = os.fork()
+    if process:
+        return process
+    status = 1
+    try:
+        silent = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(silent, 1)
+        os.dup2(silent, 2)
+        work.run(folder)
+        status = 0
+    except BaseException:
+        folder.with_name(ERRORS).write_text(traceback.format_exc(), encoding="utf-8")
+    finally:
+        os._exit(status)
+
+
+def ended(process: int, block: bool) -> int | None:
+    """Exit status of a process, negative for a signal; None if it still runs."""
+    found, status = os.waitpid(process, 0 if block else os.WNOHANG)
+    return os.waitstatus_to_exitcode(status) if found else None
+
+
+def parts_in(folder: Path) -> set[str]:
+    """Files that are being written, or were when a kill came."""
+    return {str(file) for file in folder.rglob(f".*{PART}*")}
+
+
+def kill_once(
+    work: Work, folder: Path, moment: str, usual_s: float, rng: np.random.Generator
+) -> bool:
+    """Starts a work and kills it.
+
+    Returns:
+        Whether it was killed; False if it had ended by itself.
+
+    Raises:
+        RuntimeError: it failed or hung by itself.
+    """
+    before = parts_in(folder) if folder.exists() else set[str]()
+    process = start(work, folder)
+    begun = time.monotonic()
+    wait_s = rng.uniform(0.0, usual_s) if moment == MOMENTS[0] else PATIENCE_S
+    seen = int(rng.integers(1, 4))  # the first new file, the second or the third
+    while time.monotonic() - begun < wait_s:
+        status = ended(process, block=False)
+        if status is not None:
+            _check(work, folder, status)
+            return False
+        if moment == MOMENTS[1]:
+            now = parts_in(folder)
+            if now - before:
+                seen -= 1
+                before |= now
+            if seen == 0:
+                time.sleep(rng.uniform(0.0, AFTER_PART_S))
+                break
+        else:
+            time.sleep(0.001)
+    os.kill(process, signal.SIGKILL)
+    status = ended(process, block=True)
+    if status == -signal.SIGKILL:
+        return True
+    _check(work, folder, status)
+    return False
+
+
+def _check(work: Work, folder: Path, status: int | None) -> None:
+    if status:
+        file = folder.with_name(ERRORS)
+        words = file.read_text(encoding="utf-8") if file.exists() else f"status {status}"
+        raise RuntimeError(f"{work.name}: {words.strip()}")
+
+
+def torment(work: Work, place: Path, kills: int, seed: int) -> Score:
+    """Kills a work so many times, half of them while it writes, and compares each end.
+
+    Args:
+        work: what to kill.
+        place: a folder of its own.
+        kills: how many.
+        seed: of the moments.
+    """
+    rng, score = np.random.default_rng(seed), Score()
+    begun = time.monotonic()
+    _check(work, place / "whole", ended(start(work, place / "whole"), block=True))
+    score.uninterrupted_s = round(time.monotonic() - begun, 2)
+    wanted = work.outcome(place / "whole")
+    attempts = 0
+    while sum(score.kills.values()) < kills:
+        folder = place / f"killed-{score.ends}"
+        while True:
+            attempts += 1
+            done = sum(score.kills.values())
+            # Each folder gets some kills, so that many resumed ends are compared.
+            if done >= kills or attempts % (work.kills_each + 1) == 0:
+                _check(work, folder, ended(start(work, folder), block=True))
+                break
+            moment = MOMENTS[done % 2]
+            try:
+                if not kill_once(work, folder, moment, score.uninterrupted_s, rng):
+                    break
+            except RuntimeError as error:
+                score.different.append(f"after {done} kills: {error}")
+                return score
+            score.kills[moment] += 1
+            score.different += work.damage(folder, place / "whole")
+        score.parts += len(parts_in(folder))
+        score.ends += 1
+        found = work.outcome(folder)
+        score.different += [
+            f"folder {folder.name}: {name} differs"
+            for name in sorted(wanted | found)
+            if wanted.get(name) != found.get(name)
+        ]
+    return score
+
+
+def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m scripts.reliability.crash")
+    add = parser.add_argument
+    add("--only", help=f"some of {','.join(WORKS)}; default: all")
+    add("--kills", type=int, default=30, help="of each work; default: 30")
+    add("--seed", type=int, default=0, help="of the moments")
+    add("--out", type=Path, default=RESULTS, help="folder of the dated result")
+    options = parser.parse_args(arguments)
+    options.only = tuple((options.only or ",".join(WORKS)).split(","))
+    if unknown := set(options.only) - set(WORKS):
+        parser.error(f"--only: {', '.join(sorted(unknown))}: choose some of {', '.join(WORKS)}")
+    return options
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    options = parse(arguments)
+    scores = {}
+    with tempfile.TemporaryDirectory() as place:
+        for name in options.only:
+            work = WORKS[name]()
+            score = torment(work, Path(place) / name, options.kills, options.seed)
+            scores[name] = score.as_dict() | {"bitwise": work.promise}
+            print(f"{name}: {scores[name]}", flush=True)
+    content = {"machine": harness.machine(), "seed": options.seed, "works": scores}
+    file = write_dated(options.out, "crash", content)
+    bad = [name for name, score in scores.items() if score["different"]]
+    print(f"{', '.join(bad) or 'nothing'} differs from the uninterrupted; written: {file.name}")
+    sys.exit(1 if bad else 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -71,6 +71,36 @@ FUZZ_EXAMPLES ?= 2000
 fuzz: setup  ## try FUZZ_EXAMPLES hostile inputs in each test of the readers (2000: about an hour)
 	FUZZ_EXAMPLES=$(FUZZ_EXAMPLES) $(BIN)/python -m pytest tests/fuzzing
 
+.PHONY: fuzz-guided crash soak versions lock audit bom
+FUZZ_SECONDS ?= 600
+fuzz-guided: $(VENV)/.with-reliability  ## fuzz each reader, led by coverage, for FUZZ_SECONDS (600)
+	$(BIN)/python -m scripts.reliability.guided_fuzz --seconds $(FUZZ_SECONDS)
+
+crash: setup  ## kill training, diagnosis and suite 30 times each, and compare what comes of them
+	$(BIN)/python -m scripts.reliability.crash
+
+SOAK_HOURS ?= 8
+soak: setup  ## 1e8 steps of the batch, then train, evaluate and diagnose for SOAK_HOURS (8)
+	$(BIN)/python -m scripts.reliability.soak --hours $(SOAK_HOURS)
+
+versions: $(VENV)/.with-reliability  ## run tests on the oldest and newest supported versions
+	$(BIN)/python -m scripts.reliability.versions
+
+lock: $(VENV)/.with-reliability  ## write requirements.lock: the tested versions with their hashes
+	$(BIN)/python -m uv pip compile pyproject.toml --constraint constraints.txt --generate-hashes \
+	  --extra parquet --extra render --extra docs --extra logs --extra notebook --no-header \
+	  --no-annotate --no-emit-index-url --python-version 3.11.7 \
+	  --python-platform x86_64-manylinux_2_28 --quiet --output-file requirements.lock
+
+audit: $(VENV)/.with-reliability  ## look up known vulnerabilities of requirements.lock
+	$(BIN)/python -m scripts.reliability.audit
+
+bom: $(VENV)/.with-reliability  ## write out/bom.json, a CycloneDX bill of materials of .venv
+	mkdir -p out
+	$(BIN)/cyclonedx-py environment $(BIN)/python --pyproject pyproject.toml \
+	  --output-reproducible --of JSON -o out/bom.json
+	@echo "written: out/bom.json"
+
 clean:  ## remove .venv and everything that builds and tests leave behind
 	rm -rf $(VENV) build dist out .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
@@ -98,6 +128,10 @@ $(VENV)/.with-docs: pyproject.toml constraints.txt | $(VENV)/bin/python
 	@echo "Installing robotic-fish and what builds its documentation into $(VENV)"
 	@$(PIP) --editable ".[docs]"
 	@touch $(VENV)/.with-base $@
+
+$(VENV)/.with-reliability: $(VENV)/.with-dev
+	@$(PIP) "atheris>=3,<4" "cyclonedx-bom>=7,<8" "pip-audit>=2.10,<3" "uv>=0.8,<1"
+	@touch $@
 
 $(VENV)/.with-bench: pyproject.toml constraints.txt | $(VENV)/bin/python
 	@echo "Installing robotic-fish and the simulators it is measured against into $(VENV)"

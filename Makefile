@@ -76,7 +76,8 @@ FUZZ_SECONDS ?= 600
 fuzz-guided: $(VENV)/.with-reliability  ## fuzz each reader, led by coverage, for FUZZ_SECONDS (600)
 	$(BIN)/python -m scripts.reliability.guided_fuzz --seconds $(FUZZ_SECONDS)
 
-crash: setup  ## kill training, diagnosis and suite 30 times each, and compare what comes of them
+crash: setup  ## test the rig, kill training, diagnosis and suite 30 times each, compare what comes of them
+	$(BIN)/python -m pytest tests/reliability/rig_crash.py
 	$(BIN)/python -m scripts.reliability.crash
 
 SOAK_HOURS ?= 8

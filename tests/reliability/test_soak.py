@@ -1,6 +1,8 @@
 """The soak, shortened: nothing grows, every number is finite, and what grows is noticed."""
 
 import time
+from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -39,12 +41,24 @@ def test_denormals_reach_the_state():
     assert np.all((rates > 0) & (rates < np.finfo(float).tiny))
 
 
+class Broken:
+    """A batch whose observations hold a number that is not finite."""
+
+    def __init__(self, env):
+        self.env, self.num_envs, self.batch = env, env.num_envs, env.batch
+
+    def step(self, actions):
+        obs, *rest = self.env.step(actions)
+        obs[0, 0] = np.nan
+        return obs, *rest
+
+
 def test_a_number_that_is_not_finite_ends_the_soak():
     swimmers = soak_batch.make("lean", 4)
     swimmers.env.reset(seed=0)
-    swimmers.env.batch.records[:] = np.nan
+    broken = replace(swimmers, env=Broken(swimmers.env))
     with pytest.raises(ValueError, match="not finite"):
-        soak_batch.swim_block(swimmers, "random", np.random.default_rng(0), soak_batch.Counter())
+        soak_batch.swim_block(broken, "random", np.random.default_rng(0), Counter())
 
 
 def sample(i, memory=100.0, files=10, threads=1, left=0):

@@ -5,10 +5,11 @@ PYTHON ?= python3
 JOBS ?= 2
 VENV := .venv
 BIN := $(VENV)/bin
+CLIENTS := .venv-clients
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint docs bench benchmark-diagnosis benchmark-realistic benchmark-power benchmark-time benchmark-agents benchmark-loop fuzz check-release clean
+.PHONY: help setup demo test lint docs bench benchmark-diagnosis benchmark-realistic benchmark-power benchmark-time benchmark-agents benchmark-loop clients measure-export fuzz check-release clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 28
@@ -67,6 +68,12 @@ check-release: setup  ## build the wheel twice and compare, and go through the c
 	$(BIN)/python -m scripts.check_wheels
 	$(BIN)/python -m scripts.check_project
 
+measure-export: setup  ## compare exported policies with the NumPy policy, over a million observations
+	$(BIN)/python -m scripts.measure_export
+
+clients: $(CLIENTS)/.ready  ## run libraries of reinforcement learning on the environment
+	$(CLIENTS)/bin/python -m pytest tests/clients/client_*.py
+
 FUZZ_EXAMPLES ?= 2000
 fuzz: setup  ## try FUZZ_EXAMPLES hostile inputs in each test of the readers (2000: about an hour)
 	FUZZ_EXAMPLES=$(FUZZ_EXAMPLES) $(BIN)/python -m pytest tests/fuzzing
@@ -102,8 +109,8 @@ bom: $(VENV)/.with-reliability  ## write out/bom.json, a CycloneDX bill of mater
 	  --output-reproducible --of JSON -o out/bom.json
 	@echo "written: out/bom.json"
 
-clean:  ## remove .venv and everything that builds and tests leave behind
-	rm -rf $(VENV) build dist out .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+clean:  ## remove virtual environments and everything that builds and tests leave behind
+	rm -rf $(VENV) $(CLIENTS) build dist out .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # Each stamp is redone only when the project file or the tested versions change.
@@ -138,3 +145,11 @@ $(VENV)/.with-bench: pyproject.toml constraints.txt | $(VENV)/bin/python
 	@echo "Installing robotic-fish and the simulators it is measured against into $(VENV)"
 	@$(PIP) --editable ".[bench]"
 	@touch $(VENV)/.with-base $@
+
+# Libraries of reinforcement learning need other versions than the tests.
+$(CLIENTS)/.ready: pyproject.toml constraints-clients.txt
+	@echo "Installing robotic-fish and libraries of reinforcement learning into $(CLIENTS)"
+	@$(PYTHON) -m venv $(CLIENTS)
+	@$(CLIENTS)/bin/python -m pip install --quiet --disable-pip-version-check \
+	  --constraint constraints-clients.txt --editable ".[clients]"
+	@touch $@

@@ -130,7 +130,8 @@ class RoboticFish3DEnv(Watched, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.
             parameters. What a file says of measurements (sensor delays, biases) belongs to the
             recordings it was fitted to and does not act here.
         render_mode: None, ``"rgb_array"`` (``render`` returns pictures, no screen is needed) or
-            ``"human"`` (a window that runs in real time). Both need the extra ``render``.
+            ``"human"`` (a window that runs in real time; without a screen a warning and no window).
+            Both need the extra ``render``.
         config: YAML file or mapping that changes configs/env/robotic-fish-3d.yaml.
         control_hz: actions a second.
         physics_hz: physics steps a second, a whole multiple of ``control_hz``.

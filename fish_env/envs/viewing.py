@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import gymnasium as gym
 import numpy as np
 import numpy.typing as npt
 
@@ -149,10 +150,11 @@ class Viewer:
         self._views: list[View] = []
         self._mosaic: Mosaic | None = None
         self._window: Window | None = None
+        self._unseen = False
 
     def __getstate__(self) -> dict[str, Any]:
         """Windows and cameras stay where they are; a copy opens its own."""
-        return {**vars(self), "_views": [], "_mosaic": None, "_window": None}
+        return {**vars(self), "_views": [], "_mosaic": None, "_window": None, "_unseen": False}
 
     @property
     def is_open(self) -> bool:
@@ -179,11 +181,20 @@ class Viewer:
             self.show(batch)
 
     def show(self, batch: FishBatch) -> None:
-        """Show the fish in the window, which is opened for the first of them."""
+        """Show the fish in the window, which is opened for the first of them.
+
+        Without a screen it warns once, and the fish swim on unseen.
+        """
         scenes = self._scenes(batch)
-        if self._window is None:
-            self._window = window(self.setting, self.count, self.size)
-        self._window.show(scenes)
+        if self._unseen:
+            return
+        try:
+            if self._window is None:
+                self._window = window(self.setting, self.count, self.size)
+            self._window.show(scenes)
+        except ConfigError as error:
+            self._unseen = True
+            gym.logger.warn(f"{error}; the fish swims on unseen")
 
     def frames(self, batch: FishBatch) -> list[Frame]:
         """A picture of each fish."""

@@ -24,7 +24,12 @@ def font(size: int, bold: bool = False) -> pygame.font.Font:
 @lru_cache(maxsize=512)
 def words(text: str, size: int, colour: Colour, bold: bool = False) -> pygame.Surface:
     """Text as a picture; the same words are drawn once."""
-    return font(size, bold).render(text, True, colour)
+    try:
+        return font(size, bold).render(text, True, colour)
+    except pygame.error:
+        # Another program part has called pygame.quit, which ends all fonts of the process.
+        font.cache_clear()
+        return font(size, bold).render(text, True, colour)
 
 
 def write(

@@ -57,9 +57,9 @@ class Window:
     def __init__(
         self, setting: Setting, count: int = 1, size: tuple[int, int] = PICTURE_SIZE
     ) -> None:
-        _find_screen()
-        self._window: pygame.Window | None = pygame.Window(TITLE, size, resizable=True)
-        self._window.minimum_size = SMALLEST
+        self._window: pygame.Window | None = None
+        self._lost = False
+        self._make(size)
         self._mosaic = Mosaic(setting, count, size)
         self._last: Sequence[Scene] | None = None
         self._due = 0.0
@@ -68,7 +68,20 @@ class Window:
         self._stepping = False
         self._noted_until = time.monotonic() + NOTE_S
         self.paused = False
-        _open[self._window.id] = self
+
+    def _make(self, size: tuple[int, int]) -> None:
+        _find_screen()
+        self._window = pygame.Window(TITLE, size, resizable=True)
+        self._window.minimum_size = SMALLEST
+        self._lost = False
+        self._number = self._window.id
+        _open[self._number] = self
+        # Other environments call pygame.quit when they close, which takes this window along.
+        pygame.register_quit(self._lose)
+
+    def _lose(self) -> None:
+        if _open.pop(self._number, None) is self:
+            self._lost = True
 
     @property
     def is_open(self) -> bool:
@@ -78,8 +91,11 @@ class Window:
     def show(self, scenes: Sequence[Scene]) -> None:
         """Move from the scenes shown last to these, in the time between them.
 
-        Does nothing once the window is closed. Waits while it is paused.
+        Does nothing once the window is closed. Waits while it is paused. A window that went with a
+        `pygame.quit` of another part of the program is opened again.
         """
+        if self._lost or (self.is_open and not pygame.display.get_init()):
+            self._make(self._mosaic.size)
         before, self._last = self._last or scenes, scenes
         pairs = list(zip(before, scenes, strict=True))
         period = max(0.0, *(b.time_s - a.time_s for a, b in pairs), 0.0)
@@ -136,9 +152,10 @@ class Window:
     def close(self) -> None:
         """Close the window; a second time does nothing."""
         if self._window is not None:
-            del _open[self._window.id]
-            self._window.destroy()
-            self._window = None
+            if _open.get(self._number) is self:
+                del _open[self._number]
+                self._window.destroy()
+            self._window, self._lost = None, False
 
     def handle(self, event: pygame.Event) -> None:
         """React to the mouse, the keyboard or the window's button."""

@@ -11,25 +11,32 @@ from packaging.utils import canonicalize_name
 ROOT = Path(__file__).resolve().parents[2]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 EXTRAS = PROJECT["optional-dependencies"]
-TESTED = {
-    canonicalize_name(line.split("==")[0]): line.split("==")[1]
-    for line in (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
-    if "==" in line
-}
+
+
+def pinned(name: str) -> dict[str, str]:
+    """Package -> version that a constraints file pins."""
+    lines = (ROOT / name).read_text(encoding="utf-8").splitlines()
+    pins = (line.split("==") for line in lines if "==" in line)
+    return {canonicalize_name(package): version for package, version in pins}
+
+
+TESTED, TESTED_CLIENTS = pinned("constraints.txt"), pinned("constraints-clients.txt")
 REQUIREMENTS = [
-    *PROJECT["dependencies"],
-    *(item for items in EXTRAS.values() for item in items),
+    *((item, TESTED) for item in PROJECT["dependencies"]),
+    *((item, TESTED_CLIENTS) for item in (*PROJECT["dependencies"], *EXTRAS["clients"])),
+    *((i, TESTED) for extra, items in EXTRAS.items() if extra != "clients" for i in items),
 ]
 
 
-@pytest.mark.parametrize("text", sorted(set(REQUIREMENTS)))
-def test_every_requirement_admits_the_version_it_was_tested_with(text):
+@pytest.mark.parametrize(("text", "versions"), REQUIREMENTS)
+def test_every_requirement_admits_the_version_it_was_tested_with(text, versions):
     requirement = Requirement(text)
-    assert requirement.specifier.contains(TESTED[canonicalize_name(requirement.name)])
+    assert requirement.specifier.contains(versions[canonicalize_name(requirement.name)])
 
 
-def test_constraints_name_versions_only():
-    lines = (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
+@pytest.mark.parametrize("name", ["constraints.txt", "constraints-clients.txt"])
+def test_constraints_name_versions_only(name):
+    lines = (ROOT / name).read_text(encoding="utf-8").splitlines()
     assert [line for line in lines if not re.fullmatch(r"#.*|[\w.-]+==[\w.]+", line)] == []
 
 
@@ -37,6 +44,8 @@ def test_the_base_install_needs_no_torch():
     assert not [item for item in PROJECT["dependencies"] if "torch" in item or "baselines" in item]
 
 
-def test_torch_is_pinned_wherever_it_is_asked_for():
-    torch = {item for items in EXTRAS.values() for item in items if item.startswith("torch")}
-    assert torch == {"torch==2.13.0"}
+def test_torch_is_a_range_that_the_constraints_pin():
+    torch = {item for items in EXTRAS.values() for item in items if item.startswith("torch>")}
+    assert torch == {"torch>=2.5,<3"}
+    assert TESTED["torch"] == "2.13.0"
+    assert not [item for items in EXTRAS.values() for item in items if "torch==" in item]

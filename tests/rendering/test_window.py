@@ -183,6 +183,62 @@ def test_a_window_without_a_screen_is_refused(monkeypatch):
         open_window(SETTING)
 
 
+def test_a_window_and_its_words_outlive_the_quit_of_another_environment(window):
+    """Gymnasium's own environments call pygame.quit when they close."""
+    window.show([scene(time_s=5.1)])
+    pygame.quit()
+    window.show([scene(time_s=5.2)])
+    assert window.is_open
+    pygame.quit()
+    pygame.init()
+    window.show([scene(time_s=5.3, speed=0.1234)])
+    assert window.is_open
+    press(window, pygame.K_ESCAPE)
+    window.show([scene(time_s=5.4)])
+    assert not window.is_open
+
+
+def test_a_closed_window_stays_closed_after_the_quit_of_another(window):
+    window.close()
+    pygame.quit()
+    window.show([scene(time_s=5.1)])
+    assert not window.is_open
+
+
+@pytest.mark.parametrize("between", [pygame.quit, pygame.font.quit])
+def test_pictures_have_words_after_the_quit_of_another_environment(between):
+    env = RoboticFish3DEnv(render_mode="rgb_array", render_size=(160, 120))
+    env.reset(seed=0)
+    env.render()
+    between()
+    for action in random_actions(3):
+        env.step(action)
+        assert env.render().std() > 1
+
+
+UNSEEN = """
+import sys, warnings, gymnasium as gym
+from gymnasium.utils.env_checker import check_env
+with warnings.catch_warnings(record=True) as caught:
+    warnings.simplefilter("always")
+    env = gym.make("fish_env:RoboticFish3D-v0", render_size=(64, 48))
+    check_env(env.unwrapped)
+    watched = gym.make("fish_env:RoboticFish3D-v0", render_mode="human")
+    watched.reset(seed=0)
+    watched.step(watched.action_space.sample())
+assert not watched.unwrapped.window_open
+texts = [str(warning.message) for warning in caught]
+assert any("there is no screen" in text for text in texts), texts
+"""
+
+
+def test_environments_pass_the_checker_without_a_screen():
+    """With a warning, not an error: the checker tries every mode."""
+    hidden = {"SDL_VIDEODRIVER", "DISPLAY", "WAYLAND_DISPLAY"}
+    environment = {key: value for key, value in os.environ.items() if key not in hidden}
+    subprocess.run([sys.executable, "-c", UNSEEN], env=environment, check=True, cwd=ROOT)
+
+
 DRIVE = """
 import sys, pygame, gymnasium as gym
 env = gym.make("fish_env:RoboticFish3D-v0", render_mode="human")

@@ -1,0 +1,3 @@
+"""What the tests of clients share."""
+
+ENV = "fish_env:RoboticFish3D-v0"

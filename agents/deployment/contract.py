@@ -11,11 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from agents.policies.files import ACTIONS, PolicyFile
-from fish_env.envs.config import EnvConfig, load_env_config
+from fish_env.envs.config import INPUTS, EnvConfig, load_env_config
 from fish_env.envs.layout import MAX_BEAT_S, OBSERVATION, OBSERVATION_LIMIT
 from fish_env.errors import ConfigError
 from fish_env.files import write_text
-from fish_env.model.state import INPUTS
 
 FORMAT = "robofish-contract-1"
 UNITS = ("rad", "rad", "Hz", "m", "rad")

@@ -15,7 +15,7 @@ from fish_env.arrays import FloatArray
 from fish_env.envs.config_checks import check_settings, speed_range
 from fish_env.envs.layout import Setup, empty_setup
 from fish_env.errors import ConfigError
-from fish_env.model.state import INPUTS
+from fish_env.model.state import INPUTS as INPUTS  # open to what builds on environments
 from fish_env.params.io import config_root
 from fish_env.reading import Unreadable, is_number, located, printable, read_yaml, short, shown
 

@@ -14,7 +14,7 @@ LINTER = Path(sys.executable).with_name("lint-imports")
 # What agents act on; the one style of pictures and the options of commands, so that theirs look
 # alike; and the one way to read files.
 OPEN_TO_AGENTS = {
-    "version",
+    "archives",
     "arrays",
     "commands",
     "errors",
@@ -27,6 +27,7 @@ OPEN_TO_AGENTS = {
     "plotting",
     "rendering",
     "replay",
+    "version",
 }
 BELOW_INFERENCE = {f"fish_env.{part}" for part in ("arrays", "errors", "inference", "threads")}
 NUMERICS = {"numpy", "scipy", "numba", *BELOW_INFERENCE}

@@ -127,7 +127,7 @@ def test_sizes_that_cannot_be_are_refused(size):
 @pytest.mark.parametrize("make", [RoboticFish3DEnv, RoboticFish3DVectorEnv])
 def test_what_is_missing_is_named_at_once(make, monkeypatch):
     monkeypatch.setitem(sys.modules, "pygame", None)
-    with pytest.raises(MissingExtraError, match="pip install .*pygame-ce"):
+    with pytest.raises(MissingExtraError, match=r"pip install .*pygame-ce"):
         make(render_mode="rgb_array")
     make()
 

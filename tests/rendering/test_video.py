@@ -64,5 +64,5 @@ def test_odd_sizes_and_frame_rates_are_refused(tmp_path):
 
 def test_a_missing_ffmpeg_is_named(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    with pytest.raises(MissingExtraError, match="pip install .*imageio-ffmpeg"):
+    with pytest.raises(MissingExtraError, match=r"pip install .*imageio-ffmpeg"):
         write_video(tmp_path / "swim.mp4", swim(), SETTING)

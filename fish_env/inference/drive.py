@@ -10,22 +10,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from fish_env.inference.adequacy import implausible_estimates
 from fish_env.inference.effort import Effort
-from fish_env.inference.estimate.fit import Fit, fit
-from fish_env.inference.explanation import Explanation, reached
+from fish_env.inference.estimate.fit import Fit
+from fish_env.inference.explanation import FEW_RUNS, Explanation, fitted_again
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause
-from fish_env.inference.problem import Problem
 from fish_env.inference.screening import screen
 from fish_env.inference.search import refits
 from fish_env.inference.shortlist import shortlisted
-
-FEW_RUNS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +73,7 @@ def beside_drive(
     if not tried or base is None or base.score - tried[0].score < POLICY.evidence_doubt:
         return None
     first = tried[0]
-    own = _under(problem, first.fit, nothing.fit.noise, 2)
+    own = fitted_again(problem, first.fit, nothing.fit.noise)
     if own is None:
         return None
     begun = Explanation(first.causes, own)
@@ -93,7 +89,7 @@ def _relaxed(baseline: Fit, objective: float, report: Callable[[str], None]) -> 
     if noise is None:
         return None
     report("following the drive")
-    loose = _under(baseline.problem, baseline, noise, 2)
+    loose = fitted_again(baseline.problem, baseline, noise)
     if loose is None or loose.objective > objective - POLICY.evidence_doubt:
         return None
     return Explanation((), loose).varied(beside_misfit=True)
@@ -112,12 +108,7 @@ def _with_drive(
     known = problem.known
     drives = [c for c in causes if c.is_effect and known[c.name].drifts_in_phase]
     shown = list(screen(followed, drives, rng).best())
-    few = _under(problem.subset(FEW_RUNS), followed, followed.noise, 1)
+    few = fitted_again(problem.subset(FEW_RUNS), followed, followed.noise, rounds=1)
     if few is None or not shown:
         return []
     return refits(begun, shown, report, (few, shown), effort)[0]
-
-
-def _under(problem: Problem, at: Fit, noise: Any, rounds: int) -> Fit | None:
-    """A fit again, from a noise model; None where the simulation diverges."""
-    return reached(lambda: fit(problem, at.effects, at.point, noise, at.released, rounds=rounds))

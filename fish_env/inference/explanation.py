@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -14,8 +14,11 @@ from fish_env.inference.adequacy import disturbance_at_limit
 from fish_env.inference.estimate.fit import Fit, fit, with_run_variation
 from fish_env.inference.estimate.information import information, prior_precision
 from fish_env.inference.policy import POLICY
+from fish_env.inference.problem import Problem
 
 T = TypeVar("T")
+FEW_RUNS = 3
+"""Runs on which a fit is begun, or tried."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +46,7 @@ class Explanation:
         noise = own.problem.relaxed_noise(own.noise)
         if noise is None:
             return None
-        few = own.problem.subset(3)
-        return reached(lambda: fit(few, own.effects, own.point, noise, own.released, rounds=2))
+        return fitted_again(own.problem.subset(FEW_RUNS), own, noise)
 
     def varied(self, beside_misfit: bool = False, dropped: Collection[str] = ()) -> Explanation:
         """The same causes with what the runs differ in, as it shows now that more is explained.
@@ -113,3 +115,15 @@ def reached(make: Callable[[], T]) -> T | None:
         return make()
     except np.linalg.LinAlgError:
         return None
+
+
+def fitted_again(problem: Problem, at: Fit, noise: Any, rounds: int = 2) -> Fit | None:
+    """A fit taken on, its noise estimated anew; None where the simulation diverges.
+
+    Args:
+        problem: the runs, perhaps not those of the fit.
+        at: where to begin, and what is free.
+        noise: noise model to begin from.
+        rounds: most alternations between parameters and disturbance.
+    """
+    return reached(lambda: fit(problem, at.effects, at.point, noise, at.released, rounds=rounds))

@@ -77,7 +77,7 @@ def sustained(found: Explanation, rng: np.random.Generator) -> Explanation | Non
         The causes that are left with their fit; None where none is.
     """
     while found.causes:
-        fit = found.extrapolated().fit
+        fit = found.fit.extrapolated
         runs = fit.problem.run_ids
         budget = error_budget(fit.problem, fit, found.causes, runs, False, False, rng)
         if budget is None:

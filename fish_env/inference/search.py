@@ -13,7 +13,7 @@ from fish_env.inference.adequacy import disturbance_at_limit
 from fish_env.inference.effort import FULL, Effort
 from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
 from fish_env.inference.estimate.fit import Fit, fit
-from fish_env.inference.explanation import Explanation, reached
+from fish_env.inference.explanation import FEW_RUNS, Explanation, fitted_again, reached
 from fish_env.inference.hypotheses import PREFIX
 from fish_env.inference.parallel import side_by_side
 from fish_env.inference.policy import POLICY
@@ -317,7 +317,7 @@ def _best_first(
 
 def in_full(problem: Problem, coarse: CoarseFit, noise: Any) -> Fit | None:
     """The full fit from a coarse one, first on a few runs; None where the simulation diverges."""
-    few = problem.subset(3)
+    few = problem.subset(FEW_RUNS)
     # The noise of the sensors is told in a second round only.
     rounds = 2 if few is problem else 1
     start = (coarse.effects, coarse.point, noise, coarse.released)
@@ -341,5 +341,4 @@ def _at_noise(
 
 
 def _noise_too(problem: Problem, own: Fit) -> Fit | None:
-    free = (own.effects, own.point, own.noise, own.released)
-    return reached(lambda: fit(problem, *free, rounds=2))
+    return fitted_again(problem, own, own.noise)

@@ -11,8 +11,6 @@ from fish_env.inference.policy import POLICY
 
 Answer = Mapping[str, Any]
 EXPERIMENT_FILE = "next_experiment.csv"
-FEWEST_RUNS = 3
-"""Runs from which on an interval over runs is shown; the error budget has the same limit."""
 MOST_NAMED = 3
 
 
@@ -46,6 +44,16 @@ def headline(answer: Answer) -> Headline:
         answer: Content of ``diagnosis.json``; what it lacks is left out.
     """
     return Headline(_verdict(answer), _closed(answer), _next_step(answer), _caveats(answer))
+
+
+def enough_runs(count: int) -> bool:
+    """Whether an interval over so many runs is shown: the same limit as in the error budget."""
+    return count >= POLICY.fewest_runs_for_interval
+
+
+def many_fitted(answer: Answer) -> bool:
+    """Whether enough runs were fitted for intervals over them; older answers do not say."""
+    return enough_runs(int(answer.get("fitted_runs", POLICY.fewest_runs_for_interval)))
 
 
 def _verdict(answer: Answer) -> str:
@@ -94,7 +102,7 @@ def _closed(answer: Answer) -> str:
     percent = 100.0 * min(max(share["estimate"], 0.0), 1.0)
     count, noun = len(gain["final_runs"]), _noun(answer)
     low, high = (100.0 * end for end in share["ci95"])
-    interval = f" (95 % interval: {low:.0f} to {high:.0f} %)" if count >= FEWEST_RUNS else ""
+    interval = f" (95 % interval: {low:.0f} to {high:.0f} %)" if enough_runs(count) else ""
     return (
         f"The extended model closes {percent:.0f} % of the gap between the refitted simulation and "
         f"the noise{interval}, on {count} held-out {noun}{'s' * (count != 1)}."
@@ -149,7 +157,7 @@ def _caveats(answer: Answer) -> str:
     if _doubtful(answer):
         found.append("held-out predictions hardly improve, so the named cause is doubtful")
     gain = answer.get("gain")
-    if gain and 0 < len(gain["final_runs"]) < FEWEST_RUNS:
+    if gain and gain["final_runs"] and not enough_runs(len(gain["final_runs"])):
         noun = _noun(answer)
         count = len(gain["final_runs"])
         held = f"one held-out {noun} gives" if count == 1 else f"{count} held-out {noun}s give"

@@ -23,7 +23,7 @@ BIWEIGHT = 4.685
 """Tuning constant with 95 % efficiency for normal noise (Holland and Welsch, 1977)."""
 ROUNDS = 8
 _ANGLES = ("roll", "yaw")
-_NORMAL = 0.6745
+NORMAL_MEDIAN = 0.6745
 """Median of the absolute value of a standard normal number."""
 
 
@@ -70,7 +70,7 @@ def interpolator_of(windows: Sequence[FloatArray]) -> Interpolator | None:
         root = np.sqrt(trust)
         weights[1:] = np.linalg.lstsq(pairs[:, 1:] * root[:, None], target * root, rcond=1e-10)[0]
         errors = target - pairs @ weights
-        scale = max(float(np.median(np.abs(errors))) / _NORMAL, 1e-12)
+        scale = max(float(np.median(np.abs(errors))) / NORMAL_MEDIAN, 1e-12)
         trust = np.maximum(1.0 - (errors / (BIWEIGHT * scale)) ** 2, 0.0) ** 2
     return Interpolator(weights, scale)
 

@@ -18,6 +18,7 @@ from fish_env.data.units import unwrap_angle
 from fish_env.errors import RoboticFishError
 from fish_env.rigidbody.comparisons import Comparison, compared
 from fish_env.rigidbody.gridded import GridRun, averaged, grown
+from fish_env.rigidbody.interpolation import NORMAL_MEDIAN
 from fish_env.simulator import Simulator
 
 BEAT_S = 1.0
@@ -30,8 +31,6 @@ STEP_S = 0.02
 """s. Physics step: only averages are wanted."""
 BY_NOISE = 1e-3
 """Probability that noise alone makes a way that counts."""
-QUARTILE = 0.6745
-"""Median of the absolute value of a standard normal number."""
 AGAINST = "against commands"
 Simulated = dict[str, FloatArray]
 
@@ -133,4 +132,4 @@ def _noise(column: FloatArray) -> float:
     """Standard deviation of white noise in a column, from its second differences."""
     bends = np.abs(np.diff(column, 2))
     bends = bends[np.isfinite(bends)]
-    return float(np.median(bends)) / (QUARTILE * np.sqrt(6.0)) if len(bends) else 0.0
+    return float(np.median(bends)) / (NORMAL_MEDIAN * np.sqrt(6.0)) if len(bends) else 0.0

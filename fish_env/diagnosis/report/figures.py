@@ -12,7 +12,7 @@ import numpy as np
 
 from fish_env.arrays import FloatArray
 from fish_env.data.vocabulary import COMMANDS
-from fish_env.diagnosis.headline import FEWEST_RUNS
+from fish_env.diagnosis.headline import many_fitted
 from fish_env.diagnosis.regimes import LEVEL, Localisation
 from fish_env.diagnosis.report.series import RunSeries, SteadySeries
 from fish_env.diagnosis.report.units import label, shown_unit
@@ -184,7 +184,7 @@ def draw_ranking(answer: Plain, album: Album) -> Path:
     accepted = {cause["name"] for cause in answer["causes"]}
     meaning = LEFT_OUT_GAIN.format("conditions" if answer.get("kind") == "steady" else "runs")
     gains = [row["score"] for row in rows]
-    over_runs = answer.get("fitted_runs", FEWEST_RUNS) >= FEWEST_RUNS
+    over_runs = many_fitted(answer)
     with sheet(7.0, 0.9 + 0.32 * len(rows)) as figure:
         ax = figure.subplots()
         for i, (row, gain) in enumerate(zip(rows, gains, strict=True)):

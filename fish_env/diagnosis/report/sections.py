@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fish_env.diagnosis.headline import EXPERIMENT_FILE, FEWEST_RUNS, headline
+from fish_env.diagnosis.headline import EXPERIMENT_FILE, enough_runs, headline, many_fitted
 from fish_env.diagnosis.report import figures as draw
 from fish_env.diagnosis.report.figures import Album
 from fish_env.diagnosis.report.html import (
@@ -201,7 +201,7 @@ def _gain_words(found: Answer, noun: str) -> str:
         )
     if share:
         low, high = share["ci95"]
-        many = len(found.get("final_runs", ())) >= FEWEST_RUNS
+        many = enough_runs(len(found.get("final_runs", ())))
         interval = f" (95 %: {100 * low:.0f} to {100 * high:.0f} %)" if many else ""
         said.append(
             f"It closes {100 * share['estimate']:.0f} % of the gap between the refitted baseline "
@@ -277,13 +277,9 @@ def ranking(answer: Answer, series: Series, album: Album) -> str:
     caption = (
         "How much better each refitted cause predicts what was left out of the fit. "
         "Full bars: accepted. Hatched bars: rejected."
-        + (" Lines: 95 % intervals over runs." if _many_fitted(answer) else "")
+        + (" Lines: 95 % intervals over runs." if many_fitted(answer) else "")
     )
     return section("Ranking", figure(draw.draw_ranking(answer, album), caption), key="ranking")
-
-
-def _many_fitted(answer: Answer) -> bool:
-    return int(answer.get("fitted_runs", FEWEST_RUNS)) >= FEWEST_RUNS
 
 
 def experiment(answer: Answer, series: Series, album: Album) -> str:

@@ -31,6 +31,7 @@ from fish_env.identification.own_beats import own_beats, with_own_beats
 from fish_env.identification.recorded import recorded
 from fish_env.identification.sensors import without_outliers
 from fish_env.identification.series import SeriesProblem, series_of
+from fish_env.identification.tail_drive import tail_drive
 from fish_env.identification.writing import identified_fish
 from fish_env.inference.effort import effort_of
 from fish_env.inference.estimate.fit import Fit
@@ -155,6 +156,7 @@ def _diagnose_runs(
     fitted, final = fitted_and_final(dataset, seed)
     progress("comparing the beats of the runs")
     every = SeriesProblem(dataset, fish, dt=effort.step_s)
+    every = every.with_drive(tail_drive(inputs.drive))
     if effort.retries:
         every = with_own_beats(every, own_beats(every))
     chosen = _named(every, fitted)

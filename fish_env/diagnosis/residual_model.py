@@ -38,7 +38,7 @@ POOL = 32
 MOST = 8
 APART = 1e-3
 """Share of a wrench that those already chosen must leave."""
-ROUNDS, ROUNDS_BESIDE = 4, 2
+ROUNDS, ROUNDS_BESIDE = 4, 1
 """Most rounds of choosing and fitting: alone, and beside causes, where a round takes longest."""
 RESTING = 0.3
 """Standard errors by which sizes may still move at the end."""

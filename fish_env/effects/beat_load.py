@@ -41,7 +41,6 @@ EFFECT = Effect(
     ),
     hooks={"inputs": slow_beat},
     drifts_in_phase=True,
-    diagnosed=False,
     confusable_with=(
         "battery_sag",
         "frequency_scale",

@@ -18,7 +18,6 @@ from scipy.special import chdtrc, fdtrc
 from fish_env.arrays import FloatArray
 from fish_env.data.schema import CommandSteps, Dataset, Run
 from fish_env.data.vocabulary import COMMANDS
-from fish_env.model.effect import Effect
 from fish_env.params.schema import FishParams
 
 SWAYING = ("r", "yaw", "v", "y")
@@ -30,9 +29,6 @@ SURE = 1e-6
 """p-value of a sway that is taken for one."""
 UNEVEN, BY_CHANCE = 0.01, 1e-4
 """Spread of ratios between runs worth a word, and its p-value."""
-BESIDE = (-6e-3, -3e-3, 0.0, 3e-3, 6e-3)
-"""Departures from the measured beat that a fit begins from: less than a third of a cycle in a run
-of a minute."""
 _AMPLITUDE, _FREQUENCY = (list(COMMANDS).index(f"tail_{n}") for n in ("amplitude", "frequency"))
 
 
@@ -189,18 +185,3 @@ def own_ratio(fish: FishParams) -> float:
     # Recorded time is true time over the clocks' scales.
     names = ("frequency_scale", "clock_scale", "clock_skew")
     return math.prod(float(fish.effects.get(name, {}).get("scale", 1.0)) for name in names)
-
-
-def beside_measured(effect: Effect, beat: float) -> tuple[dict[str, float], ...]:
-    """Sizes of an effect that scales the beat, around what was measured.
-
-    For runs whose phase at the start is unknown: of a comb of sizes each would have its own.
-
-    Args:
-        effect: the effect; none of one that scales no beat.
-        beat: measured over commanded frequency.
-    """
-    scales = [p.name for p in effect.switching if p.neutral == 1.0 and p.unit == "-"]
-    if not effect.drifts_in_phase or len(scales) != 1:
-        return ()
-    return tuple({scales[0]: beat + off} for off in BESIDE)

@@ -17,6 +17,9 @@ import numpy as np
 from fish_env.arrays import FloatArray
 from fish_env.identification.runs import FREQUENCY, PHASE, RunData
 from fish_env.identification.series import SeriesProblem
+from fish_env.identification.tail_drive import SCALE, tail_drive
+from fish_env.inference.hypotheses import effects_of
+from fish_env.inference.problem import Point
 
 COARSE: FloatArray = np.asarray(1.0 + np.arange(-24, 25) * 5e-3)
 """Frequencies over the commanded one of all runs together, tried on their beginnings."""
@@ -32,6 +35,9 @@ LEAST = 1.5e-3
 CLEARLY = 0.2
 """Share of what the common beat leaves that a run's own has to take away. Chance takes one per
 cent, for a hundred independent residuals a run."""
+WANDER = 0.03
+"""Random walk of their phases (rad/s^0.5) that a fit begins with where runs beat differently: no
+such beat is constant to the last. Its size is then estimated with the disturbance."""
 FEWEST = 3
 
 
@@ -40,11 +46,12 @@ class OwnBeats:
     """Tail frequencies that suit runs best.
 
     Attributes:
-        common: frequency over the commanded one, of all runs together; 1 where none is clear.
+        common: frequency over the commanded one, of all runs together, beside what was known of
+            the drive; None where none is clear.
         own: frequency over that of all runs, by run id; runs that do not differ are left out.
     """
 
-    common: float = 1.0
+    common: float | None = None
     own: Mapping[str, float] = field(default_factory=dict)
 
 
@@ -87,10 +94,13 @@ def with_own_beats(problem: SeriesProblem, beats: OwnBeats) -> SeriesProblem:
         problem: some of the runs.
         beats: what runs beat at. What they share is told to the problem and left to its effects.
     """
-    if beats.own:
-        runs = [_beating(run, beats.own.get(run.id, 1.0)) for run in problem.runs]
-        problem = problem.with_runs(runs)
-    return problem.with_beat(beats.common)
+    measured = dict(problem.drive.measured)
+    if beats.common is not None:
+        measured[SCALE] = beats.common
+    if not beats.own:
+        return problem.with_drive(tail_drive(measured))
+    runs = [_beating(run, beats.own.get(run.id, 1.0)) for run in problem.runs]
+    return problem.with_runs(runs).with_drive(tail_drive(measured, WANDER))
 
 
 def _beating(run: RunData, beat: float) -> RunData:
@@ -108,13 +118,16 @@ def _with_free_phase(run: RunData) -> RunData:
 def _left(problem: SeriesProblem, comb: FloatArray) -> FloatArray | None:
     """Squared innovations (n, R) that each frequency leaves in each run; None if none can be."""
     noise = problem.default_noise()
-    settled = problem.settled(problem.start, noise)
+    own = {path: value for path, value in problem.drive.measured.items() if path != SCALE}
+    begin = Point(problem.start.z, {**problem.neutral(effects_of(own)), **own})
+    settled = problem.settled(begin, noise)
     try:
-        filtered = settled.filtered(problem.start, noise)
+        filtered = settled.filtered(begin, noise)
     except np.linalg.LinAlgError:
         return None
-    z = np.repeat(settled.start.z[:, None], len(comb), axis=1)
-    rows = settled.innovations(z, {"effects.frequency_scale.scale": comb}, noise, filtered)
+    z = np.repeat(begin.z[:, None], len(comb), axis=1)
+    held = {path: np.full(len(comb), value) for path, value in begin.effects.items()}
+    rows = settled.innovations(z, {**held, SCALE: comb}, noise, filtered)
     ends = np.cumsum([run.measured.size for run in settled.runs])[:-1]
     parts = [np.sum(own * own, axis=1) for own in np.split(rows, ends, axis=1)]
     found = np.column_stack(parts)

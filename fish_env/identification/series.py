@@ -16,7 +16,6 @@ from fish_env.effects import catalogue
 from fish_env.effects.extended import ExtendedModel, build_model
 from fish_env.errors import EffectError
 from fish_env.identification.applied_wrench import EFFECT as APPLIED_WRENCH
-from fish_env.identification.beats import beside_measured
 from fish_env.identification.channels import usable_channels
 from fish_env.identification.filtering import (
     Filtered,
@@ -39,6 +38,7 @@ from fish_env.identification.phases import settle_phases
 from fish_env.identification.runs import FINER, RunData, prepare_run
 from fish_env.identification.sensor_errors import slopes_of_runs
 from fish_env.identification.sensors import largest_noise
+from fish_env.identification.tail_drive import TailDrive
 from fish_env.identification.variation import EVERY, SENSOR_ERRORS, VARIATIONS
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.hypotheses import effects_of
@@ -68,6 +68,7 @@ class SeriesProblem(Problem):
     """
 
     known: dict[str, Effect]
+    drive: TailDrive
     out_of_step = ("frequency_scale", "battery_sag", "clock_scale", "clock_skew")
     interchangeable = ALIKE
     variations = EVERY
@@ -100,7 +101,7 @@ class SeriesProblem(Problem):
         self.baseline = Baseline(self.fish, paths)
         self.effects = tuple(effects)
         self.unrefined = False
-        self.beat = 1.0
+        self.drive = TailDrive()
         self._filters: dict[frozenset[str], RunFilter] = {}
         unknown = [name for name in self.effects if name not in self.known]
         if unknown:
@@ -195,7 +196,7 @@ class SeriesProblem(Problem):
 
     def default_noise(self) -> NoiseModel:
         """Sensor noise from differences of the data, and a disturbance of a few millinewton."""
-        return small_disturbance(self.sensor_sd)
+        return replace(small_disturbance(self.sensor_sd), phase_sd=self.drive.phase_sd)
 
     def fitted_noise(
         self,
@@ -233,17 +234,17 @@ class SeriesProblem(Problem):
 
     def follows_drive(self, noise: NoiseModel) -> bool:
         """Whether the tail's phase is a random walk."""
-        return noise.phase_sd > 0.0
+        return noise.phase_sd >= RANDOM_WALK_PHASE
 
     def starting_grid(self, name: str) -> tuple[Mapping[str, float], ...]:
         """Sizes of an effect that drifts in phase, close enough to put it in step again."""
         if not self.starts_known:
-            return beside_measured(self.known[name], self.beat)
+            return self.drive.beside(self.known[name])
         return phase_grid(self.known[name], max(run.beats for run in self.runs))
 
-    def with_beat(self, beat: float) -> SeriesProblem:
-        """The same problem, told at what multiple of the commanded frequency all runs beat."""
-        return self._but(beat=beat)
+    def with_drive(self, drive: TailDrive) -> SeriesProblem:
+        """The same problem, told how the tail beats."""
+        return self._but(drive=drive)
 
     def batch_key(self, effects: Iterable[str]) -> frozenset[str]:
         """Stages of the quickest kernel."""
@@ -367,8 +368,7 @@ class SeriesProblem(Problem):
 
     def refines_steps(self, effects: Iterable[str]) -> bool:
         """Whether one of these effect parameters makes the tail's rate jump."""
-        names = (*effects_of(effects), *self.model.effects)
-        return not self.unrefined and self.is_nonsmooth(names)
+        return not self.unrefined and self.is_nonsmooth({*effects_of(effects), *self.model.effects})
 
     def is_nonsmooth(self, names: Iterable[str]) -> bool:
         """Whether one of these effects makes the tail's rate jump, whatever the steps."""

@@ -11,7 +11,7 @@ from scipy.special import stdtrit
 
 from fish_env.arrays import FloatArray
 from fish_env.inference.adequacy import disturbance_at_limit, implausible_estimates
-from fish_env.inference.drive import beside_drive
+from fish_env.inference.drive import beside_drive, measured
 from fish_env.inference.effort import FULL, Effort
 from fish_env.inference.elimination import backward_elimination
 from fish_env.inference.estimate.fit import Fit, finished, refined
@@ -97,7 +97,7 @@ def attribute(
         report: told what is being done.
     """
     nothing = Explanation((), baseline)
-    relax = effort.retries and disturbance_at_limit(baseline)
+    relax = effort.retries and disturbance_at_limit(baseline) and not problem.drive.known
     first, _ = both(  # where the disturbance is at its limit, relaxed noise is tried in any case
         partial(screen, baseline, causes, rng),
         lambda: nothing.with_relaxed_noise if relax else None,
@@ -126,7 +126,7 @@ def extended(
             test says that something is missing.
     """
     search = Search(causes, rng, effort, report, relaxed_log_p)
-    found, together = begun, effort.retries
+    found, together = search.measured(begun), effort.retries
     while len(found.accepted.causes) < POLICY.most_causes:
         if found.accepted.causes and together:
             found, together = search.together(found), False
@@ -177,6 +177,21 @@ class Search:
     report: Callable[[str], None]
     relaxed_log_p: float
 
+    def measured(self, begun: Attribution) -> Attribution:
+        """With what was measured to put the drive in step; the same without such, or beside causes.
+
+        Whatever else is wrong shows only once the drive is in step.
+        """
+        nothing = begun.accepted
+        accepted = None if nothing.causes else measured(nothing, self.report)
+        if accepted is None:
+            return begun
+        after = screen(accepted.fit, self.causes, self.rng)
+        return replace(
+            begun, accepted=accepted, screens=(*begun.screens, after),
+            gain=nothing.score - accepted.score,
+        )  # fmt: skip
+
     def together(self, found: Attribution) -> Attribution:
         """With further effects that are needed beside those found; the same without such."""
         before, rough = found.accepted, roughness(found.accepted)
@@ -200,9 +215,11 @@ class Search:
             begun: without a cause.
             best: with the best single cause; without one where none shows.
         """
-        if not (self.effort.retries and disturbance_at_limit(best.fit)):
-            return None
         nothing = begun.accepted
+        if not self.effort.retries or nothing.fit.problem.drive.known:
+            return None
+        if not disturbance_at_limit(best.fit):
+            return None
         more = beside_drive(nothing, best, self.causes, self.rng, self.effort, self.report)
         if more is None:
             return None
@@ -355,7 +372,9 @@ def _may_be_out_of_step(current: Explanation, chosen: Sequence[Signal]) -> bool:
 
     A drive out of step hides everything else, so it is the first cause to be found or none.
     """
-    return not current.causes and bool(chosen) and bool(disturbance_at_limit(current.fit))
+    if current.causes or current.fit.problem.drive.known:
+        return False
+    return bool(chosen) and bool(disturbance_at_limit(current.fit))
 
 
 def _new(after: Screen, chosen: Sequence[Signal]) -> list[Signal]:

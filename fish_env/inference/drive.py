@@ -10,18 +10,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from fish_env.inference.adequacy import implausible_estimates
 from fish_env.inference.effort import Effort
-from fish_env.inference.estimate.fit import Fit
-from fish_env.inference.explanation import FEW_RUNS, Explanation, fitted_again
+from fish_env.inference.estimate.fit import Fit, fit
+from fish_env.inference.explanation import FEW_RUNS, Explanation, fitted_again, reached
+from fish_env.inference.hypotheses import effect_of
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause
+from fish_env.inference.problem import Point
 from fish_env.inference.screening import screen
 from fish_env.inference.search import refits
 from fish_env.inference.shortlist import shortlisted
+from fish_env.inference.starts import baselines
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,6 +41,34 @@ class Followed:
     explanation: Explanation
     tried: Sequence[Explanation]
     base: Explanation
+
+
+def measured(nothing: Explanation, report: Callable[[str], None]) -> Explanation | None:
+    """The effects that were measured to put the drive in step, fitted.
+
+    Args:
+        nothing: the refitted baseline.
+        report: told what is being done.
+
+    Returns:
+        The explanation by these effects; None where none was measured, or where they explain no
+        more than the baseline does.
+    """
+    own = nothing.fit
+    values = own.problem.drive.in_step
+    if not values:
+        return None
+    effects = tuple(dict.fromkeys(effect_of(path) for path in values))
+    report(f"putting the drive in step by {' and '.join(effects)}")
+    few, noise = own.problem.subset(FEW_RUNS), own.problem.default_noise()
+    begin = [Point(z, values) for z in baselines(own)]
+    tried = [reached(partial(fit, few, effects, point, noise, rounds=1)) for point in begin]
+    best = min((f for f in tried if f), key=lambda f: f.objective, default=None)
+    whole = fitted_again(own.problem, best, best.noise) if best else None
+    if whole is None:
+        return None
+    found = Explanation(effects, whole)
+    return found if nothing.score - found.score >= POLICY.evidence_doubt else None
 
 
 def beside_drive(

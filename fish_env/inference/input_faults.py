@@ -6,6 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+LONGEST = 90
+"""Characters of a line that a sentence can hold; one that names many runs is longer."""
+
 
 @dataclass(frozen=True)
 class InputFault:
@@ -20,7 +23,7 @@ class InputFault:
         interval: 95 % interval of the value; None where it is exact.
         p: bound on the probability of as much evidence by chance, over all tests that were made.
         log_evidence: log likelihood that putting it right gains; None where p is from a test.
-        fix: the line of the description to write.
+        fix: the line of the description to write; empty where the vehicle itself does so.
         words: what is wrong, a clause.
         comparison: what the mistake shows in.
         before: disagreement in that as declared: 0 the same, 1 unrelated, 2 opposite.
@@ -55,10 +58,14 @@ class InputFault:
         named = self.words.split()[0].strip(",") in self.target.replace(",", " ").split()
         begin = self.words[0] if named else self.words[0].upper()
         first = f"{begin}{self.words[1:]}{self._range}."
-        if self.decisive:
-            second = f" Write `{self.fix}`" + "".join(f", or `{a}`" for a in self.alternatives)
-        else:
-            second = f" This is not certain; if it is so, write `{self.fix}`"
+        if not self.fix:
+            return first
+        fixes = [self.fix, *self.alternatives] if self.decisive else [self.fix]
+        short = [f"`{fix}`" for fix in fixes if len(fix) <= LONGEST]
+        written = ", or ".join(short) or "what `fix` says under `inputs` in diagnosis.json"
+        second = f" Write {written}"
+        if not self.decisive:
+            second = f" This is not certain; if it is so, write {written}"
         return f"{first}{second}{self._gain}."
 
     @property

@@ -8,7 +8,7 @@ implementations; ``docs/your-own.md`` shows a fourth.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
@@ -99,6 +99,19 @@ class GenericTerms(Protocol):
         ...
 
 
+@dataclass(frozen=True)
+class Drive:
+    """What was measured of a periodic drive, without a model of what it moves.
+
+    Attributes:
+        in_step: effect parameters that put the model's drive in step with it, by path.
+        known: whether it is in step but for these.
+    """
+
+    in_step: Mapping[str, float] = field(default_factory=dict)
+    known: bool = False
+
+
 class Problem(Protocol):
     """Measured runs of a vehicle, the model that should explain them, and its freedom.
 
@@ -116,6 +129,7 @@ class Problem(Protocol):
             periods no small change tells which way to go.
         interchangeable: sets of coefficients that act alike.
         variations: what runs may differ in, K of them.
+        drive: what was measured of a periodic drive.
         coefficient_step: change of a coefficient (in units of its prior) that slopes are taken by.
     """
 
@@ -125,6 +139,7 @@ class Problem(Protocol):
     out_of_step: tuple[str, ...] = ()
     interchangeable: tuple[frozenset[str], ...] = ()
     variations: tuple[RunVariation, ...] = ()
+    drive: Drive = Drive()
     coefficient_step: float = 0.05
 
     @property

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from fish_env.data.retiming import Clocks, retimed
 from fish_env.data.schema import Dataset
 from fish_env.diagnosis.inputs.changes import Change
 from fish_env.diagnosis.inputs.clocks import strokes_of
+from fish_env.diagnosis.inputs.drive_law import DriveLaw, drive_law
 from fish_env.diagnosis.inputs.fine import BIAS, Fine, fine_clock
 from fish_env.diagnosis.inputs.ratios import ratio_near
 from fish_env.diagnosis.inputs.search import Found, search
@@ -20,6 +22,7 @@ from fish_env.diagnosis.inputs.weighing import BEAT, Scales
 from fish_env.errors import DatasetError
 from fish_env.identification.beats import own_ratio
 from fish_env.identification.recorded import recorded
+from fish_env.inference.hypotheses import effect_of
 from fish_env.inference.input_faults import InputFault
 from fish_env.params.io import load_fish
 from fish_env.params.schema import FishParams
@@ -31,6 +34,8 @@ ORDINARY_BEAT = 0.15
 `frequency_scale` describes it, and runs of a real robot differ as much. Beyond, a command or a
 clock is wrong."""
 TIMES = ("clock", "clock_skew", "beat")
+AS_IT_IS = Change("beat", "tail_frequency", None, "-", "", "")
+"""Nothing is read otherwise."""
 PACES = ("frequency_scale", "clock_scale", "clock_skew")
 """Effects by which a fish makes another frequency of the commanded one."""
 
@@ -43,11 +48,14 @@ class Inputs:
         faults: mistakes, the clearest first.
         dataset: the data with what is decisive put right.
         logged: the data as they were given.
+        drive: by how much the tail beats otherwise than commanded in all runs, as effects say it:
+            ``effects.<name>.<parameter>`` -> about its value.
     """
 
     faults: tuple[InputFault, ...]
     dataset: Dataset
     logged: Dataset
+    drive: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def binding(self) -> bool:
@@ -79,13 +87,50 @@ def check_inputs(dataset: Dataset, fish: FishParams | None = None, seed: int = 0
         faults.append(fault)
         if fault.corrected:
             dataset = one.change.applied(dataset)
-    fine = fine_clock(right, np.random.default_rng([seed, 2]))
-    if fine is not None:
-        fault = _fine_fault(fine)
+    seen = _seen(right, np.random.default_rng([seed, 2]))
+    left = [one.change for one in found if _left_to_effects(one.change)]
+    if seen.of_runs:  # says the same and more
+        faults = [fault for fault in faults if fault.fix not in {change.line for change in left}]
+    for fault, change in seen.told:
         faults.append(fault)
         if fault.corrected:
-            dataset = fine.change.applied(dataset)
-    return Inputs(tuple(faults), _noted(dataset, faults), logged)
+            dataset = change.applied(dataset)
+    drive = seen.law.starts(math.prod(change.clocks[""].beat for change in left))
+    drive = {path: v for path, v in drive.items() if effect_of(path) not in nominal.effects}
+    return Inputs(tuple(faults), _noted(dataset, faults), logged, drive)
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """What a closer look at clocks and beats finds.
+
+    Attributes:
+        law: what the beat does in all runs, and is not put right.
+        told: faults, with what puts them right.
+        of_runs: whether more is known of the beats than their ratio in all runs.
+    """
+
+    law: DriveLaw
+    told: Sequence[tuple[InputFault, Change]]
+    of_runs: bool
+
+
+def _seen(right: Dataset, rng: np.random.Generator) -> _Seen:
+    law = drive_law(right)
+    lawful = bool(law.sizes)
+    fine = fine_clock(law.following(right), rng, lawful)
+    told = [(_law_fault(law), AS_IT_IS)] if lawful else []
+    if fine is None:
+        return _Seen(law, told, lawful)
+    told.append((_fine_fault(fine), fine.change))
+    single = "" not in fine.change.clocks
+    # Ratios of single runs hold what they have in common, unless a law does.
+    return _Seen(law if lawful or not single else replace(law, common=1.0), told, lawful or single)
+
+
+def _left_to_effects(change: Change) -> bool:
+    """Whether a change is a beat in all runs that is put right to look on, but not in the data."""
+    return _ordinary(change) and "" in change.clocks
 
 
 def as_told(dataset: Dataset, fish: FishParams) -> tuple[FishParams, Dataset]:
@@ -142,6 +187,14 @@ def _derived_fault(one: Derived) -> InputFault:
     )  # fmt: skip
 
 
+def _law_fault(law: DriveLaw) -> InputFault:
+    """What a law of the beat says: nothing to put right, the drive itself does so."""
+    return InputFault(
+        AS_IT_IS.kind, AS_IT_IS.target, None, "-", None, law.p, None, "", law.words, BEAT, None,
+        None, decisive=True, binds=False, corrected=False,
+    )  # fmt: skip
+
+
 def _fault(one: Found, right: Dataset) -> InputFault:
     change = one.change
     ordinary = _ordinary(change)
@@ -149,7 +202,7 @@ def _fault(one: Found, right: Dataset) -> InputFault:
         change.kind, change.target, change.value, change.unit,
         _interval(change, right), one.p, one.gain, change.line, change.words,
         one.comparison, one.before, one.after, tuple(rival.line for rival in one.rivals),
-        decisive=True, binds=not ordinary, corrected=not ordinary or "" not in change.clocks,
+        decisive=True, binds=not ordinary, corrected=not _left_to_effects(change),
     )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ second makes angles grow faster than their rates say, and by the same per cent.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import chdtrc, ndtr, ndtri
@@ -54,12 +54,13 @@ class Fine:
     sure: bool
 
 
-def fine_clock(dataset: Dataset, rng: np.random.Generator) -> Fine | None:
+def fine_clock(dataset: Dataset, rng: np.random.Generator, beside_law: bool = False) -> Fine | None:
     """A clock, or a beat, that is off by little; None if neither is.
 
     Args:
-        dataset: with what is grossly wrong put right.
+        dataset: with what is grossly wrong put right, and commands as a law of the beat has them.
         rng: for the resampling of the kinematic test.
+        beside_law: whether a law says what the runs share: only their differences are looked for.
     """
     strokes = strokes_of(dataset)
     single = {run: ratio_near([stroke]) for run, stroke in strokes.items()}
@@ -67,8 +68,14 @@ def fine_clock(dataset: Dataset, rng: np.random.Generator) -> Fine | None:
     p = _uneven(list(known.values()))
     if p is not None:
         ratios = _of_every_run(dataset, known)
-        return Fine(beat(ratios), (min(ratios.values()), max(ratios.values())), p, (), True)
-    whole = ratio_near(list(strokes.values()))
+        if beside_law:
+            middle = float(np.median(list(ratios.values())))
+            ratios = {run: ratio / middle for run, ratio in ratios.items()}
+        change = beat(ratios)
+        if beside_law:
+            change = replace(change, words=f"beside that, {change.words}")
+        return Fine(change, (min(ratios.values()), max(ratios.values())), p, (), True)
+    whole = None if beside_law else ratio_near(list(strokes.values()))
     if whole is None or not _off(whole):
         return None
     return _clock_or_beat(dataset, whole, rng)

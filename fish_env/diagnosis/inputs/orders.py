@@ -31,7 +31,9 @@ FINENESS = 0.12
 """Step of the multiples, in cycles at the end of a window."""
 NYQUIST = 0.45
 """Cycles a sample up to which a sway can be seen."""
-_AMPLITUDE, _FREQUENCY = (list(COMMANDS).index(f"tail_{n}") for n in ("amplitude", "frequency"))
+_OFFSET, _AMPLITUDE, _FREQUENCY = (
+    list(COMMANDS).index(f"tail_{n}") for n in ("offset", "amplitude", "frequency")
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,12 +45,15 @@ class Stroke:
         amplitude: (n,) commanded amplitude, rad.
         sway: (n,) channel in which the beat shows, NaN in gaps.
         step_s: s.
+        terms: (n, 3) what may slow a drive: time since the start of the run (s), offset without
+            its sign (rad), and speed of the stroke, 2 pi times amplitude times frequency (rad/s).
     """
 
     phase: FloatArray
     amplitude: FloatArray
     sway: FloatArray
     step_s: float
+    terms: FloatArray
 
 
 def stroke_of(run: GridRun, steps: CommandSteps) -> Stroke | None:
@@ -63,7 +68,9 @@ def stroke_of(run: GridRun, steps: CommandSteps) -> Stroke | None:
     row = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, len(frequency) - 1)
     cycles = turned[row] + np.maximum(times - steps.times_s[row], 0.0) * frequency[row]
     amplitude = steps.values[row, _AMPLITUDE]
-    return Stroke(2.0 * np.pi * cycles, amplitude, run.channels[channel], run.step_s)
+    speed = 2.0 * np.pi * amplitude * frequency[row]
+    terms = np.column_stack([run.since_s, np.abs(steps.values[row, _OFFSET]), speed])
+    return Stroke(2.0 * np.pi * cycles, amplitude, run.channels[channel], run.step_s, terms)
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +83,7 @@ class Window:
         slow: (n, k) orthonormal basis of what is slow.
         sway: (n,) what is left of the channel.
         rate: commanded frequency at its quickest, cycles a sample.
+        terms: (3,) mean of the stroke's.
     """
 
     phase: FloatArray
@@ -83,6 +91,7 @@ class Window:
     slow: FloatArray
     sway: FloatArray
     rate: float
+    terms: FloatArray
 
 
 def windows_of(stroke: Stroke, multiple: float) -> list[Window]:
@@ -112,6 +121,7 @@ def _window(stroke: Stroke, at: IntArray) -> Window:
         slow,
         sway - slow @ (slow.T @ sway),
         rate,
+        stroke.terms[at].mean(axis=0),
     )
 
 

@@ -61,25 +61,45 @@ def ratio_near(strokes: Sequence[Stroke], near: float = 1.0) -> Ratio | None:
 
 def _refined(windows: Sequence[Window], near: float) -> Ratio:
     """Mean over windows of where each explains most, weighted by how clearly it does."""
-    multiples = near * np.linspace(1.0 - SIDE, 1.0 + SIDE, 2 * REFINED + 1)
-    shares = np.array([explained(w, multiples) for w in windows])
+    shares, found = peaks_of(windows, near)
     total = shares.mean(axis=0)
     centre = int(np.argmax(total))
-    peaks, weights = [], []
-    for share in shares:
-        at = int(np.argmax(share))
-        if 0 < at < len(multiples) - 1 and share[at] > CLEAR:
-            peaks.append(_vertex(multiples[at - 1 : at + 2], share[at - 1 : at + 2]))
-            weights.append(share[at] / (1.01 - share[at]))
-    if len(peaks) < 2:
-        return Ratio(float(multiples[centre]), SIDE * near, float(total[centre]))
-    value, weight = np.array(peaks), np.array(weights)
+    known = np.isfinite(found[:, 0])
+    if known.sum() < 2:
+        return Ratio(float(_around(near)[centre]), SIDE * near, float(total[centre]))
+    value, weight = found[known].T
     middle = float(np.median(value))
     kept = np.abs(value - middle) < 0.03 * near
     value, weight = value[kept], weight[kept] / weight[kept].sum()
     mean = float(weight @ value)
     sd = float(np.sqrt(weight**2 @ (value - mean) ** 2 * len(value) / max(len(value) - 1, 1)))
     return Ratio(mean, max(sd, 1e-4), float(total[centre]))
+
+
+def peaks_of(windows: Sequence[Window], near: float) -> tuple[FloatArray, FloatArray]:
+    """Where each window explains most, close to a multiple of the commanded frequency.
+
+    Args:
+        windows: N of them.
+        near: the multiple.
+
+    Returns:
+        (N, m) share of the sway at each multiple tried, and (N, 2) the multiple with the largest
+        share and its weight, NaN where no share is clear.
+    """
+    multiples = _around(near)
+    shares = np.array([explained(w, multiples) for w in windows]).reshape(-1, len(multiples))
+    found = np.full((len(windows), 2), np.nan)
+    for share, peak in zip(shares, found, strict=True):
+        at = int(np.argmax(share))
+        if 0 < at < len(multiples) - 1 and share[at] > CLEAR:
+            peak[0] = _vertex(multiples[at - 1 : at + 2], share[at - 1 : at + 2])
+            peak[1] = share[at] / (1.01 - share[at])
+    return shares, found
+
+
+def _around(near: float) -> FloatArray:
+    return np.asarray(near * np.linspace(1.0 - SIDE, 1.0 + SIDE, 2 * REFINED + 1))
 
 
 def _vertex(x: FloatArray, y: FloatArray) -> float:

@@ -1,0 +1,161 @@
+"""How the beat of the tail departs from its command: with time, with offset, with its own speed.
+
+Order tracking gives the beat of every few cycles, whatever forces act on the hull. A regression of
+these ratios on what is known to slow a drive says where a fit may begin. From a drive that is out
+of step no slope leads to the right size.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from scipy.special import stdtr
+
+from fish_env.arrays import BoolArray, FloatArray, IntArray
+from fish_env.data.schema import CommandSteps, Dataset, Run
+from fish_env.data.vocabulary import COMMANDS
+from fish_env.diagnosis.inputs.clocks import strokes_of
+from fish_env.diagnosis.inputs.orders import windows_of
+from fish_env.diagnosis.inputs.ratios import peaks_of, ratio_near
+from fish_env.identification.tail_drive import SCALE
+
+TERMS = ("battery_sag.rate", "beat_load.offset", "beat_load.load")
+"""Effect parameters by which the beat falls, in the order of the windows' terms."""
+SAID = {
+    "battery_sag.rate": "more with each second of a run (`battery_sag`)",
+    "beat_load.offset": "for each radian of its offset (`beat_load`)",
+    "beat_load.load": "for each rad/s of its stroke (`beat_load`)",
+}
+SMALLEST = (2e-4, 0.05, 2e-3)
+"""The least that the catalogue takes for plausible. Without any such effect the regression finds
+less than a third of it."""
+LEVEL = 0.05
+"""Of a two-sided t-test. A term only begins a fit, whose evidence decides."""
+FAR = 3.5
+"""Robust standard deviations from which a window's beat is another thing's."""
+ROUNDS = 8
+_OFFSET, _AMPLITUDE, _FREQUENCY = (
+    list(COMMANDS).index(f"tail_{n}") for n in ("offset", "amplitude", "frequency")
+)
+
+
+@dataclass(frozen=True)
+class DriveLaw:
+    """The beat over the commanded frequency: common (1 - sum of each size times its term).
+
+    Attributes:
+        common: ratio at the start of a run, without offset and stroke; None where no beat is clear.
+        sizes: effect parameter of :data:`TERMS` -> size, of those that show.
+        p: largest p-value of these, each alone.
+    """
+
+    common: float | None = None
+    sizes: Mapping[str, float] = field(default_factory=dict)
+    p: float = 1.0
+
+    @property
+    def words(self) -> str:
+        """What the beat does, a clause; empty where it follows its command."""
+        found = [f"by {100.0 * size:.2g} % {SAID[name]}" for name, size in self.sizes.items()]
+        return f"the tail beats more slowly than commanded: {' and '.join(found)}" if found else ""
+
+    def starts(self, common: float = 1.0) -> dict[str, float]:
+        """Where fits begin: effect parameter -> value; nothing where no beat is clear.
+
+        Args:
+            common: ratio of all beats that was put right before the law was found.
+        """
+        if self.common is None:
+            return {}
+        found = {f"effects.{name}": size for name, size in self.sizes.items()}
+        return {SCALE: self.common * common, **found}
+
+    def following(self, dataset: Dataset) -> Dataset:
+        """The dataset as if it had been commanded to beat as offset and stroke let it.
+
+        What falls with time stays: commands hold. Without a law the dataset is the same.
+        """
+        if not self.sizes:
+            return dataset
+        return replace(dataset, runs=tuple(self._following(run) for run in dataset.runs))
+
+    def _following(self, run: Run) -> Run:
+        values = run.commands.values.copy()
+        speed = 2.0 * np.pi * values[:, _AMPLITUDE] * values[:, _FREQUENCY]
+        aside = 1.0 - self.sizes.get("beat_load.offset", 0.0) * np.abs(values[:, _OFFSET])
+        loaded = 1.0 - self.sizes.get("beat_load.load", 0.0) * speed
+        left = np.maximum(aside, 0.0) * np.maximum(loaded, 0.0)
+        values[:, _FREQUENCY] *= left * (self.common or 1.0)
+        return replace(run, commands=CommandSteps(run.commands.times_s, values))
+
+
+def drive_law(dataset: Dataset) -> DriveLaw:
+    """How the beat departs from its command in all runs.
+
+    Args:
+        dataset: measured runs, with what is grossly wrong put right.
+    """
+    strokes = strokes_of(dataset)
+    whole = ratio_near(list(strokes.values()))
+    if whole is None:
+        return DriveLaw()
+    rows, run_of = [], []
+    for number, stroke in enumerate(strokes.values()):
+        windows = windows_of(stroke, whole.value)
+        for window, peak in zip(windows, peaks_of(windows, whole.value)[1], strict=True):
+            if np.isfinite(peak[0]):
+                rows.append([*peak, *window.terms])
+                run_of.append(number)
+    if len(rows) < 2 * (len(TERMS) + 1):
+        return DriveLaw(whole.value)
+    ratio, weight, *terms = np.array(rows).T
+    return _law(ratio, weight, np.array(terms).T, np.array(run_of))
+
+
+def _law(ratio: FloatArray, weight: FloatArray, terms: FloatArray, run_of: IntArray) -> DriveLaw:
+    """The law of windows' ratios (N,); terms that do not show are left out, the least first."""
+    kept = [i for i in range(len(TERMS)) if np.ptp(terms[:, i]) > 1e-9]
+    while True:
+        columns = np.column_stack([np.ones(len(ratio)), terms[:, kept]])
+        value, error, freedom = _regression(columns, ratio, weight, run_of)
+        sizes = -value[1:] / value[0]
+        p = 2.0 * stdtr(freedom, -np.abs(value[1:] / error[1:]))
+        small = np.array([size < SMALLEST[i] for size, i in zip(sizes, kept, strict=True)], bool)
+        doubtful = np.where(small, 1.0, p)
+        if not kept or doubtful.max() < LEVEL:
+            found = {TERMS[i]: float(size) for i, size in zip(kept, sizes, strict=True)}
+            return DriveLaw(float(value[0]), found, float(doubtful.max(initial=0.0)))
+        kept.pop(int(np.argmax(doubtful)))
+
+
+def _regression(
+    columns: FloatArray, ratio: FloatArray, weight: FloatArray, run_of: IntArray
+) -> tuple[FloatArray, FloatArray, int]:
+    """Weighted least squares without far windows, with errors that allow for runs that differ.
+
+    Args:
+        columns: (N, k).
+        ratio: (N,).
+        weight: (N,).
+        run_of: (N,) run of each row, whose errors are taken to depend on each other.
+
+    Returns:
+        (k,) estimates, (k,) their standard errors, and the degrees of freedom of the latter.
+        Source: Liang and Zeger (1986), Biometrika 73, 13, with the factor R / (R - k).
+    """
+    near: BoolArray = np.ones(len(ratio), bool)
+    for _ in range(ROUNDS):
+        used = weight * near
+        inverse = np.linalg.pinv(columns.T @ (used[:, None] * columns))
+        value = inverse @ columns.T @ (used * ratio)
+        left = ratio - columns @ value
+        scale = 1.4826 * float(np.median(np.abs(left[near])))
+        near = np.abs(left) < FAR * max(scale, 1e-4)
+    pulls = columns * (used * left)[:, None]
+    runs = np.unique(run_of)
+    sums = np.array([pulls[run_of == run].sum(axis=0) for run in runs])
+    freedom = max(len(runs) - columns.shape[1], 1)
+    covariance = inverse @ sums.T @ sums @ inverse * len(runs) / freedom
+    return value, np.sqrt(np.maximum(np.diag(covariance), 1e-30)), freedom

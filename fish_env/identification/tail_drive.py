@@ -1,0 +1,65 @@
+"""What is known of the tail's beat before any force model is fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from fish_env.inference.problem import Drive
+from fish_env.model.effect import Effect
+
+SCALE = "effects.frequency_scale.scale"
+ORDINARY = 4e-3
+"""Share of the beat that a servo is off by, usually."""
+BESIDE = (-6e-3, -3e-3, 0.0, 3e-3, 6e-3)
+"""Departures from the measured beat that a fit begins from: less than a third of a cycle in a run
+of a minute."""
+
+
+@dataclass(frozen=True)
+class TailDrive(Drive):
+    """How the tail departs from its commands in all runs.
+
+    Attributes:
+        measured: ``effects.<name>.<parameter>`` -> about its value; empty where no beat is clear.
+        phase_sd: random walk of the phase that a fit begins with (rad/s^0.5).
+    """
+
+    measured: Mapping[str, float] = field(default_factory=dict)
+    phase_sd: float = 0.0
+
+    @property
+    def scale(self) -> float:
+        """Beat over the commanded frequency, beside what else was measured."""
+        return self.measured.get(SCALE, 1.0)
+
+    def beside(self, effect: Effect) -> tuple[dict[str, float], ...]:
+        """Sizes of an effect that scales the beat, around what was measured.
+
+        For runs whose phase at the start is unknown: of a comb of sizes each would have its own.
+
+        Args:
+            effect: the effect; none of one that scales no beat.
+        """
+        scales = [p.name for p in effect.switching if p.neutral == 1.0 and p.unit == "-"]
+        if not effect.drifts_in_phase or len(scales) != 1:
+            return ()
+        return tuple({scales[0]: self.scale + off} for off in BESIDE)
+
+
+def tail_drive(measured: Mapping[str, float], phase_sd: float = 0.0) -> TailDrive:
+    """What is known of the beat, and which effects put a model in step with it.
+
+    None do where all beats are off by one ratio only: several effects do that, and a comparison of
+    all of them tells which.
+
+    Args:
+        measured: ``effects.<name>.<parameter>`` -> about its value.
+        phase_sd: random walk of the phase that a fit begins with (rad/s^0.5).
+    """
+    found = dict(measured)
+    ordinary = SCALE in found and abs(found[SCALE] - 1.0) <= ORDINARY
+    if ordinary:
+        found.pop(SCALE)
+    in_step = found if found.keys() - {SCALE} else {}
+    return TailDrive(in_step, bool(in_step) or ordinary, measured, phase_sd)

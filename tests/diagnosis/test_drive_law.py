@@ -1,0 +1,130 @@
+"""A law of the beat is read from the swaying of the hull, and none where the tail obeys."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fish_env.data import CommandSteps, Dataset, Run
+from fish_env.diagnosis.inputs.check import check_inputs
+from fish_env.diagnosis.inputs.drive_law import DriveLaw, drive_law
+from fish_env.identification.tail_drive import SCALE, tail_drive
+
+RATE, LENGTH, HELD, RUNS = 25.0, 30.0, 2.5, 6
+FREQUENCY = 2
+
+
+def swaying(seed, common=1.0, rate=0.0, offset=0.0, load=0.0, own=0.0):
+    """Runs whose hulls sway with tails that beat by a law; `own` is what runs differ by."""
+    rng = np.random.default_rng(seed)
+    return Dataset(
+        "swaying",
+        "zheng-2021-a",
+        tuple(
+            _run(f"r{i}", rng, common * (1.0 + own * rng.standard_normal()), rate, offset, load)
+            for i in range(RUNS)
+        ),
+    )
+
+
+def _run(name, rng, common, rate, offset, load):
+    starts = np.arange(0.0, LENGTH, HELD)
+    count = len(starts)
+    values = np.column_stack(
+        [
+            rng.uniform(-0.5, 0.5, count),
+            rng.uniform(0.2, 0.5, count),
+            rng.uniform(1.0, 2.0, count),
+            np.zeros((count, 2)),
+        ]
+    )
+    fine = np.arange(0.0, LENGTH, 1e-3)
+    told = values[np.searchsorted(starts, fine, side="right") - 1]
+    speed = 2.0 * np.pi * told[:, 1] * told[:, 2]
+    law = (1.0 - rate * fine) * (1.0 - offset * np.abs(told[:, 0])) * (1.0 - load * speed)
+    phase = 2.0 * np.pi * np.cumsum(common * law * told[:, 2]) * 1e-3
+    times = np.arange(0.0, LENGTH, 1.0 / RATE)
+    at = np.rint(times / 1e-3).astype(int)
+    turn = np.cumsum(told[:, 0])[at] * -2e-4
+    yaw = turn + 0.1 * told[at, 1] * np.sin(phase[at]) + 0.002 * rng.standard_normal(len(at))
+    return Run.from_steps(name, times, {"yaw": yaw}, CommandSteps(starts, values), start="unknown")
+
+
+LAWS = (
+    {"rate": 0.003},
+    {"offset": 0.25},
+    {"offset": 0.15, "load": 0.015},
+    {"rate": 0.002, "offset": 0.2},
+)
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: "-".join(law))
+def test_a_law_is_found_with_its_size(law):
+    found = drive_law(swaying(1, common=0.98, own=0.002, **law))
+    sizes = {name.split(".")[1]: size for name, size in found.sizes.items()}
+    assert sizes.keys() == law.keys()
+    for name, size in law.items():
+        assert sizes[name] == pytest.approx(size, rel=0.2)
+    assert found.common == pytest.approx(0.98, abs=0.01)
+
+
+def test_tails_that_obey_have_no_law():
+    found = [drive_law(swaying(seed, own=0.002)) for seed in range(20)]
+    assert sum(bool(law.sizes) for law in found) <= 2  # each term is tested at 5 per cent
+    assert all(abs(law.common - 1.0) < 0.005 for law in found)
+
+
+def test_without_a_beat_nothing_is_said():
+    rng = np.random.default_rng(2)
+    still = swaying(3)
+    runs = [
+        Run(r.id, r.time_s, {"yaw": rng.standard_normal(len(r.time_s))}, r.commands, "rest")
+        for r in still.runs
+    ]
+    law = drive_law(Dataset("still", still.fish, tuple(runs)))
+    assert law == DriveLaw()
+    assert law.starts() == {}
+
+
+def test_commands_follow_the_law():
+    data = swaying(4, common=0.97, offset=0.25)
+    followed = drive_law(data).following(data)
+    assert drive_law(followed).sizes == {}
+    assert drive_law(followed).common == pytest.approx(1.0, abs=0.005)
+    assert DriveLaw(0.97).following(data) is data, "what all share is no law"
+
+
+def test_the_input_step_tells_the_law_and_leaves_it_to_effects():
+    data = swaying(5, common=0.97, offset=0.25)
+    inputs = check_inputs(data)
+    (told,) = [fault for fault in inputs.faults if fault.target == "tail_frequency"]
+    assert "beat_load" in told.said
+    assert "Write" not in told.said, "no line of dataset.yaml puts it right"
+    assert not inputs.binding
+    assert inputs.drive["effects.beat_load.offset"] == pytest.approx(0.25, rel=0.2)
+    assert inputs.drive[SCALE] == pytest.approx(0.97, abs=0.01)
+    for run, logged in zip(inputs.dataset.runs, data.runs, strict=True):
+        assert np.array_equal(run.commands.values, logged.commands.values)
+
+
+def test_runs_that_differ_beside_a_law_are_put_right():
+    data = swaying(6, offset=0.25, own=0.03)
+    inputs = check_inputs(data)
+    ratios = [
+        a.commands.values[0, FREQUENCY] / b.commands.values[0, FREQUENCY]
+        for a, b in zip(inputs.dataset.runs, data.runs, strict=True)
+    ]
+    assert np.median(ratios) == pytest.approx(1.0, abs=0.01)
+    assert np.std(ratios) > 0.01
+    law = drive_law(inputs.dataset)
+    assert law.sizes["beat_load.offset"] == pytest.approx(0.25, rel=0.2)
+
+
+def test_a_fit_begins_in_step_only_beside_a_law():
+    off = tail_drive({SCALE: 0.9})
+    assert (off.in_step, off.known) == ({}, False)
+    law = {SCALE: 1.001, "effects.battery_sag.rate": 0.002}
+    assert tail_drive(law).in_step == {"effects.battery_sag.rate": 0.002}
+    assert tail_drive({**law, SCALE: 0.95}).in_step == {**law, SCALE: 0.95}
+    assert tail_drive({SCALE: 1.001}).known
+    assert not tail_drive({}).known, "nothing was measured"

@@ -111,6 +111,11 @@ def disturbance_range(fish: FishParams) -> DisturbanceRange:
     return DisturbanceRange((1e-4, force), (1e-6, moment), (0.05, 10.0))
 
 
+def widest_disturbance(fish: FishParams) -> DisturbanceRange:
+    """As strong as a noise model may have it: what is missing has to show as large as it is."""
+    return disturbance_range(fish).widened(POLICY.largest_disturbance)
+
+
 def small_disturbance(sensor_sd: FloatArray) -> NoiseModel:
     """A disturbance of a few millinewton beside sensor noise (C,)."""
     return NoiseModel(sensor_sd, 3e-3, 1e-4, 1.0)
@@ -151,8 +156,7 @@ def fitted_noise(
         noise: the present noise model.
         largest_sensor_sd: as :func:`fit_noise` takes it.
     """
-    plausible = disturbance_range(problem.fish)
-    wide = plausible.widened(POLICY.largest_disturbance)
+    plausible, wide = disturbance_range(problem.fish), widest_disturbance(problem.fish)
     found = noise
     for _ in range(3):
         runs, made_with = problem.filtered(point, found, keep_slopes=True), found

@@ -25,12 +25,13 @@ from fish_env.identification.filtering import (
     RunFilter,
 )
 from fish_env.identification.generic_forces import BoundForces, generic_forces
-from fish_env.identification.kernel_kinds import LEAN, quickest
+from fish_env.identification.kernel_kinds import LEAN, quickest, with_stages
 from fish_env.identification.noise import (
     disturbance_range,
     fitted_noise,
     small_disturbance,
     white_noise_sd,
+    widest_disturbance,
 )
 from fish_env.identification.open_loop import windows, without_feedback
 from fish_env.identification.parameters import ALIKE, Baseline, changes_of, neutral_values
@@ -60,15 +61,14 @@ class SeriesProblem(Problem):
         dataset: measured runs.
         fish: parameters; default: the dataset's own fish.
         run_ids: runs to use; default: all.
-        paths: free baseline coefficients; default: all with a prior.
-        effects: names of effects whose parameters are free.
+        paths: free coefficients; default: all with a prior.
+        effects: names of effects that are free.
         user_effects: effects of the caller's own, among ``effects`` or not.
         dt: longest RK4 step (s), but for a moment after each switch of the commands and for
             effects that make the tail's rate jump, or are faster in the fish's file.
     """
 
     known: dict[str, Effect]
-    drive: TailDrive
     out_of_step = ("frequency_scale", "battery_sag", "clock_scale", "clock_skew")
     interchangeable = ALIKE
     variations = EVERY
@@ -101,7 +101,7 @@ class SeriesProblem(Problem):
         self.baseline = Baseline(self.fish, paths)
         self.effects = tuple(effects)
         self.unrefined = False
-        self.drive = TailDrive()
+        self.drive: TailDrive = TailDrive()
         self._filters: dict[frozenset[str], RunFilter] = {}
         unknown = [name for name in self.effects if name not in self.known]
         if unknown:
@@ -124,10 +124,7 @@ class SeriesProblem(Problem):
 
     def _filter_of(self, stages: frozenset[str]) -> RunFilter:
         if stages not in self._filters:
-            declared = tuple(e for e in self.model.declared if set(e.hooks) <= stages)
-            if APPLIED_WRENCH not in declared:
-                declared = (*declared, APPLIED_WRENCH)
-            model = replace(self.model, declared=declared)
+            model = with_stages(self.model, stages)
             self._filters[stages] = RunFilter(model, self.runs, self.channels)
         return self._filters[stages]
 
@@ -214,6 +211,10 @@ class SeriesProblem(Problem):
         """How the disturbance leaves what is plausible: a misfit with another name."""
         return disturbance_range(self.fish).left_by(noise)
 
+    def swamped(self, noise: NoiseModel) -> bool:
+        """Whether a disturbance is as strong as any that a noise model may have."""
+        return bool(widest_disturbance(self.fish).left_by(noise))
+
     def settled(self, point: Point, noise: NoiseModel) -> SeriesProblem:
         """The same problem with the likeliest starting phase of every run that has none."""
         return settle_phases(self, point, noise)
@@ -268,8 +269,7 @@ class SeriesProblem(Problem):
 
         By differences (K,) where the fish has to swim again, else through the filter's slopes.
         """
-        own = steps[: len(VARIATIONS)]
-        swum = self._swum_slopes(point, noise, filtered, own)
+        swum = self._swum_slopes(point, noise, filtered, steps[: len(VARIATIONS)])
         again = self.filtered(point, noise, keep_slopes=True)
         seen = slopes_of_runs(self.runs, again, self.channels, noise.correlation_s)
         return np.hstack([swum, seen])

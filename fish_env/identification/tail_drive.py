@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from fish_env.inference.problem import Drive
+from fish_env.inference.vehicle import Drive
 from fish_env.model.effect import Effect
 
 SCALE = "effects.frequency_scale.scale"

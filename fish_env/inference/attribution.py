@@ -215,10 +215,9 @@ class Search:
             begun: without a cause.
             best: with the best single cause; without one where none shows.
         """
-        nothing = begun.accepted
-        if not self.effort.retries or nothing.fit.problem.drive.known:
-            return None
-        if not disturbance_at_limit(best.fit):
+        nothing, problem = begun.accepted, best.fit.problem
+        swamped = problem.swamped(best.fit.noise) or not problem.drive.known
+        if not (self.effort.retries and disturbance_at_limit(best.fit) and swamped):
             return None
         more = beside_drive(nothing, best, self.causes, self.rng, self.effort, self.report)
         if more is None:

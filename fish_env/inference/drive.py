@@ -137,6 +137,8 @@ def _with_drive(
 ) -> list[Explanation]:
     """Fits with a cause and one effect that puts the drive in step, best first."""
     problem = begun.fit.problem
+    if problem.drive.known:
+        return []
     known = problem.known
     drives = [c for c in causes if c.is_effect and known[c.name].drifts_in_phase]
     shown = list(screen(followed, drives, rng).best())

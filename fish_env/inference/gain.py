@@ -20,6 +20,10 @@ from fish_env.inference.problem import Point, Problem
 RESAMPLES = 2000
 
 
+WORST = 1e4
+"""Squared error of a prediction, in units of the noise: a hundred standard deviations."""
+
+
 @dataclass(frozen=True)
 class ClosedGap:
     """Share of the gap between baseline and floor that an explanation closes.
@@ -53,6 +57,8 @@ def gap_closed(
 def squared_errors(problem: Problem, point: Point, noise: object) -> FloatArray:
     """Squared whitened one-step errors (D,), NaN where nothing was measured.
 
+    A model that diverges is taken to be wrong by :data:`WORST`.
+
     Args:
         problem: the runs.
         point: values of the parameters.
@@ -60,7 +66,8 @@ def squared_errors(problem: Problem, point: Point, noise: object) -> FloatArray:
     """
     _, evaluations = evaluated(problem, point, noise)
     residuals = np.concatenate([evaluation.residuals for evaluation in evaluations])
-    return np.where(problem.measured, residuals**2, np.nan)
+    squares = np.nan_to_num(residuals**2, nan=WORST, posinf=WORST)
+    return np.where(problem.measured, np.minimum(squares, WORST), np.nan)
 
 
 def by_window(

@@ -8,7 +8,7 @@ implementations; ``docs/your-own.md`` shows a fourth.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -19,6 +19,7 @@ from fish_env.inference.estimate.run_variation import RunVariation
 from fish_env.inference.hypotheses import parameter_path
 from fish_env.inference.vehicle import (
     Coefficients,
+    Drive,
     Effect,
     EffectFreedom,
     finite_values,
@@ -97,19 +98,6 @@ class GenericTerms(Protocol):
     def changes(self, columns: IntArray) -> FloatArray:
         """What small amounts of some terms change in the residuals, (D, N)."""
         ...
-
-
-@dataclass(frozen=True)
-class Drive:
-    """What was measured of a periodic drive, without a model of what it moves.
-
-    Attributes:
-        in_step: effect parameters that put the model's drive in step with it, by path.
-        known: whether it is in step but for these.
-    """
-
-    in_step: Mapping[str, float] = field(default_factory=dict)
-    known: bool = False
 
 
 class Problem(Protocol):
@@ -348,6 +336,10 @@ class Problem(Protocol):
     def residual_channels(self) -> tuple[tuple[str, ...], IntArray]:
         """Names of the channels, and (D,) which of them each residual is of."""
         return ("all",), np.zeros(len(self.groups()[0]), np.int64)
+
+    def swamped(self, noise: Any) -> bool:
+        """Whether a disturbance is as strong as any that a noise model may have."""
+        return False
 
     def settled(self, point: Point, noise: Any) -> Problem:
         """The same problem with what is unknown of each run's start where it suits a point."""

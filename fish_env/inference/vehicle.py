@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -182,3 +182,16 @@ class Coefficients:
         """The same of many (n, N): (N,), and no longer for those that are equal."""
         distinct, which = np.unique(z, axis=1, return_inverse=True)
         return np.array([self.possible(one) for one in distinct.T])[which.ravel()]
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What was measured of a periodic drive, without a model of what it moves.
+
+    Attributes:
+        in_step: effect parameters that put the model's drive in step with it, by path.
+        known: whether it is in step but for these.
+    """
+
+    in_step: Mapping[str, float] = field(default_factory=dict)
+    known: bool = False

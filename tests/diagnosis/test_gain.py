@@ -11,7 +11,7 @@ from fish_env.diagnosis.gain import measure_gain
 from fish_env.identification import SeriesProblem, open_loop
 from fish_env.identification.filtering import NoiseModel
 from fish_env.identification.runs import RunData
-from fish_env.inference.gain import gap_closed, reachable_share
+from fish_env.inference.gain import WORST, by_window, gap_closed, reachable_share, squared_errors
 from fish_env.inference.problem import Point
 from fish_env.params import load_fish
 from fish_env.simulator import Simulator
@@ -122,3 +122,27 @@ def test_runs_of_unknown_phase_are_judged_in_step():
     out_of_step = problem.filtered(extended.point, noise)
     left = np.concatenate([r.innovations.ravel() for r in out_of_step])
     assert np.nanmean(left**2) > 1.2 * np.mean([p.extended**2 for p in found.misfit.values()])
+
+
+class Diverging(SeriesProblem):
+    """A problem whose predictions end in infinity after half a run."""
+
+    def filtered(self, *args, **options):
+        found = super().filtered(*args, **options)
+        for own in found:
+            own.residuals[len(own.residuals) // 2 :] = np.inf
+        return found
+
+
+def test_a_model_that_diverges_on_final_runs_loses_by_a_finite_amount():
+    data = simulate(Setup(runs=2, duration=8.0, channels=("x", "y", "z", "yaw")))
+    good, bad = SeriesProblem(data, paths=()), Diverging(data, paths=())
+    noise = Setup(channels=good.channels).noise
+    point = Point(np.zeros(0), {})
+    usual, spoilt = (squared_errors(problem, point, noise) for problem in (good, bad))
+    assert np.nanmax(spoilt) == WORST
+    assert np.isfinite(spoilt).sum() == np.isfinite(usual).sum()
+    before, after = (by_window(good, values, np.nanmean) for values in (usual + 1.0, spoilt))
+    share, interval = reachable_share(before, after, np.random.default_rng(0))
+    assert share < -10.0
+    assert np.isfinite(interval).all()

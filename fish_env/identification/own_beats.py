@@ -17,7 +17,7 @@ import numpy as np
 from fish_env.arrays import FloatArray
 from fish_env.identification.runs import FREQUENCY, PHASE, RunData
 from fish_env.identification.series import SeriesProblem
-from fish_env.identification.tail_drive import SCALE, tail_drive
+from fish_env.identification.tail_drive import SCALE
 from fish_env.inference.hypotheses import effects_of
 from fish_env.inference.problem import Point
 
@@ -94,13 +94,11 @@ def with_own_beats(problem: SeriesProblem, beats: OwnBeats) -> SeriesProblem:
         problem: some of the runs.
         beats: what runs beat at. What they share is told to the problem and left to its effects.
     """
-    measured = dict(problem.drive.measured)
-    if beats.common is not None:
-        measured[SCALE] = beats.common
+    drive = problem.drive if beats.common is None else problem.drive.at(beats.common)
     if not beats.own:
-        return problem.with_drive(tail_drive(measured))
+        return problem.with_drive(drive)
     runs = [_beating(run, beats.own.get(run.id, 1.0)) for run in problem.runs]
-    return problem.with_runs(runs).with_drive(tail_drive(measured, WANDER))
+    return problem.with_runs(runs).with_drive(replace(drive, phase_sd=WANDER))
 
 
 def _beating(run: RunData, beat: float) -> RunData:

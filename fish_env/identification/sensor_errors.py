@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.signal import butter, sosfilt
 
 from fish_env.arrays import FloatArray
 from fish_env.identification.channels import BY_NAME
@@ -22,6 +23,9 @@ from fish_env.identification.variation import SENSOR_ERRORS
 from fish_env.model.frames import euler_from_quaternion
 from fish_env.rigidbody.kinematics import euler_rates, rotations
 
+CUTOFF_HZ, FINE_S = 5.0, 0.004
+"""Usual low-pass of an inertial unit, and steps in which it is computed (s)."""
+_LOW_PASS = butter(2, CUTOFF_HZ, fs=1.0 / FINE_S, output="sos")
 _INDEX = {error.name: i for i, error in enumerate(SENSOR_ERRORS)}
 _DEVICE = {
     **dict.fromkeys(("x", "y", "u", "v", "w"), "camera_delay"),
@@ -51,6 +55,8 @@ def sensor_slopes(clock: FloatArray, filtered: Filtered, channels: Sequence[str]
     for name, i in at.items():
         if name in _DEVICE:
             found[:, i, _INDEX[_DEVICE[name]]] = -change[name]
+    for name, values in (*zip(_ATTITUDE, euler.T, strict=True), *zip(_RATES, rates.T, strict=True)):
+        _put(found, at, name, "inertial_smoothing", _smoothed(clock, values) - values)
     turns, kinematics = rotations(euler), euler_rates(euler)
     for k, axis in enumerate(_PLACE):
         for j, name in enumerate(_PLACE):
@@ -73,6 +79,17 @@ def sensor_slopes(clock: FloatArray, filtered: Filtered, channels: Sequence[str]
     for j, name in enumerate(("x", "y")):
         _put(found, at, name, "camera_scale_per_depth", -place[:, j] * depth)
     return found
+
+
+def _smoothed(clock: FloatArray, values: FloatArray) -> FloatArray:
+    """Samples (T,) as an inertial unit passes them on that has settled on the first of them.
+
+    The delay of such a filter is a good part of a beat: no slope with time says what it does.
+    """
+    even = np.arange(clock[0], clock[-1] + FINE_S, FINE_S)
+    along = np.interp(even, clock, values) - values[0]
+    filtered = np.asarray(sosfilt(_LOW_PASS, along))
+    return np.asarray(np.interp(clock, even, filtered) + values[0], float)
 
 
 def _predicted(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from fish_env.inference.vehicle import Drive
 from fish_env.model.effect import Effect
@@ -11,6 +11,8 @@ from fish_env.model.effect import Effect
 SCALE = "effects.frequency_scale.scale"
 ORDINARY = 4e-3
 """Share of the beat that a servo is off by, usually."""
+DECISIVE = 0.01
+"""Probability by chance below which a finding of the input step is decisive."""
 BESIDE = (-6e-3, -3e-3, 0.0, 3e-3, 6e-3)
 """Departures from the measured beat that a fit begins from: less than a third of a cycle in a run
 of a minute."""
@@ -33,6 +35,11 @@ class TailDrive(Drive):
         """Beat over the commanded frequency, beside what else was measured."""
         return self.measured.get(SCALE, 1.0)
 
+    def at(self, scale: float) -> TailDrive:
+        """The same with another beat over the commanded frequency."""
+        drive = tail_drive({**self.measured, SCALE: scale}, self.phase_sd)
+        return replace(drive, certain=self.certain)
+
     def beside(self, effect: Effect) -> tuple[dict[str, float], ...]:
         """Sizes of an effect that scales the beat, around what was measured.
 
@@ -47,7 +54,7 @@ class TailDrive(Drive):
         return tuple({scales[0]: self.scale + off} for off in BESIDE)
 
 
-def tail_drive(measured: Mapping[str, float], phase_sd: float = 0.0) -> TailDrive:
+def tail_drive(measured: Mapping[str, float], phase_sd: float = 0.0, p: float = 1.0) -> TailDrive:
     """What is known of the beat, and which effects put a model in step with it.
 
     None do where all beats are off by one ratio only: several effects do that, and a comparison of
@@ -56,10 +63,12 @@ def tail_drive(measured: Mapping[str, float], phase_sd: float = 0.0) -> TailDriv
     Args:
         measured: ``effects.<name>.<parameter>`` -> about its value.
         phase_sd: random walk of the phase that a fit begins with (rad/s^0.5).
+        p: probability by chance of what was measured.
     """
     found = dict(measured)
     ordinary = SCALE in found and abs(found[SCALE] - 1.0) <= ORDINARY
     if ordinary:
         found.pop(SCALE)
     in_step = found if found.keys() - {SCALE} else {}
-    return TailDrive(in_step, bool(in_step) or ordinary, measured, phase_sd)
+    certain = bool(in_step) and p < DECISIVE
+    return TailDrive(in_step, bool(in_step) or ordinary, certain, measured, phase_sd)

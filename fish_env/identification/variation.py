@@ -49,8 +49,10 @@ SENSOR_ERRORS = (
     RunVariation("camera_delay", "s", 0.02, shared=True),
     RunVariation("inertial_delay", "s", 0.02, shared=True),
     RunVariation("depth_delay", "s", 0.02, shared=True),
+    RunVariation("inertial_smoothing", "1", 1.0, shared=True),
 )
-"""Usual sizes: a centimetre, a degree, one per cent, a frame of a camera; the picture of a camera
+"""Usual sizes: a centimetre, a degree, one per cent, a frame of a camera, all that a low-pass of
+5 Hz inside an inertial unit takes away; the picture of a camera
 some metres above the water shrinks with depth, by the refractive index and its height."""
 EVERY = (*VARIATIONS, *SENSOR_ERRORS)
 _MASS, _BUOYANCY = RECORD_FIELDS.index("mass_total"), RECORD_FIELDS.index("mass_buoyancy")

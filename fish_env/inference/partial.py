@@ -39,7 +39,8 @@ def confirmed(accepted: Explanation, threshold: float) -> Explanation | None:
     """The explanation with those of its causes that no sum of generic forces can stand in for.
 
     What is left may be a disturbance of implausible strength: it is estimated with the rest, and
-    the evidence for a cause is counted beside it.
+    the evidence for a cause is counted beside it. What was measured of a drive without a model
+    needs no model to confirm it.
 
     Args:
         accepted: causes that explain part of the data.
@@ -48,10 +49,12 @@ def confirmed(accepted: Explanation, threshold: float) -> Explanation | None:
     Returns:
         The causes that are left with their fit; None where none is.
     """
-    while accepted.causes:
-        weakest = _implausible(accepted)
+    measured = _measured(accepted)
+    while {*accepted.causes} - measured:
+        weakest = _implausible(accepted, measured)
         if weakest is None:
             log_p = StandIns(accepted, threshold).log_p()
+            log_p = {name: value for name, value in log_p.items() if name not in measured}
             weakest = max(log_p, key=lambda name: log_p[name])
             if log_p[weakest] < threshold:
                 return accepted
@@ -59,7 +62,13 @@ def confirmed(accepted: Explanation, threshold: float) -> Explanation | None:
         if smaller is None:
             return None
         accepted = smaller
-    return None
+    return accepted if accepted.causes else None
+
+
+def _measured(found: Explanation) -> frozenset[str]:
+    """Causes that were measured without a model."""
+    drive = found.fit.problem.drive
+    return drive.effects & {*found.causes} if drive.certain else frozenset()
 
 
 def sustained(found: Explanation, rng: np.random.Generator) -> Explanation | None:
@@ -67,7 +76,8 @@ def sustained(found: Explanation, rng: np.random.Generator) -> Explanation | Non
 
     One sample ahead a cause may stand in for the spectrum of what is unknown: it makes whitened
     residuals smaller and the simulation worse. A cause that acts makes both better, in most runs:
-    the 95 % interval of its share over runs lies above zero.
+    the 95 % interval of its share over runs lies above zero. A drive that was measured to be out of
+    step may take longer to show than such a simulation lasts.
 
     Args:
         found: causes that act beside something unknown.
@@ -76,27 +86,30 @@ def sustained(found: Explanation, rng: np.random.Generator) -> Explanation | Non
     Returns:
         The causes that are left with their fit; None where none is.
     """
-    while found.causes:
+    measured = _measured(found)
+    while {*found.causes} - measured:
         fit = found.fit.extrapolated
         runs = fit.problem.run_ids
         budget = error_budget(fit.problem, fit, found.causes, runs, False, False, rng)
         if budget is None:
             return found
         least = {s.name: s.ci95[0] if s.ci95 else s.share for s in budget.shares}
-        worst = min(found.causes, key=lambda name: least[name])
+        others = [name for name in found.causes if name not in measured]
+        worst = min(others, key=lambda name: least[name])
         if least[worst] > 0.0:
             return found
         smaller = without(found, (worst,))
         if smaller is None:
             return None
         found = smaller
-    return None
+    return found if found.causes else None
 
 
-def _implausible(accepted: Explanation) -> str | None:
-    """The first cause whose estimate is implausible; None if none is."""
+def _implausible(accepted: Explanation, measured: frozenset[str]) -> str | None:
+    """The first cause whose estimate is implausible, but for those measured; None if none is."""
     words = implausible_estimates(accepted.fit)
-    blamed = (name for name in accepted.causes if any(_is_of(name, word) for word in words))
+    others = (name for name in accepted.causes if name not in measured)
+    blamed = (name for name in others if any(_is_of(name, word) for word in words))
     return next(blamed, None)
 
 

@@ -191,7 +191,14 @@ class Drive:
     Attributes:
         in_step: effect parameters that put the model's drive in step with it, by path.
         known: whether it is in step but for these.
+        certain: whether chance does not make such measurements.
     """
 
     in_step: Mapping[str, float] = field(default_factory=dict)
     known: bool = False
+    certain: bool = False
+
+    @property
+    def effects(self) -> frozenset[str]:
+        """Names of the effects that put the model's drive in step."""
+        return frozenset(effects_of(self.in_step))

@@ -9,6 +9,7 @@ from fish_env.inference.estimate.fit import fit
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.partial import StandIns, confirmed, sustained
 from fish_env.inference.pipeline import infer
+from fish_env.inference.vehicle import Drive
 from tests.inference.boat import sail
 from tests.inference.boat_problem import BoatProblem
 from tests.inference.test_boat import BIAS, EAST, FITTED, NORTH, problems, wind
@@ -68,3 +69,16 @@ def test_a_cause_that_improves_every_simulation_stays(seed):
     boat = BoatProblem(sail(rng, FITTED, {BIAS: 0.06}, foreign=wind))
     right = Explanation(("rudder_bias",), fit(boat, ("rudder_bias",)))
     assert sustained(right, rng) is right
+
+
+@pytest.mark.parametrize("certain", [True, False])
+def test_what_was_measured_of_a_drive_needs_no_simulation(certain):
+    rng = np.random.default_rng(4)
+    boat = BoatProblem(sail(rng, FITTED, {NORTH: 0.15, EAST: -0.2}, foreign=wind))
+    boat.drive = Drive({BIAS: 0.0}, known=True, certain=certain)
+    both = Explanation(("current", "rudder_bias"), fit(boat, ("current", "rudder_bias")))
+    found = sustained(both, rng)
+    assert ("rudder_bias" in found.causes) == certain
+    assert "current" in found.causes
+    alone = Explanation(("rudder_bias",), fit(boat, ("rudder_bias",)))
+    assert (confirmed(alone, THRESHOLD) is not None) == certain

@@ -50,12 +50,14 @@ class Inputs:
         logged: the data as they were given.
         drive: by how much the tail beats otherwise than commanded in all runs, as effects say it:
             ``effects.<name>.<parameter>`` -> about its value.
+        drive_p: probability of that by chance.
     """
 
     faults: tuple[InputFault, ...]
     dataset: Dataset
     logged: Dataset
     drive: Mapping[str, float] = field(default_factory=dict)
+    drive_p: float = 1.0
 
     @property
     def binding(self) -> bool:
@@ -97,7 +99,7 @@ def check_inputs(dataset: Dataset, fish: FishParams | None = None, seed: int = 0
             dataset = change.applied(dataset)
     drive = seen.law.starts(math.prod(change.clocks[""].beat for change in left))
     drive = {path: v for path, v in drive.items() if effect_of(path) not in nominal.effects}
-    return Inputs(tuple(faults), _noted(dataset, faults), logged, drive)
+    return Inputs(tuple(faults), _noted(dataset, faults), logged, drive, seen.law.p)
 
 
 @dataclass(frozen=True, eq=False)

@@ -98,7 +98,7 @@ def with_own_beats(problem: SeriesProblem, beats: OwnBeats) -> SeriesProblem:
     if not beats.own:
         return problem.with_drive(drive)
     runs = [_beating(run, beats.own.get(run.id, 1.0)) for run in problem.runs]
-    return problem.with_runs(runs).with_drive(replace(drive, phase_sd=WANDER))
+    return problem.with_runs(runs).with_drive(replace(drive, uneven=True, phase_sd=WANDER))
 
 
 def _beating(run: RunData, beat: float) -> RunData:

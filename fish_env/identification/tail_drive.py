@@ -71,4 +71,5 @@ def tail_drive(measured: Mapping[str, float], phase_sd: float = 0.0, p: float = 
         found.pop(SCALE)
     in_step = found if found.keys() - {SCALE} else {}
     certain = bool(in_step) and p < DECISIVE
-    return TailDrive(in_step, bool(in_step) or ordinary, certain, measured, phase_sd)
+    known, uneven = bool(in_step) or ordinary, phase_sd > 0.0
+    return TailDrive(in_step, known, certain, uneven, measured, phase_sd)

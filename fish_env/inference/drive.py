@@ -67,7 +67,7 @@ def measured(nothing: Explanation, report: Callable[[str], None]) -> Explanation
     whole = fitted_again(own.problem, best, best.noise) if best else None
     if whole is None:
         return None
-    found = Explanation(effects, whole)
+    found = Explanation(effects, whole).varied(beside_misfit=own.problem.drive.uneven)
     return found if nothing.score - found.score >= POLICY.evidence_doubt else None
 
 

@@ -68,7 +68,8 @@ def refit_baseline(problem: Problem) -> Fit:
     """The refitted baseline.
 
     It is iterated to convergence unless its disturbance is at the limit: the misfit that causes
-    this is what comes next. A drive known to be out of step hides what the runs differ in.
+    this is what comes next. A drive known to be out of step hides what the runs differ in; where
+    single runs differ in their drive, what else they differ in counts beside any misfit.
 
     Raises:
         LinAlgError: the simulation diverges with the nominal coefficients.
@@ -76,7 +77,7 @@ def refit_baseline(problem: Problem) -> Fit:
     own = fit(problem, rounds=2, iterations=3)
     if problem.drive.in_step and disturbance_at_limit(own):
         return own
-    own = Explanation((), own).varied().fit
+    own = Explanation((), own).varied(beside_misfit=problem.drive.uneven).fit
     return own if disturbance_at_limit(own) else finished(own)
 
 

@@ -192,11 +192,13 @@ class Drive:
         in_step: effect parameters that put the model's drive in step with it, by path.
         known: whether it is in step but for these.
         certain: whether chance does not make such measurements.
+        uneven: whether single runs differ in it, as they then do in other ways too.
     """
 
     in_step: Mapping[str, float] = field(default_factory=dict)
     known: bool = False
     certain: bool = False
+    uneven: bool = False
 
     @property
     def effects(self) -> frozenset[str]:

@@ -100,8 +100,8 @@ def page(rows: Sequence[dict[str, Any]], swims: Sequence[dict[str, Any]], count:
     text += f"{count:,} observations for each row.\n\n{HEAD}"
     for row in rows:
         off = [f"{row[key]:.1e}" if key in row else "-" for key in ("largest", "rms")]
-        text += f"| {row['task']} | {row['seed']} | {row['policy']} | {' | '.join(off)} | {row['us']:.1f} "
-        text += f"| {row['bytes']:,} |\n"
+        text += f"| {row['task']} | {row['seed']} | {row['policy']} | {' | '.join(off)} "
+        text += f"| {row['us']:.1f} | {row['bytes']:,} |\n"
     text += "\nSwims of the suites, 100 episodes each.\n\n"
     text += "| task | weights | suite | success (%) | depth RMSE (cm) | heading RMSE (rad) |\n"
     text += "| --- | --- | --- | --: | --: | --: |\n"

@@ -98,7 +98,7 @@ versions: $(VENV)/.with-reliability  ## run tests on the oldest and newest suppo
 lock: $(VENV)/.with-reliability  ## write requirements.lock: the tested versions with their hashes
 	$(BIN)/python -m uv pip compile pyproject.toml --constraint constraints.txt --generate-hashes \
 	  --extra parquet --extra render --extra docs --extra logs --extra notebook --no-header \
-	  --no-annotate --no-emit-index-url --python-version 3.11.7 \
+	  --no-annotate --no-emit-index-url --python-version 3.11.0 \
 	  --python-platform x86_64-manylinux_2_28 --quiet --output-file requirements.lock
 
 audit: $(VENV)/.with-reliability  ## look up known vulnerabilities of requirements.lock

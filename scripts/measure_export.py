@@ -8,8 +8,6 @@ and its numbers into results/.
 from __future__ import annotations
 
 import argparse
-import datetime
-import json
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -31,8 +29,8 @@ from scripts.exported import (
     differences,
     observations,
 )
+from scripts.results import RESULTS, write_dated
 
-ROOT = Path(__file__).resolve().parents[1]
 FISH = 1000
 HEAD = (
     "| task | trained | policy | largest difference | RMS difference | decision (us) | bytes |\n"
@@ -97,7 +95,7 @@ def swum(task: str) -> list[dict[str, Any]]:
 def page(rows: Sequence[dict[str, Any]], swims: Sequence[dict[str, Any]], count: int) -> str:
     """The tables as Markdown."""
     text = "# Exported policies\n\nDifferences in an action from the NumPy policy over "
-    text += f"{count:,} observations for each row.\n\n{HEAD}"
+    text += f"{count:,} observations for each row. Decisions in processor time.\n\n{HEAD}"
     for row in rows:
         off = [f"{row[key]:.1e}" if key in row else "-" for key in ("largest", "rms")]
         text += f"| {row['task']} | {row['seed']} | {row['policy']} | {' | '.join(off)} "
@@ -118,9 +116,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument(
         "--steps", type=int, default=1000, help=f"observations in {FISH}s, a policy"
     )
-    parser.add_argument("--out", type=Path, default=ROOT / "results")
+    parser.add_argument("--out", type=Path, default=RESULTS)
     options, console = parser.parse_args(arguments), Console()
-    today = datetime.date.today().isoformat()
     with tempfile.TemporaryDirectory() as folder:
         rows = []
         for task in TASKS:
@@ -128,10 +125,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
             console.print(page(rows, [], options.steps * FISH), markup=False)
     swims = [row for task in TASKS for row in swum(task)]
     text = page(rows, swims, options.steps * FISH)
-    about = {"date": today, "machine": machine(), "rows": rows, "swims": swims}
-    about["versions"] = versions(("numpy", "onnx", "onnxruntime"))
-    (options.out / f"export-{today}.md").write_text(text, "utf-8")
-    (options.out / f"export-{today}.json").write_text(json.dumps(about, indent=1) + "\n", "utf-8")
+    about = {"machine": machine(), "steps": options.steps, "fish": FISH, "rows": rows}
+    about |= {"swims": swims, "versions": versions(("numpy", "onnx", "onnxruntime"))}
+    write_dated(options.out, "export", about, text)
     console.print(text, markup=False)
 
 

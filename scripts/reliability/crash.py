@@ -1,6 +1,6 @@
 """Kills trainings, diagnoses and suites over and over, and compares what comes of them.
 
-    python -m scripts.reliability.crash               # 30 kills of each, into results/
+    python -m scripts.reliability.crash               # 30 kills of each; one file each in results/
     python -m scripts.reliability.crash --only train --kills 5
 
 Each work runs in a process of its own, which gets SIGKILL: at a random moment, or while a file is
@@ -201,17 +201,18 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     options = parse(arguments)
-    scores = {}
+    bad = []
     with tempfile.TemporaryDirectory() as place:
         for name in options.only:
             work = WORKS[name]()
             score = torment(work, Path(place) / name, options.kills, options.seed)
-            scores[name] = score.as_dict() | {"bitwise": work.promise}
-            print(f"{name}: {scores[name]}", flush=True)
-    content = {"machine": harness.machine(), "seed": options.seed, "works": scores}
-    file = write_dated(options.out, "crash", content)
-    bad = [name for name, score in scores.items() if score["different"]]
-    print(f"{', '.join(bad) or 'nothing'} differs from the uninterrupted; written: {file.name}")
+            if score.different:
+                bad.append(name)
+            about = {"work": name, "seed": options.seed, "machine": harness.machine()}
+            about |= score.as_dict() | {"promise": work.promise}
+            file = write_dated(options.out, f"crash-{name}", about)
+            print(f"{name}: {score.as_dict()}; written: {file.name}", flush=True)
+    print(f"{', '.join(bad) or 'nothing'} differs from the uninterrupted")
     sys.exit(1 if bad else 0)
 
 

@@ -12,6 +12,7 @@ There is no sweep to kill yet.
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import signal
 import sys
@@ -167,7 +168,9 @@ def _check(work: Work, folder: Path, status: int | None) -> None:
         raise RuntimeError(f"{work.name}: {words.strip()}")
 
 
-def torment(work: Work, place: Path, kills: int, seed: int) -> Score:
+def torment(
+    work: Work, place: Path, kills: int, seed: int, most_minutes: float = math.inf
+) -> Score:
     """Kills a work so many times, half of them while it writes, and compares each end.
 
     Args:
@@ -175,6 +178,7 @@ def torment(work: Work, place: Path, kills: int, seed: int) -> Score:
         place: a folder of its own.
         kills: how many.
         seed: of the moments.
+        most_minutes: after so long no further kill is begun.
     """
     rng, score = np.random.default_rng(seed), Score()
     begun = time.monotonic()
@@ -182,14 +186,15 @@ def torment(work: Work, place: Path, kills: int, seed: int) -> Score:
     score.uninterrupted_s = round(time.monotonic() - begun, 2)
     writes = int((place / WRITES).read_text(encoding="utf-8"))
     wanted = work.outcome(place / "whole")
-    attempts = 0
-    while sum(score.kills.values()) < kills:
+    attempts, late = 0, begun + 60.0 * most_minutes
+    while sum(score.kills.values()) < kills and time.monotonic() < late:
         folder = place / f"killed-{score.ends}"
         while True:
             attempts += 1
             done = sum(score.kills.values())
             # Each folder gets some kills, so that many resumed ends are compared.
-            if done >= kills or attempts % (work.kills_each + 1) == 0:
+            enough = done >= kills or time.monotonic() > late
+            if enough or attempts % (work.kills_each + 1) == 0:
                 _check(work, folder, ended(start(work, folder), block=True))
                 break
             moment = MOMENTS[done % 2]
@@ -222,6 +227,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     add = parser.add_argument
     add("--only", help=f"some of {','.join(WORKS)}; default: all")
     add("--kills", type=int, default=30, help="of each work; default: 30")
+    add("--most-minutes", type=float, default=math.inf, help="of each work, then fewer kills")
     add("--seed", type=int, default=0, help="of the moments")
     add("--out", type=Path, default=RESULTS, help="folder of the dated result")
     options = parser.parse_args(arguments)
@@ -237,7 +243,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     with tempfile.TemporaryDirectory() as place:
         for name in options.only:
             work = WORKS[name]()
-            score = torment(work, Path(place) / name, options.kills, options.seed)
+            score = torment(
+                work, Path(place) / name, options.kills, options.seed, options.most_minutes
+            )
             if score.different:
                 bad.append(name)
             about = {"work": name, "seed": options.seed, "machine": harness.machine()}

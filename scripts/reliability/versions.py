@@ -5,7 +5,8 @@
 
 Needs `uv` (from PyPI) and the interpreters. One that is not on this machine is left out and named.
 PyTorch is always the version of constraints.txt, as others may pull gigabytes; where it is no CPU
-build, `--base` leaves out the extra `train` and its tests.
+build, `--base` leaves out the extra `train` and its tests. ROBOFISH_CACHE_DIR, if it is set, keeps
+compiled kernels from run to run; numba tells its versions apart there.
 """
 
 from __future__ import annotations
@@ -68,7 +69,7 @@ def run(command: Sequence[str | Path], place: Path, **environment: str) -> tuple
         cwd=ROOT,
         capture_output=True,
         text=True,
-        env={**os.environ, "ROBOFISH_CACHE_DIR": str(place / "kernels"), **environment},
+        env={"ROBOFISH_CACHE_DIR": str(place / "kernels"), **os.environ, **environment},
     )
     return done.returncode == 0, (done.stdout + done.stderr)[-3000:]
 

@@ -6,7 +6,7 @@
 Needs `uv` (from PyPI) and the interpreters. One that is not on this machine is left out and named.
 PyTorch is always the version of constraints.txt, as others may pull gigabytes; where it is no CPU
 build, `--base` leaves out the extra `train` and its tests. ROBOFISH_CACHE_DIR, if it is set, keeps
-compiled kernels from run to run; numba tells its versions apart there.
+compiled kernels from run to run; give each version of numba a folder of its own.
 """
 
 from __future__ import annotations

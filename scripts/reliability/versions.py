@@ -46,7 +46,7 @@ TESTS = (
 )
 SHOW = (
     "import importlib.metadata as m, json, platform, sys;"
-    "found = {d.name: d.version for d in m.distributions()};"
+    "found = {d.name.replace('_', '-'): d.version for d in m.distributions()};"
     "versions = {n: found[n] for n in sys.argv[1:] if n in found};"
     "print(json.dumps({'python': platform.python_version()} | versions))"
 )
@@ -89,9 +89,9 @@ def try_case(name: str, place: Path, tests: Sequence[str], base: bool) -> dict[s
     uv, folder = [sys.executable, "-m", "uv"], place / name
     binary = folder / "bin" / "python"
     begun = time.monotonic()
-    wanted = [str(ROOT)] if base else [f"{ROOT}[train]", tested_torch()]
+    wanted = [f"{ROOT}[render]"] if base else [f"{ROOT}[render,train]", tested_torch()]
     steps = (
-        [*uv, "venv", "--quiet", "--python", found, folder],
+        [*uv, "venv", "--quiet", "--clear", "--python", found, folder],
         [
             *uv, "pip", "install", "--quiet", "--python", binary, "--resolution", resolution,
             "--only-binary", ":all:", *wanted, "--no-binary", "robotic-fish",

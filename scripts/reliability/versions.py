@@ -5,8 +5,8 @@
 
 Needs `uv` (from PyPI) and the interpreters. One that is not on this machine is left out and named.
 PyTorch is always the version of constraints.txt, as others may pull gigabytes; where it is no CPU
-build, `--base` leaves out the extra `train` and its tests. ROBOFISH_CACHE_DIR, if it is set, keeps
-compiled kernels from run to run; give each version of numba a folder of its own.
+build, `--base` leaves out the extra `train` and its tests. Kernels that were compiled
+for a case stay in the folder that `--work` names.
 """
 
 from __future__ import annotations
@@ -62,14 +62,14 @@ def interpreter(python: str) -> str | None:
     return None
 
 
-def run(command: Sequence[str | Path], place: Path, **environment: str) -> tuple[bool, str]:
-    """Whether a command succeeds, and the end of what it says."""
+def run(command: Sequence[str | Path], kernels: Path, **environment: str) -> tuple[bool, str]:
+    """Whether a command succeeds, and the end of what it says; compiled kernels go to a folder."""
     done = subprocess.run(
         list(map(str, command)),
         cwd=ROOT,
         capture_output=True,
         text=True,
-        env={"ROBOFISH_CACHE_DIR": str(place / "kernels"), **os.environ, **environment},
+        env={**os.environ, "ROBOFISH_CACHE_DIR": str(kernels), **environment},
     )
     return done.returncode == 0, (done.stdout + done.stderr)[-3000:]
 
@@ -88,6 +88,7 @@ def try_case(name: str, place: Path, tests: Sequence[str], base: bool) -> dict[s
         return {"installed": False, "why": f"no Python {python} on this machine"}
     uv, folder = [sys.executable, "-m", "uv"], place / name
     binary = folder / "bin" / "python"
+    kernels = place / f"{name}-kernels"
     begun = time.monotonic()
     wanted = [f"{ROOT}[render]"] if base else [f"{ROOT}[render,train]", tested_torch()]
     steps = (
@@ -99,12 +100,12 @@ def try_case(name: str, place: Path, tests: Sequence[str], base: bool) -> dict[s
         [*uv, "pip", "install", "--quiet", "--python", binary, "pytest>=8.3,<10", "pyarrow>=17"],
     )  # fmt: skip
     for step in steps:
-        good, said = run(step, place)
+        good, said = run(step, kernels)
         if not good:
             return {"installed": False, "why": said.strip().splitlines()[-12:]}
-    versions = json.loads(run([binary, "-c", SHOW, *PACKAGES], place)[1].splitlines()[0])
+    versions = json.loads(run([binary, "-c", SHOW, *PACKAGES], kernels)[1].splitlines()[0])
     good, said = run(
-        [binary, "-m", "pytest", "-p", "no:cacheprovider", *tests], place,
+        [binary, "-m", "pytest", "-p", "no:cacheprovider", *tests], kernels,
         PYTHONPATH=str(ROOT), PYTHONDONTWRITEBYTECODE="1",
     )  # fmt: skip
     failed = re.findall(r"^(?:FAILED|ERROR) .*$", said, re.MULTILINE)

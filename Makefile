@@ -6,6 +6,7 @@ JOBS ?= 2
 VENV := .venv
 BIN := $(VENV)/bin
 CLIENTS := .venv-clients
+CLEANRL := .venv-cleanrl
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
 .DEFAULT_GOAL := help
@@ -71,8 +72,8 @@ check-release: setup  ## build the wheel twice and compare, and go through the c
 measure-export: setup  ## compare exported policies with the NumPy policy, over a million observations
 	$(BIN)/python -m scripts.measure_export
 
-clients: $(CLIENTS)/.ready  ## run libraries of reinforcement learning on the environment
-	$(CLIENTS)/bin/python -m pytest tests/clients/client_*.py
+clients: $(CLIENTS)/.ready $(CLEANRL)/.ready  ## run libraries of reinforcement learning on the environment
+	CLEANRL_PYTHON=$(CURDIR)/$(CLEANRL)/bin/python $(CLIENTS)/bin/python -m pytest tests/clients/client_*.py
 
 FUZZ_EXAMPLES ?= 2000
 fuzz: setup  ## try FUZZ_EXAMPLES hostile inputs in each test of the readers (2000: about an hour)
@@ -97,7 +98,7 @@ versions: $(VENV)/.with-reliability  ## run tests on the oldest and newest suppo
 lock: $(VENV)/.with-reliability  ## write requirements.lock: the tested versions with their hashes
 	$(BIN)/python -m uv pip compile pyproject.toml --constraint constraints.txt --generate-hashes \
 	  --extra parquet --extra render --extra docs --extra logs --extra notebook --no-header \
-	  --no-annotate --no-emit-index-url --python-version 3.11.7 \
+	  --no-annotate --no-emit-index-url --python-version 3.11.0 \
 	  --python-platform x86_64-manylinux_2_28 --quiet --output-file requirements.lock
 
 audit: $(VENV)/.with-reliability  ## look up known vulnerabilities of requirements.lock
@@ -110,7 +111,7 @@ bom: $(VENV)/.with-reliability  ## write out/bom.json, a CycloneDX bill of mater
 	@echo "written: out/bom.json"
 
 clean:  ## remove virtual environments and everything that builds and tests leave behind
-	rm -rf $(VENV) $(CLIENTS) build dist out .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) $(CLIENTS) $(CLEANRL) build dist out .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # Each stamp is redone only when the project file or the tested versions change.
@@ -152,4 +153,16 @@ $(CLIENTS)/.ready: pyproject.toml constraints-clients.txt
 	@$(PYTHON) -m venv $(CLIENTS)
 	@$(CLIENTS)/bin/python -m pip install --quiet --disable-pip-version-check \
 	  --constraint constraints-clients.txt --editable ".[clients]"
+	@touch $@
+
+# CleanRL's last release needs a Gymnasium below 1.0, older than the range of this project.
+$(CLEANRL)/.ready: pyproject.toml constraints-clients.txt
+	@echo "Installing robotic-fish and CleanRL into $(CLEANRL)"
+	@$(PYTHON) -m venv $(CLEANRL)
+	@grep -v '^gymnasium==' constraints-clients.txt > $(CLEANRL)/constraints.txt
+	@$(CLEANRL)/bin/python -m pip install --quiet --disable-pip-version-check \
+	  --constraint $(CLEANRL)/constraints.txt gymnasium==0.29.1 matplotlib numba numpy pandas pint \
+	  pyyaml rich scipy tensorboard threadpoolctl torch typer
+	@$(CLEANRL)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps \
+	  --ignore-requires-python cleanrl==1.2.0 --editable .
 	@touch $@

@@ -1,15 +1,13 @@
 """Measures exported policies against the NumPy policy: `python -m scripts.measure_export`.
 
-Differences over a million observations, time of a decision and bytes, of one shipped policy for
-each task; and what weights of eight bits cost on the frozen suites. Writes a dated table and its
-numbers into results/.
+Differences over a million observations, time of a decision and bytes, of each shipped policy; and
+what weights of eight bits cost the first of each task on the frozen suites. Writes a dated table
+and its numbers into results/.
 """
 
 from __future__ import annotations
 
 import argparse
-import datetime
-import json
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -31,44 +29,53 @@ from scripts.exported import (
     differences,
     observations,
 )
+from scripts.results import RESULTS, write_dated
 
-ROOT = Path(__file__).resolve().parents[1]
 FISH = 1000
 HEAD = (
-    "| task | policy | largest difference | RMS difference | decision (us) | bytes |\n"
-    "| --- | --- | --: | --: | --: | --: |\n"
+    "| task | trained | policy | largest difference | RMS difference | decision (us) | bytes |\n"
+    "| --- | --- | --- | --: | --: | --: | --: |\n"
 )
 SUITES = ("calm", "hard")
 
 
 def measured(task: str, steps: int, folder: Path) -> list[dict[str, Any]]:
-    """One row for each form of the first shipped policy of a task."""
-    file = shipped(task)[0]
+    """Rows of the forms of each shipped policy of a task; of all forms and times for the first."""
+    return [
+        {"task": task, "seed": file.stem, **row}
+        for number, file in enumerate(shipped(task))
+        for row in forms(file, task, steps, folder / file.stem, number == 0)
+    ]
+
+
+def forms(
+    file: Path, task: str, steps: int, folder: Path, everything: bool
+) -> list[dict[str, Any]]:
+    """One row for each form of a policy; ONNX and C in float32 alone without ``everything``."""
+    folder.mkdir(exist_ok=True)
     policy = read_policy(file)
     model, _ = export_onnx(policy, folder / f"{task}.onnx")
     header, _ = export_c(policy, folder / f"{task}.h")
-    small, _ = export_c(policy, folder / f"{task}-int8.h", int8=True)
-    compiled = {
-        "C, float32": CompiledPolicy(header),
-        "C, float32, computed in float": CompiledPolicy(header, f"-D{task.upper()}_SINGLE"),
-        "C, int8": CompiledPolicy(small),
-    }
-    exported = {"ONNX": OnnxPolicy(model), **compiled}
-    exact = {name: exported[name] for name in ("ONNX", "C, float32")}
-    off = differences(policy, exact, task, steps, FISH)
-    others = {name: one for name, one in exported.items() if name not in exact}
-    off |= differences(policy, others, task, max(2, steps // 10), FISH)
+    exact = {"ONNX": OnnxPolicy(model), "C, float32": CompiledPolicy(header)}
+    others: dict[str, CompiledPolicy] = {}
+    if everything:
+        small, _ = export_c(policy, folder / f"{task}-int8.h", int8=True)
+        others = {
+            "C, float32, computed in float": CompiledPolicy(header, f"-D{task.upper()}_SINGLE"),
+            "C, int8": CompiledPolicy(small),
+        }
+    exported = exact | others
+    off = differences(policy, exported, task, steps, FISH)
     seen = next(iter(observations(task, 1, FISH)))
-    sizes = {"ONNX": model.stat().st_size}
-    sizes |= {name: one.flash_bytes() for name, one in compiled.items()}
     numpy_us = decision_us(PretrainedPolicy(policy), seen)
     rows = [{"policy": "NumPy (the file)", "us": numpy_us, "bytes": file.stat().st_size}]
     for name, one in exported.items():
         bare = isinstance(one, CompiledPolicy)
         us = bare_decision_us(one, seen) if bare else decision_us(one, seen)
+        size = one.flash_bytes() if bare else model.stat().st_size
         row = {"policy": name, "largest": off[name][0], "rms": off[name][1], "us": us}
-        rows.append(row | {"bytes": sizes[name], "ratio": us / numpy_us})
-    return [{"task": task, **row} for row in rows]
+        rows.append(row | {"bytes": size, "ratio": us / numpy_us})
+    return rows
 
 
 def swum(task: str) -> list[dict[str, Any]]:
@@ -88,11 +95,11 @@ def swum(task: str) -> list[dict[str, Any]]:
 def page(rows: Sequence[dict[str, Any]], swims: Sequence[dict[str, Any]], count: int) -> str:
     """The tables as Markdown."""
     text = "# Exported policies\n\nDifferences in an action from the NumPy policy over "
-    text += f"{count:,} observations a task (a tenth for the last two rows).\n\n{HEAD}"
+    text += f"{count:,} observations for each row. Decisions in processor time.\n\n{HEAD}"
     for row in rows:
         off = [f"{row[key]:.1e}" if key in row else "-" for key in ("largest", "rms")]
-        text += f"| {row['task']} | {row['policy']} | {' | '.join(off)} | {row['us']:.1f} "
-        text += f"| {row['bytes']:,} |\n"
+        text += f"| {row['task']} | {row['seed']} | {row['policy']} | {' | '.join(off)} "
+        text += f"| {row['us']:.1f} | {row['bytes']:,} |\n"
     text += "\nSwims of the suites, 100 episodes each.\n\n"
     text += "| task | weights | suite | success (%) | depth RMSE (cm) | heading RMSE (rad) |\n"
     text += "| --- | --- | --- | --: | --: | --: |\n"
@@ -106,10 +113,11 @@ def page(rows: Sequence[dict[str, Any]], swims: Sequence[dict[str, Any]], count:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--steps", type=int, default=500, help=f"observations in {FISH}s, a task")
-    parser.add_argument("--out", type=Path, default=ROOT / "results")
+    parser.add_argument(
+        "--steps", type=int, default=1000, help=f"observations in {FISH}s, a policy"
+    )
+    parser.add_argument("--out", type=Path, default=RESULTS)
     options, console = parser.parse_args(arguments), Console()
-    today = datetime.date.today().isoformat()
     with tempfile.TemporaryDirectory() as folder:
         rows = []
         for task in TASKS:
@@ -117,10 +125,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
             console.print(page(rows, [], options.steps * FISH), markup=False)
     swims = [row for task in TASKS for row in swum(task)]
     text = page(rows, swims, options.steps * FISH)
-    about = {"date": today, "machine": machine(), "rows": rows, "swims": swims}
-    about["versions"] = versions(("numpy", "onnx", "onnxruntime"))
-    (options.out / f"export-{today}.md").write_text(text, "utf-8")
-    (options.out / f"export-{today}.json").write_text(json.dumps(about, indent=1) + "\n", "utf-8")
+    about = {"machine": machine(), "steps": options.steps, "fish": FISH, "rows": rows}
+    about |= {"swims": swims, "versions": versions(("numpy", "onnx", "onnxruntime"))}
+    write_dated(options.out, "export", about, text)
     console.print(text, markup=False)
 
 

@@ -1,6 +1,6 @@
 """Kills trainings, diagnoses and suites over and over, and compares what comes of them.
 
-    python -m scripts.reliability.crash               # 30 kills of each, into results/
+    python -m scripts.reliability.crash               # 30 kills of each; one file each in results/
     python -m scripts.reliability.crash --only train --kills 5
 
 Each work runs in a process of its own, which gets SIGKILL: at a random moment, or while a file is
@@ -12,10 +12,12 @@ There is no sweep to kill yet.
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import signal
 import sys
 import tempfile
+import threading
 import time
 import traceback
 from collections.abc import Sequence
@@ -36,10 +38,9 @@ from scripts.results import RESULTS, write_dated  # noqa: E402
 
 MOMENTS = ("at a random moment", "while writing")
 ERRORS = "errors.txt"
-PATIENCE_S = 600.0
-"""A work that takes longer hangs."""
-AFTER_PART_S = 0.004
-"""A kill while writing comes so long after a new file was seen, at most."""
+AFTER_EVENT_S = 0.004
+"""A kill while writing comes so long after a new file was opened or put in place, at most."""
+WRITES = "writes.txt"
 
 
 @dataclass
@@ -65,8 +66,36 @@ class Score:
         return {"killed": sum(self.kills.values()), **vars(self)}
 
 
-def start(work: Work, folder: Path) -> int:
-    """Starts a work in a new process; errors go to a file beside the folder."""
+class Writes:
+    """Counts what a process writes: each new file is opened, then renamed.
+
+    Args:
+        kill_at: after so many of these the process kills itself; None: never.
+        delay_s: so long after the last of them, so that the kill falls into the writing too.
+    """
+
+    def __init__(self, kill_at: int | None = None, delay_s: float = 0.0) -> None:
+        self.count, self.kill_at, self.delay_s = 0, kill_at, delay_s
+        sys.addaudithook(self.notice)
+
+    def notice(self, event: str, arguments: tuple[Any, ...]) -> None:
+        """Called by Python for each event."""
+        if event not in ("open", "os.rename") or PART not in str(arguments[0]):
+            return
+        self.count += 1
+        if self.count == self.kill_at:
+            threading.Timer(self.delay_s, os.kill, (os.getpid(), signal.SIGKILL)).start()
+
+
+def start(work: Work, folder: Path, kill_at: int | None = None, delay_s: float = 0.0) -> int:
+    """Starts a work in a new process; errors go to a file beside the folder.
+
+    Args:
+        work: what to do.
+        folder: where.
+        kill_at: the process kills itself after so many openings and renamings; None: it does not.
+        delay_s: so long after that.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     process = os.fork()
     if process:
@@ -76,7 +105,9 @@ def start(work: Work, folder: Path) -> int:
         silent = os.open(os.devnull, os.O_WRONLY)
         os.dup2(silent, 1)
         os.dup2(silent, 2)
+        writes = Writes(kill_at, delay_s)
         work.run(folder)
+        folder.with_name(WRITES).write_text(str(writes.count), encoding="utf-8")
         status = 0
     except BaseException:
         folder.with_name(ERRORS).write_text(traceback.format_exc(), encoding="utf-8")
@@ -95,38 +126,34 @@ def parts_in(folder: Path) -> set[str]:
     return {str(file) for file in folder.rglob(f".*{PART}*")}
 
 
-def kill_once(
-    work: Work, folder: Path, moment: str, usual_s: float, rng: np.random.Generator
-) -> bool:
-    """Starts a work and kills it.
+def kill_at_random(work: Work, folder: Path, usual_s: float, rng: np.random.Generator) -> bool:
+    """Starts a work and kills it within its usual time.
 
     Returns:
         Whether it was killed; False if it had ended by itself.
 
     Raises:
-        RuntimeError: it failed or hung by itself.
+        RuntimeError: it failed by itself.
     """
-    before = parts_in(folder) if folder.exists() else set[str]()
     process = start(work, folder)
-    begun = time.monotonic()
-    wait_s = rng.uniform(0.0, usual_s) if moment == MOMENTS[0] else PATIENCE_S
-    seen = int(rng.integers(1, 4))  # the first new file, the second or the third
-    while time.monotonic() - begun < wait_s:
+    until = time.monotonic() + rng.uniform(0.0, usual_s)
+    while time.monotonic() < until:
         status = ended(process, block=False)
         if status is not None:
             _check(work, folder, status)
             return False
-        if moment == MOMENTS[1]:
-            now = parts_in(folder)
-            if now - before:
-                seen -= 1
-                before |= now
-            if seen == 0:
-                time.sleep(rng.uniform(0.0, AFTER_PART_S))
-                break
-        else:
-            time.sleep(0.001)
+        time.sleep(0.001)
     os.kill(process, signal.SIGKILL)
+    return _killed(work, folder, process)
+
+
+def kill_while_writing(work: Work, folder: Path, writes: int, rng: np.random.Generator) -> bool:
+    """As :func:`kill_at_random`, for a kill after one of the openings and renamings of files."""
+    kill_at = int(rng.integers(1, max(2, writes // 2)))
+    return _killed(work, folder, start(work, folder, kill_at, rng.uniform(0.0, AFTER_EVENT_S)))
+
+
+def _killed(work: Work, folder: Path, process: int) -> bool:
     status = ended(process, block=True)
     if status == -signal.SIGKILL:
         return True
@@ -141,7 +168,9 @@ def _check(work: Work, folder: Path, status: int | None) -> None:
         raise RuntimeError(f"{work.name}: {words.strip()}")
 
 
-def torment(work: Work, place: Path, kills: int, seed: int) -> Score:
+def torment(
+    work: Work, place: Path, kills: int, seed: int, most_minutes: float = math.inf
+) -> Score:
     """Kills a work so many times, half of them while it writes, and compares each end.
 
     Args:
@@ -149,30 +178,38 @@ def torment(work: Work, place: Path, kills: int, seed: int) -> Score:
         place: a folder of its own.
         kills: how many.
         seed: of the moments.
+        most_minutes: after so long no further kill is begun.
     """
     rng, score = np.random.default_rng(seed), Score()
     begun = time.monotonic()
     _check(work, place / "whole", ended(start(work, place / "whole"), block=True))
     score.uninterrupted_s = round(time.monotonic() - begun, 2)
+    writes = int((place / WRITES).read_text(encoding="utf-8"))
     wanted = work.outcome(place / "whole")
-    attempts = 0
-    while sum(score.kills.values()) < kills:
+    attempts, late = 0, begun + 60.0 * most_minutes
+    while sum(score.kills.values()) < kills and time.monotonic() < late:
         folder = place / f"killed-{score.ends}"
         while True:
             attempts += 1
             done = sum(score.kills.values())
             # Each folder gets some kills, so that many resumed ends are compared.
-            if done >= kills or attempts % (work.kills_each + 1) == 0:
+            enough = done >= kills or time.monotonic() > late
+            if enough or attempts % (work.kills_each + 1) == 0:
                 _check(work, folder, ended(start(work, folder), block=True))
                 break
             moment = MOMENTS[done % 2]
             try:
-                if not kill_once(work, folder, moment, score.uninterrupted_s, rng):
+                if moment == MOMENTS[0]:
+                    killed = kill_at_random(work, folder, score.uninterrupted_s, rng)
+                else:
+                    killed = kill_while_writing(work, folder, writes, rng)
+                if not killed:
                     break
             except RuntimeError as error:
                 score.different.append(f"after {done} kills: {error}")
                 return score
             score.kills[moment] += 1
+            print(f"{work.name}: {done + 1} kills", file=sys.stderr, flush=True)
             score.different += work.damage(folder, place / "whole")
         score.parts += len(parts_in(folder))
         score.ends += 1
@@ -190,6 +227,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     add = parser.add_argument
     add("--only", help=f"some of {','.join(WORKS)}; default: all")
     add("--kills", type=int, default=30, help="of each work; default: 30")
+    add("--most-minutes", type=float, default=math.inf, help="of each work, then fewer kills")
     add("--seed", type=int, default=0, help="of the moments")
     add("--out", type=Path, default=RESULTS, help="folder of the dated result")
     options = parser.parse_args(arguments)
@@ -201,17 +239,20 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
 
 def main(arguments: Sequence[str] | None = None) -> None:
     options = parse(arguments)
-    scores = {}
+    bad = []
     with tempfile.TemporaryDirectory() as place:
         for name in options.only:
             work = WORKS[name]()
-            score = torment(work, Path(place) / name, options.kills, options.seed)
-            scores[name] = score.as_dict() | {"bitwise": work.promise}
-            print(f"{name}: {scores[name]}", flush=True)
-    content = {"machine": harness.machine(), "seed": options.seed, "works": scores}
-    file = write_dated(options.out, "crash", content)
-    bad = [name for name, score in scores.items() if score["different"]]
-    print(f"{', '.join(bad) or 'nothing'} differs from the uninterrupted; written: {file.name}")
+            score = torment(
+                work, Path(place) / name, options.kills, options.seed, options.most_minutes
+            )
+            if score.different:
+                bad.append(name)
+            about = {"work": name, "seed": options.seed, "machine": harness.machine()}
+            about |= score.as_dict() | {"promise": work.promise}
+            file = write_dated(options.out, f"crash-{name}", about)
+            print(f"{name}: {score.as_dict()}; written: {file.name}", flush=True)
+    print(f"{', '.join(bad) or 'nothing'} differs from the uninterrupted")
     sys.exit(1 if bad else 0)
 
 

@@ -16,7 +16,7 @@ EXTRAS = PROJECT["optional-dependencies"]
 def pinned(name: str) -> dict[str, str]:
     """Package -> version that a constraints file pins."""
     lines = (ROOT / name).read_text(encoding="utf-8").splitlines()
-    pins = (line.split("==") for line in lines if "==" in line)
+    pins = (line.rstrip(" \\").split("==") for line in lines if "==" in line)
     return {canonicalize_name(package): version for package, version in pins}
 
 
@@ -38,6 +38,17 @@ def test_every_requirement_admits_the_version_it_was_tested_with(text, versions)
 def test_constraints_name_versions_only(name):
     lines = (ROOT / name).read_text(encoding="utf-8").splitlines()
     assert [line for line in lines if not re.fullmatch(r"#.*|[\w.-]+==[\w.]+", line)] == []
+
+
+def test_the_lock_holds_what_is_asked_for_in_the_tested_versions():
+    recipe = (ROOT / "Makefile").read_text(encoding="utf-8")
+    asked = [*PROJECT["dependencies"]]
+    for extra in re.findall(r"--extra (\w+)", recipe):
+        asked += EXTRAS[extra]
+    locked = pinned("requirements.lock")
+    missing = {canonicalize_name(Requirement(item).name) for item in asked} - set(locked)
+    assert missing == set(), "run `make lock`"
+    assert {name: TESTED.get(name, version) for name, version in locked.items()} == locked
 
 
 def test_the_base_install_needs_no_torch():

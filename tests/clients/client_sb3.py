@@ -1,4 +1,4 @@
-"""Stable-Baselines3 trains, saves, loads and swims."""
+"""Stable-Baselines3 and rl_zoo3 train, save, load and swim."""
 
 import gymnasium as gym
 import numpy as np
@@ -9,7 +9,7 @@ from stable_baselines3.common.env_util import make_vec_env
 from stable_baselines3.common.evaluation import evaluate_policy
 
 from fish_env.envs.sb3 import FishVecEnv
-from tests.clients.running import ENV
+from tests.clients.running import ENV, ROOT, run
 
 
 @pytest.mark.parametrize("vectorised", ["make_vec_env", "FishVecEnv"])
@@ -31,3 +31,19 @@ def test_sb3_learns_saves_and_loads(algorithm, vectorised, tmp_path):
     check_env(env, warn=True)
     mean, _ = evaluate_policy(loaded, env, 1, warn=False)
     assert -500 < mean < 400
+
+
+def test_rl_zoo3_trains_with_our_hyper_parameters_and_enjoys(tmp_path):
+    chosen = ("--algo", "ppo", "--env", "RoboticFish3D-v0", "--gym-packages", "fish_env")
+    settings = ROOT / "configs" / "rl_zoo3" / "ppo.yml"
+    shown = run(
+        tmp_path, "-m", "rl_zoo3.train", *chosen, "-conf", settings, "-n", "4096", "-f", "logs",
+        "--device", "cpu", "--eval-freq", "-1", "--num-threads", "1",
+    )  # fmt: skip
+    assert "Normalization activated" in shown
+    assert list((tmp_path / "logs").rglob("vecnormalize.pkl"))
+    shown = run(
+        tmp_path, "-m", "rl_zoo3.enjoy", *chosen, "-f", "logs", "-n", "800", "--no-render",
+        "--device", "cpu",
+    )  # fmt: skip
+    assert "Mean reward" in shown or "Episode Reward" in shown

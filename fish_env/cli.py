@@ -18,7 +18,16 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
-from fish_env.commands.options import Commands, Json, TrustEffects, Version
+from fish_env.commands.campaign import campaign
+from fish_env.commands.options import (
+    Commands,
+    Json,
+    MeasuredBeats,
+    OtherFish,
+    Quick,
+    TrustEffects,
+    Version,
+)
 from fish_env.errors import Interrupted, RoboticFishError
 
 app = typer.Typer(
@@ -68,9 +77,7 @@ def compare(
     dataset: Annotated[
         str, typer.Argument(help="A folder with dataset.yaml, or a shipped dataset's name.")
     ],
-    fish: Annotated[
-        str | None, typer.Option(help="Another fish than the dataset names: preset or file.")
-    ] = None,
+    fish: OtherFish = None,
     json: Json = None,
     out: Annotated[Path | None, typer.Option(help="Folder for pictures.")] = None,
     dt: Annotated[float, typer.Option(help="Longest physics step, s.")] = 0.01,
@@ -171,18 +178,9 @@ def diagnose(
         str, typer.Argument(help="A folder with dataset.yaml, or a shipped dataset's name.")
     ],
     out: Annotated[Path, typer.Option(help="Folder for what is found.")] = Path("out/diagnosis"),
-    fish: Annotated[
-        str | None, typer.Option(help="Another fish than the dataset names: preset or file.")
-    ] = None,
-    quick: Annotated[
-        bool, typer.Option("--quick", help="A first look: fewer runs, no rival causes.")
-    ] = False,
-    measured_beats: Annotated[
-        bool,
-        typer.Option(
-            "--measured-beats", help="Tail frequencies from the hull's swaying, not as commanded."
-        ),
-    ] = False,
+    fish: OtherFish = None,
+    quick: Quick = False,
+    measured_beats: MeasuredBeats = False,
     seed: Annotated[int, typer.Option(min=0, help="Of all that is random.")] = 0,
     json: Json = None,
     trust_effects: TrustEffects = False,
@@ -208,9 +206,7 @@ def fit(
     dataset: Annotated[
         str, typer.Argument(help="A folder with dataset.yaml, or a shipped dataset's name.")
     ],
-    fish: Annotated[
-        str | None, typer.Option(help="Another fish than the dataset names: preset or file.")
-    ] = None,
+    fish: OtherFish = None,
     effects: Annotated[
         str,
         typer.Option(
@@ -342,6 +338,8 @@ def effects(json: Json = None) -> None:
 
     print_effects(console_for(json), json)
 
+
+app.command()(campaign)
 
 GROUP = "robofish.commands"
 INTERRUPTED = 130

@@ -24,6 +24,33 @@ Json = Annotated[
     Path | None, typer.Option("--json", help="File for all numbers; - is standard output.")
 ]
 
+OtherFish = Annotated[
+    str | None, typer.Option(help="Another fish than the dataset names: preset or file.")
+]
+Quick = Annotated[bool, typer.Option("--quick", help="A first look: fewer runs, no rival causes.")]
+MeasuredBeats = Annotated[
+    bool,
+    typer.Option(
+        "--measured-beats", help="Tail frequencies from the hull's swaying, not as commanded."
+    ),
+]
+Address = Annotated[
+    str | None,
+    typer.Option(
+        help="A running Ray cluster, HOST:PORT or auto. Without it, Ray starts on this machine "
+        "and ends with the command.",
+        show_default=False,
+    ),
+]
+Cpus = Annotated[
+    int | None,
+    typer.Option(help="Tasks side by side on this machine.", show_default="its cores"),
+]
+Temp = Annotated[
+    Path | None,
+    typer.Option(help="Folder for Ray's own files on this machine.", show_default="Ray's"),
+]
+
 
 class Commands(TyperGroup):
     """The commands; a person's Ctrl-C ends each with one line."""

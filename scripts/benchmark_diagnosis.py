@@ -4,6 +4,9 @@ Each finished case is kept, so a stopped run goes on where it was:
 
     python scripts/benchmark_diagnosis.py --tiers rich,null --limit 20
     python scripts/benchmark_diagnosis.py --suite realistic
+    python scripts/benchmark_diagnosis.py --suite realistic --ray --address auto
+
+With `--ray` the cases are tasks of a Ray cluster, and only this process writes.
 """
 
 from __future__ import annotations
@@ -11,7 +14,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict
 from pathlib import Path
@@ -25,8 +28,9 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 from rich.progress import track  # noqa: E402
 
+from fish_env.cluster import ClusterSettings, Failed, Task, connected, run_tasks  # noqa: E402
 from scripts.results import RESULTS, commit, today, write_dated  # noqa: E402
-from tests.hidden.suite import PIPELINE, SUITES, Job, do, jobs  # noqa: E402
+from tests.hidden.suite import PIPELINE, SUITES, Job, do, jobs, keep, make  # noqa: E402
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -42,8 +46,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
             job.file.unlink(missing_ok=True)
     if options.finished:
         todo = [job for job in todo if job.file.exists()]
-    finished = track(run(todo, options.processes), f"{len(todo)} cases", total=len(todo))
+    lost: list[str] = []
+    found = on_ray(todo, options, lost.append) if options.ray else run(todo, options.processes)
+    finished = track(found, f"{len(todo)} cases", total=len(todo))
     rows = sorted(finished, key=lambda row: (row.tier, row.seed))
+    if lost:
+        sys.exit("not finished, run the same command again:\n" + "\n".join(lost))
     write(rows, options)
 
 
@@ -58,10 +66,15 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     add("--finished", action="store_true", help="only sum up the cases finished so far")
     add("--fresh", action="store_true", help="do finished cases again")
     add("--processes", type=int, default=2)
+    add("--ray", action="store_true", help="run the cases as Ray tasks, see docs/cluster.md")
+    add("--address", help="with --ray: a running cluster, HOST:PORT or auto")
+    add("--temp", type=Path, help="with --ray: folder for Ray's own files on this machine")
     add("--work", type=Path, help="folder of finished cases; default: out/benchmark-...")
     add("--out", type=Path, default=RESULTS, help="folder of the dated result")
     add("--diagnose", default=PIPELINE, help="module:function to judge instead")
     options = parser.parse_args(arguments)
+    if not options.ray and (options.address or options.temp):
+        parser.error("--address and --temp belong to --ray")
     options.tiers = tuple(options.tiers.split(",")) if options.tiers else ()
     known = SUITES[options.suite].counts
     if unknown := set(options.tiers) - set(known):
@@ -79,6 +92,23 @@ def run(todo: list[Job], processes: int) -> Iterator[Any]:
     with ProcessPoolExecutor(processes) as pool:
         for future in as_completed([pool.submit(do, job) for job in todo]):
             yield future.result()
+
+
+def on_ray(
+    todo: list[Job], options: argparse.Namespace, lose: Callable[[str], object]
+) -> Iterator[Any]:
+    """The rows of the jobs as Ray's tasks end; told the cases whose processes died each time."""
+    left = [job for job in todo if not job.file.exists()]
+    yield from (do(job) for job in todo if job not in left)
+    if not left:
+        return
+    cpus = None if options.address else options.processes
+    with connected(ClusterSettings(options.address, cpus, options.temp)) as ray:
+        for task, result in run_tasks(ray, make, (Task(job.file.stem, job) for job in left)):
+            if isinstance(result, Failed):
+                lose(f"{task.name}: {result.reason}")
+            else:
+                yield keep(task.payload, lambda found=result: found)
 
 
 def write(rows: list[Any], options: argparse.Namespace) -> None:

@@ -123,13 +123,18 @@ def find(name: str) -> Diagnose:
 
 def do(job: Job) -> Any:
     """Makes, diagnoses and scores one case; a finished one is read back."""
-    suite = suite_of(job.tier)
-    return suite.row_of(kept(job.file, partial(_done, suite, job)))
+    return keep(job, partial(make, job))
 
 
-def _done(suite: Suite, job: Job) -> dict[str, Any]:
+def make(job: Job) -> dict[str, Any]:
+    """Makes, diagnoses and scores one case, and writes nothing that stays."""
     with tempfile.TemporaryDirectory() as place:
-        return suite.finish(Path(place) / "data", job)
+        return suite_of(job.tier).finish(Path(place) / "data", job)
+
+
+def keep(job: Job, content: Callable[[], Mapping[str, Any]]) -> Any:
+    """The row of a case; what is not finished is written, whole."""
+    return suite_of(job.tier).row_of(kept(job.file, content))
 
 
 def _answer(folder: Path, job: Job) -> Mapping[str, Any]:

@@ -22,6 +22,10 @@ except ImportError:  # Windows; there two trainings in one folder are not told a
 LOCK = "training.lock"
 
 
+class Held(ConfigError):
+    """Raised when another training runs in a folder."""
+
+
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
     """Keeps a folder for this process; the system lets go of it whatever way the process ends.
@@ -33,7 +37,7 @@ def locked(folder: Path) -> Iterator[None]:
         folder: made if missing.
 
     Raises:
-        ConfigError: another training runs in the folder; says in which process.
+        Held: another training runs in the folder; says in which process.
         OutputError: the folder cannot be written.
     """
     if fcntl is None:
@@ -46,7 +50,7 @@ def locked(folder: Path) -> Iterator[None]:
     except OSError as error:
         raise cannot_write(file, error) from error
     if held is None:
-        raise ConfigError(
+        raise Held(
             f"{folder}: {_holder(file)} trains here now; wait until it ends, stop it, or give "
             "another folder with --out"
         )

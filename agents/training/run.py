@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -81,6 +81,16 @@ def outputs(folder: Path) -> list[Path]:
     return [folder / name for name in (CONFIG, CHECKPOINT, POLICY, CARD, EVALUATIONS)]
 
 
+def config_bytes(config: TrainConfig) -> bytes:
+    """What ``config.yaml`` of a run folder holds."""
+    return _yaml(config.tree())
+
+
+def best_of(evaluations: Sequence[dict[str, float]]) -> dict[str, float]:
+    """The evaluation whose policy is kept: the first of those with the most success."""
+    return max(evaluations, key=_merit)
+
+
 def _check_folder(config: TrainConfig, folder: Path, resume: bool) -> None:
     """Refuses a folder that has something to lose."""
     if (folder / CHECKPOINT).exists():
@@ -92,7 +102,7 @@ def _check_folder(config: TrainConfig, folder: Path, resume: bool) -> None:
         return
     present = [file for file in outputs(folder) if file.exists()]
     kept = folder / CONFIG
-    if present and not (kept.is_file() and kept.read_bytes() == _yaml(config.tree())):
+    if present and not (kept.is_file() and kept.read_bytes() == config_bytes(config)):
         raise ConfigError(
             f"{present[0]}: this training did not write it and would replace it; move it away, or "
             "give another folder with --out"
@@ -110,7 +120,7 @@ class _Run:
         if checkpoint.exists():
             self.model, self.progress = load_checkpoint(checkpoint, config, self.stack)
         else:
-            write_bytes(folder / CONFIG, _yaml(config.tree()))
+            write_bytes(folder / CONFIG, config_bytes(config))
             self.model, self.progress = make_model(config, self.stack), Progress()
             seed_episodes(self.stack, config)
             if config.imitate.rounds:
@@ -134,8 +144,7 @@ class _Run:
                 logger.configure(str(self.folder / "tensorboard"), ["tensorboard"])
             )
             self.model.learn(left, callback=books, reset_num_timesteps=progress.steps == 0)
-        best = max(progress.evaluations, key=_merit)
-        return Outcome(self.folder / POLICY, best, progress)
+        return Outcome(self.folder / POLICY, best_of(progress.evaluations), progress)
 
     def _evaluate(self) -> dict[str, float]:
         policy = self._policy({})

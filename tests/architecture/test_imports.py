@@ -16,6 +16,7 @@ LINTER = Path(sys.executable).with_name("lint-imports")
 OPEN_TO_AGENTS = {
     "archives",
     "arrays",
+    "cluster",
     "commands",
     "errors",
     "files",

@@ -1,0 +1,1 @@
+"""One training under many seeds and settings, by Ray Tune."""

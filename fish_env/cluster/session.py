@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,6 +15,8 @@ from fish_env.threads import default_threads
 
 OBJECT_STORE_BYTES = 100_000_000
 """Shared memory of the embedded Ray. Ray's own default is 30 % of the machine's memory."""
+ANSWER_S = 5.0
+"""How long the head of a cluster may take to accept a connection."""
 QUIET = {
     "RAY_USAGE_STATS_ENABLED": "0",  # Ray would report to its makers
     "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
@@ -96,11 +99,23 @@ def _start(ray: Any, settings: ClusterSettings) -> None:
             options["_temp_dir"] = str(settings.temp.resolve())
     else:
         options["address"] = settings.address
+        _knock(settings)
     try:
         ray.init(**options)
     # Ray raises many kinds of errors here, of its own, of gRPC and of Python.
     except Exception as error:
         ray.shutdown()
+        raise _not_started(settings, error) from error
+
+
+def _knock(settings: ClusterSettings) -> None:
+    """Sees that something listens at the address; Ray itself would wait for many minutes."""
+    host, colon, port = str(settings.address).rpartition(":")
+    if not colon or not port.isdigit():
+        return
+    try:
+        socket.create_connection((host.removeprefix("ray://"), int(port)), ANSWER_S).close()
+    except (OSError, OverflowError) as error:
         raise _not_started(settings, error) from error
 
 

@@ -79,7 +79,7 @@ FUZZ_EXAMPLES ?= 2000
 fuzz: setup  ## try FUZZ_EXAMPLES hostile inputs in each test of the readers (2000: about an hour)
 	FUZZ_EXAMPLES=$(FUZZ_EXAMPLES) $(BIN)/python -m pytest tests/fuzzing
 
-.PHONY: fuzz-guided crash soak versions lock audit bom
+.PHONY: fuzz-guided crash soak versions lock audit bom ray
 FUZZ_SECONDS ?= 600
 fuzz-guided: $(VENV)/.with-reliability  ## fuzz each reader, led by coverage, for FUZZ_SECONDS (600)
 	$(BIN)/python -m scripts.reliability.guided_fuzz --seconds $(FUZZ_SECONDS)
@@ -91,6 +91,9 @@ crash: setup  ## test the rig, kill training, diagnosis and suite 30 times each,
 SOAK_HOURS ?= 8
 soak: setup  ## 1e8 steps of the batch, then train, evaluate and diagnose for SOAK_HOURS (8)
 	$(BIN)/python -m scripts.reliability.soak --hours $(SOAK_HOURS)
+
+ray: $(VENV)/.with-ray  ## test campaigns and sweeps on a Ray cluster that loses a node, see docs/cluster.md
+	$(BIN)/python -m pytest tests/cluster/ray_*.py
 
 versions: $(VENV)/.with-reliability  ## run tests on the oldest and newest supported versions
 	$(BIN)/python -m scripts.reliability.versions
@@ -140,6 +143,11 @@ $(VENV)/.with-docs: pyproject.toml constraints.txt | $(VENV)/bin/python
 
 $(VENV)/.with-reliability: $(VENV)/.with-dev
 	@$(PIP) "atheris>=3,<4" "cyclonedx-bom>=7,<8" "pip-audit>=2.10,<3" "uv>=0.8,<1"
+	@touch $@
+
+$(VENV)/.with-ray: $(VENV)/.with-dev
+	@echo "Installing Ray into $(VENV)"
+	@$(PIP) --editable ".[ray]"
 	@touch $@
 
 $(VENV)/.with-bench: pyproject.toml constraints.txt | $(VENV)/bin/python

@@ -128,4 +128,8 @@ def _not_started(settings: ClusterSettings, error: Exception) -> ConfigError:
         )
     if "AF_UNIX" in reason:
         return ConfigError(f"--temp {settings.temp}: the path is too long for Ray; give a shorter")
+    if "timed out" in reason:
+        return ConfigError(
+            f"Ray cannot start: this machine is too busy ({reason}); try again later"
+        )
     return ConfigError(f"Ray cannot start on this machine ({reason}); give another --temp")

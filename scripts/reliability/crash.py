@@ -6,7 +6,7 @@
 Each work runs in a process of its own, which gets SIGKILL: at a random moment, or while a file is
 being written. It is then started again in the same folder, until it ends by itself. What it leaves
 must equal what a process leaves that nobody killed. A difference ends the rig with status 1.
-There is no sweep to kill yet.
+Sweeps and campaigns are killed by ``make ray``.
 """
 
 from __future__ import annotations

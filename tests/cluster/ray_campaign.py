@@ -17,7 +17,7 @@ QUICK = Options(quick=True)
 HIDDEN = ({}, {"servo_lag": 1.0}, {}, {"servo_lag": 1.0})
 
 
-DATES = re.compile(rb"\d{4}-\d\d-\d\dT[\d:.]+")
+TIMES = re.compile(rb"\d{4}-\d\d-\d\dT[\d:.]+|\d+ s(?=\. Numbers: diagnosis\.json)")
 LIST = ".robofish-files.json"
 
 
@@ -29,7 +29,7 @@ def contents(folder: Path) -> dict[str, bytes | str]:
     """
     found: dict[str, bytes | str] = {}
     for file in sorted(f for f in folder.rglob("*") if f.is_file() and f.name != MARK):
-        content: bytes | str = DATES.sub(b"", file.read_bytes())
+        content: bytes | str = TIMES.sub(b"", file.read_bytes())
         if file.name == "diagnosis.json":
             answer = json.loads(content)
             answer.pop("runtime_s")

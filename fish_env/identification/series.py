@@ -272,7 +272,7 @@ class SeriesProblem(Problem):
         swum = self._swum_slopes(point, noise, filtered, steps[: len(VARIATIONS)])
         again = self.filtered(point, noise, keep_slopes=True)
         seen = slopes_of_runs(self.runs, again, self.channels, noise.correlation_s)
-        return np.hstack([swum, seen])
+        return np.hstack([swum, -seen])  # the data hold the errors, and not the model
 
     def _swum_slopes(
         self, point: Point, noise: NoiseModel, filtered: Sequence[Filtered], steps: FloatArray

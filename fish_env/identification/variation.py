@@ -46,10 +46,10 @@ SENSOR_ERRORS = (
     RunVariation("camera_roll", "rad", DEGREE, shared=True),
     RunVariation("camera_pitch", "rad", DEGREE, shared=True),
     RunVariation("camera_scale_per_depth", "1/m", 0.15, shared=True),
-    RunVariation("camera_delay", "s", 0.02, shared=True),
-    RunVariation("inertial_delay", "s", 0.02, shared=True),
-    RunVariation("depth_delay", "s", 0.02, shared=True),
-    RunVariation("inertial_smoothing", "1", 1.0, shared=True),
+    RunVariation("camera_delay", "s", 0.02, shared=True, positive=True),
+    RunVariation("inertial_delay", "s", 0.02, shared=True, positive=True),
+    RunVariation("depth_delay", "s", 0.02, shared=True, positive=True),
+    RunVariation("inertial_smoothing", "1", 1.0, shared=True, positive=True),
 )
 """Usual sizes: a centimetre, a degree, one per cent, a frame of a camera, all that a low-pass of
 5 Hz inside an inertial unit takes away; the picture of a camera

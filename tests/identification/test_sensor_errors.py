@@ -10,6 +10,7 @@ import pytest
 from fish_env.identification.sensor_errors import innovation_slopes, sensor_slopes
 from fish_env.identification.series import SeriesProblem
 from fish_env.identification.variation import SENSOR_ERRORS
+from fish_env.inference.estimate.fit import fit, run_variation
 from fish_env.inference.problem import Point
 from tests.identification.synthetic import PATHS, Setup, simulate
 
@@ -58,3 +59,22 @@ def test_slopes_need_a_filter_that_kept_them(filtered):
     (run,), (result,) = problem.runs, problem.filtered(point, noise)
     with pytest.raises(ValueError, match="keep_slopes"):
         sensor_slopes(run.clock, result, problem.channels)
+
+
+@pytest.mark.parametrize("late", [0.03, -0.03])
+def test_a_camera_may_be_late_and_cannot_foresee(late):
+    data = simulate(Setup(runs=5, duration=16.0))
+    runs = []
+    for run in data.runs:
+        seen = {
+            name: np.interp(run.time_s - late, run.time_s, values) if name in "xyuvw" else values
+            for name, values in run.channels.items()
+        }
+        runs.append(replace(run, channels=seen))
+    problem = SeriesProblem(replace(data, runs=tuple(runs)))
+    spread = run_variation(fit(problem, rounds=2))
+    delay = [v.name for v in problem.variations].index("camera_delay")
+    if late > 0.0:
+        assert spread.values[:, delay].mean() == pytest.approx(late, abs=0.01)
+    else:
+        assert spread.sd[delay] == 0.0

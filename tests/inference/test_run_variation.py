@@ -69,6 +69,15 @@ def test_nothing_shared_is_far_beyond_the_usual():
     assert fit_spread(far, variations(True)).sd[1] == pytest.approx(variations(True)[1].largest)
 
 
+@pytest.mark.parametrize(("mean", "taken"), [(-1.5, True), (1.5, False)])
+def test_what_cannot_be_negative_is_left_out_where_it_would_be(mean, taken):
+    """Residuals grow by what the data hold, so the number that puts them right has its sign."""
+    late = [RunVariation(name, "1", 1.0, shared=True, positive=True) for name in ("a", "b")]
+    found = fit_spread(likelihood(5, (0.0, 0.3), mean=mean)[0], late)
+    assert found.sd.any() == taken
+    assert not taken or found.values[:, 1].mean() == pytest.approx(-mean, abs=0.4)
+
+
 def test_the_restricted_likelihood_is_that_of_the_whole_covariance():
     residuals, shared, own, run_of, _ = record(3, (0.4, 0.8))
     sd = np.array([0.4, 0.8])

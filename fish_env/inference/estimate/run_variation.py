@@ -28,6 +28,8 @@ LARGEST = 30.0
 """Largest spread that is looked for, in units of the usual one."""
 SIZES = np.geomspace(0.1, 10.0, 7)
 """Spreads that are tried before one is looked for exactly, in units of the usual one."""
+FORESEEN = 2.0
+"""Standard errors of a run's number by which its mean is surely negative."""
 WIDE = 0.01
 """Precision of what all runs have in common, in usual spreads: hardly any."""
 
@@ -43,12 +45,14 @@ class RunVariation:
         shared: whether runs may as well have it in common. If not, only differences between runs
             count as variation: what all runs have in common is a cause, to be found and named.
             What they may share is not taken to be far beyond the usual, which again is a cause.
+        positive: whether it cannot be negative: no device shows what has yet to happen.
     """
 
     name: str
     unit: str
     usual: float
     shared: bool = False
+    positive: bool = False
 
     @property
     def largest(self) -> float:
@@ -226,6 +230,7 @@ def fit_spread(likelihood: Likelihood, variations: Sequence[RunVariation]) -> Sp
 
     Spreads are added one at a time, the most indicated first, while one gains enough. The prior of
     each is half-normal with the usual spread as its scale: what is far beyond it has to be plain.
+    What cannot be negative is left out where it would be: something else is then meant.
 
     Args:
         likelihood: of spreads in units of the usual ones.
@@ -234,11 +239,12 @@ def fit_spread(likelihood: Likelihood, variations: Sequence[RunVariation]) -> Sp
     count = len(variations)
     usual = np.array([variation.usual for variation in variations])
     largest = np.array([variation.largest for variation in variations])
+    positive = np.array([variation.positive for variation in variations], bool)
     sd, none = np.zeros(count), likelihood(np.zeros(count))
     active: list[int] = []
+    refused: set[int] = set()
     best = none
-    while len(active) < count:
-        left = [i for i in range(count) if i not in active]
+    while left := [i for i in range(count) if i not in active and i not in refused]:
         added = [_alone(likelihood, sd, i, float(largest[i])) for i in left]
         value, i, size = min(added)
         if best - value < POLICY.run_variation_gain:
@@ -246,8 +252,18 @@ def fit_spread(likelihood: Likelihood, variations: Sequence[RunVariation]) -> Sp
         active.append(i)
         sd[i] = size
         sd, best = _largest(likelihood, largest, active, sd)
+        wrong = positive & _negative(*likelihood.predicted(sd)) & (sd > 0.0)
+        if wrong.any():
+            refused |= {*np.flatnonzero(wrong).tolist()}
+            active = [k for k in active if k not in refused]
+            sd, best = _largest(likelihood, largest, active, sd) if active else (0.0 * sd, none)
     values, errors = likelihood.predicted(sd)
     return Spread(sd * usual, none - best, values * usual, errors * usual)
+
+
+def _negative(values: FloatArray, errors: FloatArray) -> BoolArray:
+    """(K,) whether the runs' own numbers (R, K) are negative on the whole."""
+    return np.asarray(values.mean(axis=0) < -FORESEEN * errors.mean(axis=0))
 
 
 def _alone(

@@ -175,7 +175,11 @@ def diagnose(
         str | None, typer.Option(help="Another fish than the dataset names: preset or file.")
     ] = None,
     quick: Annotated[
-        bool, typer.Option("--quick", help="A first look: fewer runs, no rival causes.")
+        bool,
+        typer.Option(
+            "--quick",
+            help="Fit the first 20 s of two runs and skip the comparison of rival causes.",
+        ),
     ] = False,
     measured_beats: Annotated[
         bool,

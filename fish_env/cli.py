@@ -113,6 +113,7 @@ def import_command(
     run_column: Annotated[
         str | None, typer.Option(help="Column that tells several runs in one table apart.")
     ] = None,
+    start: Annotated[str | None, typer.Option(help="rest: each run began level and still.")] = None,
     yes: Annotated[
         bool, typer.Option("--yes", help="Accept what is guessed; everything assumed is printed.")
     ] = False,
@@ -128,7 +129,7 @@ def import_command(
 
     console = Console()
     ask = console.input if sys.stdin.isatty() else None
-    told = Told(fish, frame, name, run_column)
+    told = Told(fish, frame, name, run_column, start)
     if import_logs(console, logs, out, mapping, told, yes, ask) is None:
         raise typer.Exit(1)
 
@@ -175,17 +176,10 @@ def diagnose(
         str | None, typer.Option(help="Another fish than the dataset names: preset or file.")
     ] = None,
     quick: Annotated[
-        bool,
-        typer.Option(
-            "--quick",
-            help="Fit the first 20 s of two runs and skip the comparison of rival causes.",
-        ),
+        bool, typer.Option("--quick", help="Fit 20 s of two runs; compare no rival causes.")
     ] = False,
     measured_beats: Annotated[
-        bool,
-        typer.Option(
-            "--measured-beats", help="Tail frequencies from the hull's swaying, not as commanded."
-        ),
+        bool, typer.Option("--measured-beats", help="Take tail frequencies from the hull's sway.")
     ] = False,
     seed: Annotated[int, typer.Option(min=0, help="Of all that is random.")] = 0,
     json: Json = None,

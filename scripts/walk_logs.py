@@ -62,7 +62,7 @@ def write_bags(folder: Path) -> None:
     for name, swim in swims().items():
         flipped = swim.commands * np.array([-1.0, 1.0, 1.0, 1.0, 1.0])
         motion = Swim(swim.time_s, swim.channels, swim.command_times_s, flipped)
-        write_ros2(folder / "bags" / name, motion, "MCAP")
+        write_ros2(folder / "bags" / name, motion, "MCAP", imu_delay_s=0.0)
 
 
 def write_mat(folder: Path) -> None:

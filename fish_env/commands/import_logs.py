@@ -72,7 +72,6 @@ class Told:
             "name": self.name,
             "run_column": self.run_column,
             "start": self.start,
-            "tail_phase": 0.0 if self.start == "rest" else None,
         }
         return {**content, **{key: value for key, value in told.items() if value is not None}}
 

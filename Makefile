@@ -10,7 +10,7 @@ CLEANRL := .venv-cleanrl
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint docs bench benchmark-diagnosis benchmark-realistic benchmark-power benchmark-time benchmark-agents benchmark-loop clients measure-export fuzz check-release clean
+.PHONY: help setup demo test lint docs bench benchmark-diagnosis benchmark-realistic benchmark-power benchmark-time benchmark-agents benchmark-loop clients measure-export fuzz check-release walks clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 28
@@ -36,6 +36,7 @@ docs: $(VENV)/.with-docs  ## write the generated pages, then the site into out/s
 	$(BIN)/python -m scripts.make_environment_page
 	$(BIN)/python -m scripts.make_import_graphs
 	$(BIN)/python -m scripts.make_benchmarks_page
+	$(BIN)/python -m scripts.make_notebook_page
 	$(BIN)/python -m scripts.update_readme
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --quiet
 	@echo "Open out/site/index.html"
@@ -68,6 +69,9 @@ benchmark-loop: setup  ## measure hidden fish, diagnose, learn on what was found
 check-release: setup  ## build the wheel twice and compare, and go through the checklists of a release
 	$(BIN)/python -m scripts.check_wheels
 	$(BIN)/python -m scripts.check_project
+
+walks: setup  ## go from raw logs and from nothing to an answer, as the pages say, and time it
+	$(BIN)/python -m scripts.walks
 
 measure-export: setup  ## compare exported policies with the NumPy policy, over a million observations
 	$(BIN)/python -m scripts.measure_export
@@ -133,12 +137,12 @@ $(VENV)/.with-base: pyproject.toml constraints.txt | $(VENV)/bin/python
 $(VENV)/.with-dev: pyproject.toml constraints.txt | $(VENV)/bin/python
 	@echo "Installing robotic-fish with its test and training tools into $(VENV)"
 	@echo "(a few minutes, only this once; PyTorch is the large part)"
-	@$(PIP) --editable ".[dev,train,parquet,render,docs]"
+	@$(PIP) --editable ".[dev,train,parquet,render,docs,notebook]"
 	@touch $(VENV)/.with-base $(VENV)/.with-docs $@
 
 $(VENV)/.with-docs: pyproject.toml constraints.txt | $(VENV)/bin/python
 	@echo "Installing robotic-fish and what builds its documentation into $(VENV)"
-	@$(PIP) --editable ".[docs]"
+	@$(PIP) --editable ".[docs,train,notebook]"
 	@touch $(VENV)/.with-base $@
 
 $(VENV)/.with-reliability: $(VENV)/.with-dev

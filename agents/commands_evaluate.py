@@ -33,7 +33,7 @@ def evaluate(
     ] = ALL,
     task: Annotated[str, typer.Option(help="hold, track, or both.")] = "both",
     episodes: Annotated[
-        int | None, typer.Option(min=1, help="Only the first so many, for a first look.")
+        int | None, typer.Option(min=1, help="Only the first so many episodes.")
     ] = None,
     json: Json = None,
     trust_effects: TrustEffects = False,

@@ -120,6 +120,7 @@ def import_command(
     run_column: Annotated[
         str | None, typer.Option(help="Column that tells several runs in one table apart.")
     ] = None,
+    start: Annotated[str | None, typer.Option(help="rest: each run began level and still.")] = None,
     yes: Annotated[
         bool, typer.Option("--yes", help="Accept what is guessed; everything assumed is printed.")
     ] = False,
@@ -135,7 +136,7 @@ def import_command(
 
     console = Console()
     ask = console.input if sys.stdin.isatty() else None
-    told = Told(fish, frame, name, run_column)
+    told = Told(fish, frame, name, run_column, start)
     if import_logs(console, logs, out, mapping, told, yes, ask) is None:
         raise typer.Exit(1)
 

@@ -108,7 +108,7 @@ def diagnose(
         fish: As for :func:`compare`.
         out: Folder for the report and the extended fish; without it they are kept as long as the
             result, and `save` writes them.
-        quick: A first look: fewer runs, no rival causes.
+        quick: Fit the first 20 s of two runs and skip the comparison of rival causes.
         rng: Seed of the split into runs and of the null distributions, or a generator that one is
             drawn from. The seed stands in the answer.
         measured_beats: Take the tail's frequencies from the hull's swaying, not as commanded.

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from fish_env.comparison import RunsComparison, SteadyComparison
 from fish_env.comparison.words import in_words
-from fish_env.diagnosis.answer import words
+from fish_env.diagnosis.headline import headline
 from fish_env.diagnosis.writing import EXTENDED
 from fish_env.files import write_bytes
 from fish_env.identification.dataset_fit import DatasetFit
@@ -157,7 +157,7 @@ class FitResult(Result):
         return f"{found.fish.name} fitted to {found.dataset} ({found.objective} errors)"
 
     def sentences(self) -> list[str]:
-        """Errors, and what moved furthest from what was believed before."""
+        """Errors, and what moved furthest from its prior."""
         found = self.result
         errors = ", ".join(
             f"{name} {value:.3g} {found.units[name]}" for name, value in found.mean_errors.items()
@@ -216,7 +216,7 @@ class DiagnoseResult(Result):
 
     @property
     def verdict(self) -> str:
-        """The verdict in one word, such as `extended` or `no_misfit`."""
+        """The verdict in one word, such as `cause` or `no_misfit`."""
         return str(self.answer["verdict"])
 
     @property
@@ -231,8 +231,8 @@ class DiagnoseResult(Result):
         return f"{self.verdict}: {causes}" if causes else self.verdict
 
     def sentences(self) -> list[str]:
-        """The verdict in words."""
-        return [words(self.answer)]
+        """Verdict, closed share of the gap, next step and caveats, as in the report."""
+        return list(headline(self.answer).lines)
 
     def to_dataframe(self) -> pd.DataFrame:
         """Every parameter of the causes and of their rivals, with its 95 % interval."""

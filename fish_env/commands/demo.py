@@ -46,7 +46,7 @@ def compare_with_a_real_fish(console: Console, out: Path) -> list[Path]:
 
 def diagnose_trials(console: Console, out: Path) -> list[Path]:
     """Diagnoses six runs of a robot with a hidden fault; returns the report and its picture."""
-    from fish_env.diagnosis.headline import headline
+    from fish_env.commands.diagnose import print_headline
     from fish_env.diagnosis.pipeline import diagnose
 
     console.print(
@@ -58,10 +58,7 @@ def diagnose_trials(console: Console, out: Path) -> list[Path]:
         answer = diagnose(
             TRIALS, folder, quick=True, progress=lambda step: status.update(f"{step}")
         )
-    verdict, *others = headline(answer).lines
-    console.print(verdict, style="bold", highlight=False, markup=False)
-    for line in others:
-        console.print(line, highlight=False, markup=False)
+    print_headline(console, answer)
     return [folder / "report.html", folder / "figures" / "paths.png"]
 
 

@@ -14,7 +14,8 @@ from rich.table import Table
 
 from fish_env.commands.numbers import write_json
 from fish_env.data import dataset_files
-from fish_env.diagnosis.answer import holds_elsewhere, words
+from fish_env.diagnosis.answer import holds_elsewhere
+from fish_env.diagnosis.headline import facts, headline
 from fish_env.diagnosis.pipeline import diagnose
 from fish_env.diagnosis.writing import EXTENDED
 from fish_env.errors import Interrupted
@@ -44,7 +45,7 @@ def diagnose_dataset(
         dataset: Folder, or name of a shipped dataset.
         out: Folder for `diagnosis.json`, `report.html` and `extended.yaml`.
         fish: Another fish than the dataset names: preset or file.
-        quick: Take a first look only.
+        quick: Fit the first 20 s of two runs only.
         seed: Of the split into runs and of the null distributions.
         measured_beats: Take the tail's frequencies from the hull's swaying.
         trust_effects: Run the effect files that the fish's file names.
@@ -55,7 +56,7 @@ def diagnose_dataset(
     """
     check_outputs([json_file], dataset_files(dataset))
     # What is loaded by now stays, and hardly anything made later refers to itself: to look for
-    # garbage as often as usual would take a fifteenth of a first look's time.
+    # garbage as often as usual would take a fifteenth of quick mode's time.
     gc.freeze()
     gc.set_threshold(COLLECT_AFTER)
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
@@ -69,8 +70,8 @@ def diagnose_dataset(
             answer = diagnose(dataset, out, seed, quick, fish, tell, measured_beats, trust_effects)
         except KeyboardInterrupt:
             raise Interrupted(
-                f"stopped; nothing was written, {out} is as it was. Start again, with --quick for "
-                "a first look"
+                f"stopped; nothing was written, {out} is as it was. Start again; --quick takes "
+                "seconds"
             ) from None
     print_answer(console, answer)
     _print_files(console, out, answer["verdict"] in EXTENDING)
@@ -90,13 +91,12 @@ def _print_files(console: Console, out: Path, extends: bool) -> None:
 
 
 def print_answer(console: Console, answer: dict[str, Any]) -> None:
-    """Prints the verdict in words, then what supports it."""
-    console.print(f"[bold]{answer['verdict']}[/bold]  {escape(words(answer))}", highlight=False)
+    """Prints the headline of the report, then what supports it."""
+    print_headline(console, answer)
     for fault in answer.get("inputs", ()):
-        word = "inputs" if fault["decisive"] else "perhaps"
-        console.print(f"{word}: {escape(fault['words'])}", highlight=False)
-    if answer["quick"]:
-        console.print(f"a first look, without {'; '.join(answer['left_out'])}", style="dim")
+        if not (fault["decisive"] and answer["verdict"] == "inputs"):  # in the headline
+            word = "inputs" if fault["decisive"] else "perhaps"
+            console.print(f"{word}: {escape(fault['words'])}", highlight=False)
     if answer["causes"]:
         console.print(_causes(answer))
     console.print(_misfit(answer))
@@ -104,14 +104,20 @@ def print_answer(console: Console, answer: dict[str, Any]) -> None:
         console.print(_residual_model(answer["residual_model"]))
     elif answer["unexplained"]:
         console.print(_unexplained(answer))
-    experiment = answer["next_experiment"]
-    if experiment["separates"]:
-        aim = ", ".join(experiment["separates"])
-        console.print(f"next experiment: {experiment['manoeuvre']}, to see {aim}", highlight=False)
     for doubt in answer.get("doubts", ()):
-        console.print(f"doubt: {escape(doubt)}", highlight=False)
+        console.print(f"implausible: {escape(doubt)}", highlight=False)
     for note in answer["notes"]:
         console.print(f"note: {note}", style="dim", highlight=False, markup=False)
+
+
+def print_headline(console: Console, answer: dict[str, Any]) -> None:
+    """Prints verdict, closed share of the gap, next step and caveats, as the report does."""
+    said = headline(answer)
+    console.print(facts(answer), style="dim", highlight=False, markup=False)
+    console.print(said.verdict, style="bold", highlight=False, markup=False)
+    for line in said.lines[1:]:
+        style = "dim" if line == said.caveats else None
+        console.print(line, style=style, highlight=False, markup=False)
 
 
 def _table(title: str, *columns: str) -> Table:
@@ -136,7 +142,7 @@ def _causes(answer: dict[str, Any]) -> Table:
 def _misfit(answer: dict[str, Any]) -> Table:
     steady = answer.get("kind") == "steady"
     errors = "Errors of averages" if steady else "One-step prediction errors"
-    title = f"{errors} in units of the noise (1: nothing left)"
+    title = f"{errors} in units of the noise (1: only noise left)"
     table = _table(title, "channel", "refitted baseline", "with the causes")
     for name, pair in answer["misfit"].items():
         table.add_row(name, f"{pair['baseline']:.2f}", f"{pair['extended']:.2f}")
@@ -144,7 +150,7 @@ def _misfit(answer: dict[str, Any]) -> Table:
 
 
 def _residual_model(model: dict[str, Any]) -> Table:
-    title = "What is left, described by simple functions at their root mean square"
+    title = "Model of the residual: simple functions at their root mean square"
     table = _table(title, "direction", "depends on", "coefficient", "95 % interval", "unit")
     for term in model["terms"]:
         low, high = term["ci95"]
@@ -155,7 +161,7 @@ def _residual_model(model: dict[str, Any]) -> Table:
 
 
 def _unexplained(answer: dict[str, Any]) -> Table:
-    table = _table("Asked for beyond every known cause", "direction", "depends on", "rms")
+    table = _table("Forces indicated beyond every known cause", "direction", "depends on", "rms")
     for item in answer["unexplained"][:5]:
         size = f"{item['rms']:.2g} {wrench_unit(item['direction'])}"
         table.add_row(item["direction"], item["depends_on"], size)

@@ -59,6 +59,7 @@ class Told:
     frame: str | None = None
     name: str | None = None
     run_column: str | None = None
+    start: str | None = None
 
     def applied(self, content: Content) -> Content:
         """The mapping with what is told in place of what stands there."""
@@ -70,6 +71,7 @@ class Told:
             "frame": self.frame,
             "name": self.name,
             "run_column": self.run_column,
+            "start": self.start,
         }
         return {**content, **{key: value for key, value in told.items() if value is not None}}
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from statistics import pstdev
 
 from fish_env.data.schema import Dataset
@@ -29,7 +28,6 @@ from fish_env.identification.series import series_of
 from fish_env.inference.attribution import Ranked
 from fish_env.inference.effort import effort_of
 from fish_env.inference.estimate.fit import Fit
-from fish_env.inference.hypotheses import PARAMETER
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import coefficient_sizes
 from fish_env.inference.screening import smallest_detectable
@@ -147,7 +145,7 @@ def _own_beats(fit: Fit) -> list[Plain]:
 
 
 def _unexplained(diagnosis: Diagnosed) -> list[Plain]:
-    """Forces the data still ask for, over and above the best explanation."""
+    """Generic forces that the data still indicate beside the best explanation."""
     return [
         {"depends_on": m.function, "direction": m.direction, "rms": float(m.size), "log_p": m.log_p}
         for m in diagnosis.adequacy.misfits
@@ -155,154 +153,16 @@ def _unexplained(diagnosis: Diagnosed) -> list[Plain]:
 
 
 def _chance(diagnosis: Diagnosis) -> list[str]:
-    """What was asked for by the fitted runs, and is no good for the others."""
+    """The force that the fitted runs indicate and that other runs do not confirm."""
     gain = diagnosis.adequacy.refuted
     if gain is None:
         return []
     asked = _unexplained(diagnosis)[0]
     return [
-        f"The runs that were fitted ask for {_wrench(asked)} ({asked['rms']:.2g} "
-        f"{wrench_unit(asked['direction'])}), hardly louder than chance does; as it foretells the "
-        f"final runs no better (log likelihood {gain:+.2g}), it is taken for chance."
+        f"The fitted runs indicate {_wrench(asked)} ({asked['rms']:.2g} "
+        f"{wrench_unit(asked['direction'])}), hardly more than chance does. It does not improve "
+        f"the prediction of other runs (log likelihood {gain:+.2g}), so it is taken for chance."
     ]
-
-
-def words(answer: Plain) -> str:
-    """The verdict in two sentences for somebody who builds robots."""
-    if answer["verdict"] == "inputs":
-        rest = words(
-            {**answer, "verdict": answer.get("verdict_once_corrected", "no_misfit"), "inputs": []}
-        )
-        return f"{_inputs(answer)} With that put right: {rest}"
-    told = _inputs(answer)
-    return f"{told} {_said(answer)}" if told else _said(answer)
-
-
-def _inputs(answer: Plain) -> str:
-    """What is wrong with the data, in sentences."""
-    return " ".join(fault["words"] for fault in answer.get("inputs", ()) if fault["decisive"])
-
-
-def _said(answer: Plain) -> str:
-    """The verdict on the model, in sentences."""
-    say: dict[str, Sequence[str]] = {
-        "no_misfit": (
-            "The simulation explains these runs down to the noise once its coefficients are "
-            "fitted within what was known of them.",
-            _blind(answer),
-        ),
-        "not_excited": (
-            "Nothing is seen to be wrong, but these runs could not show most causes.",
-            _blind(answer),
-        ),
-        "parameters": (
-            f"The structure of the model holds, but its numbers do not: {_named(answer)}.",
-            _gained(answer),
-        ),
-        "cause": (f"The simulation lacks {_named(answer)}.", _gained(answer)),
-        "ambiguous": (
-            f"Something is missing, and these runs cannot tell {_named(answer)} from "
-            f"{_others(answer)}.",
-            "Fly the next experiment to separate them.",
-        ),
-        "partial": (
-            "These known causes act, beside something that no known cause explains: "
-            f"{_named(answer)}.",
-            _gained(answer),
-            _asked(answer),
-        ),
-        "outside_library": (
-            "Something is missing that none of the known causes explains.",
-            _asked(answer),
-        ),
-    }
-    sentences = (_doubt(answer), *say[answer["verdict"]], _budgeted(answer))
-    return " ".join(sentence for sentence in sentences if sentence)
-
-
-def _doubt(answer: Plain) -> str:
-    """What speaks against a named answer, ahead of it."""
-    share = ((answer.get("gain") or {}).get("share_of_reachable") or {}).get("estimate")
-    if not answer["causes"] or share is None or share >= POLICY.least_share:
-        return ""
-    if share <= 0.0:
-        return "Doubtful: held-out runs are predicted no better with what is named here."
-    return (
-        f"Doubtful: what is named here closes {100 * share:.0f} % of the gap to the noise on "
-        "held-out runs."
-    )
-
-
-def _budgeted(answer: Plain) -> str:
-    """The error budget in one sentence."""
-    budget = answer.get("budget")
-    if not budget:
-        return ""
-    names = {
-        "coefficients": "re-estimated coefficients",
-        "run_variation": "what the runs differ in",
-    }
-    parts = [
-        f"{100 * max(entry['share'], 0.0):.0f} % goes with "
-        f"{names.get(entry['name'], entry['name'].removeprefix(PARAMETER))}"
-        for entry in budget["shares"]
-    ]
-    where = "held-out runs" if budget["held_out"] else "the fitted runs"
-    left = 100 * max(budget["left"], 0.0)
-    return (
-        f"Of the misfit of the nominal simulation on {where}, {', '.join(parts)}; "
-        f"{left:.0f} % is left."
-    )
-
-
-def _named(answer: Plain) -> str:
-    return " and ".join(_one(cause) for cause in answer["causes"])
-
-
-def _one(cause: Plain) -> str:
-    name = cause["name"].removeprefix(PARAMETER)
-    values = ", ".join(
-        f"{key} {p['estimate']:.3g} ({p['ci95'][0]:.3g} to {p['ci95'][1]:.3g}) {p['unit']}".rstrip()
-        for key, p in cause["parameters"].items()
-    )
-    return f"{name} [{values}]"
-
-
-def _others(answer: Plain) -> str:
-    return " or from ".join(" and ".join(map(_one, other)) for other in answer["alternatives"])
-
-
-def _gained(answer: Plain) -> str:
-    gain = answer["gain"]
-    if not gain:
-        return "There were too few runs to keep some for judging the gain."
-    fit = gain["fit_percent"]
-    return (
-        f"On {_judged(answer)} fit {fit['extended']:.0f} % with it and "
-        f"{fit['baseline']:.0f} % without."
-    )
-
-
-def _judged(answer: Plain) -> str:
-    if answer.get("kind") == "steady":
-        return "conditions kept for judging, predicted averages"
-    return "runs kept for judging, predictions over 3 s"
-
-
-def _blind(answer: Plain) -> str:
-    blind = [p["name"] for p in answer["preconditions"] if not p["excited"]]
-    if not blind:
-        return "Every known cause of a plausible size would have been found."
-    return f"They could not have shown: {', '.join(blind)}."
-
-
-def _asked(answer: Plain) -> str:
-    if not answer["unexplained"]:
-        return ""
-    holds = holds_elsewhere(answer)
-    first = answer["residual_model"]["terms"][0] if holds else answer["unexplained"][0]
-    also = ", on runs kept for judging too" if holds else ""
-    return f"What is left looks most like {_wrench(first)}{also}."
 
 
 def _wrench(term: Plain) -> str:
@@ -312,6 +172,6 @@ def _wrench(term: Plain) -> str:
 
 
 def holds_elsewhere(answer: Plain) -> bool:
-    """Whether the empirical model of what is left foretells runs that did not choose it."""
+    """Whether the model of the residual improves the prediction of held-out runs."""
     gain = (answer.get("residual_model") or {}).get("gain")
     return bool(gain and gain["log_likelihood"]["ci95"][0] > 0.0)

@@ -46,6 +46,12 @@ def headline(answer: Answer) -> Headline:
     return Headline(_verdict(answer), _closed(answer), _next_step(answer), _caveats(answer))
 
 
+def facts(answer: Answer) -> str:
+    """Verdict, data and fish in one line of names."""
+    named = ("verdict", "dataset", "fish")
+    return " · ".join(f"{word} {answer.get(word, '?')}" for word in named)
+
+
 def enough_runs(count: int) -> bool:
     """Whether an interval over so many runs is shown: the same limit as in the error budget."""
     return count >= POLICY.fewest_runs_for_interval
@@ -63,7 +69,7 @@ def _verdict(answer: Answer) -> str:
         return f"{told or 'The data or their description are wrong.'} Once corrected: {rest}"
     named = _joined(map(_cause, answer["causes"]), "and")
     others = _joined((_joined(map(_cause, o), "and") for o in answer["alternatives"]), "or")
-    return {
+    said = {
         "no_misfit": "No model error is detectable in these data.",
         "not_excited": "No model error is detectable, but these data could not show most effects.",
         "parameters": f"The structure of the model holds, but its numbers are wrong: {named}.",
@@ -72,6 +78,7 @@ def _verdict(answer: Answer) -> str:
         "partial": f"The simulation lacks {named}, and something that no known effect explains.",
         "outside_library": "Something is missing that no known effect explains.",
     }[answer["verdict"]]
+    return f"Doubtful: {said[0].lower()}{said[1:]}" if _doubtful(answer) else said
 
 
 def _cause(cause: Answer) -> str:
@@ -155,7 +162,7 @@ def _caveats(answer: Answer) -> str:
     if answer.get("quick"):
         found.append("quick mode: rival causes are not compared and weak causes may be missed")
     if _doubtful(answer):
-        found.append("held-out predictions hardly improve, so the named cause is doubtful")
+        found.append("held-out predictions hardly improve with what is named")
     gain = answer.get("gain")
     if gain and gain["final_runs"] and not enough_runs(len(gain["final_runs"])):
         noun = _noun(answer)

@@ -110,13 +110,13 @@ def _check_amount(dataset: Dataset) -> None:
         present = sum(int(np.isfinite(run.channels[channel]).sum()) for run in dataset.runs)
         if present < FEWEST_SAMPLES:
             raise DatasetError(
-                f"{dataset.name}: {present} samples of {channel} in all, too few to judge anything "
-                f"by; measure at least {FEWEST_SAMPLES}"
+                f"{dataset.name}: {present} samples of {channel} in all, too few for a "
+                f"diagnosis; measure at least {FEWEST_SAMPLES}"
             )
 
 
 def doubts(answer: Mapping[str, Any]) -> list[str]:
-    """Doubts to voice beside a verdict: signs that the fish file is not of the fish that swam.
+    """Implausible numbers beside a verdict: signs that the fish file is of another fish.
 
     Data cannot tell that for sure. A wrong geometry comes out as coefficients far from what was
     known of them, a wrong mass as an added mass that is the same in every direction.
@@ -125,7 +125,7 @@ def doubts(answer: Mapping[str, Any]) -> list[str]:
         answer: the content of ``diagnosis.json``.
     """
     found = [_far_coefficients(answer["parameters"]), _mass_in_disguise(answer["causes"])]
-    found += [f"What fits best is not to be believed: {s}." for s in answer.get("strained", ())]
+    found += [f"The best fit is implausible: {s}." for s in answer.get("strained", ())]
     return [doubt for doubt in found if doubt]
 
 

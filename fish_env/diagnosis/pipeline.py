@@ -64,7 +64,7 @@ def diagnose(
         out: folder for ``diagnosis.json``, ``report.html`` with its figures and, where there is
             something to extend, ``extended.yaml``; nothing is written without it.
         seed: of the split and of the null distributions.
-        quick: a first look, which leaves out what :data:`~fish_env.inference.effort.QUICK` says.
+        quick: quick mode, which leaves out what :data:`~fish_env.inference.effort.QUICK` says.
         fish: another fish than the dataset names: parameters, preset or file.
         progress: told the name of each step.
         measured_beats: take the tail's frequencies from the hull's swaying, not from the commands.
@@ -131,7 +131,7 @@ def diagnose_runs(
         dataset: measured runs.
         fish: parameters; default: the dataset's own.
         seed: of the split and of the null distributions.
-        quick: a first look, which leaves out what :data:`~fish_env.inference.effort.QUICK` says.
+        quick: quick mode, which leaves out what :data:`~fish_env.inference.effort.QUICK` says.
         progress: told the name of each step.
 
     Raises:

@@ -38,7 +38,7 @@ class Diagnosed:
         next_experiment: what separates what is still open; None where nothing is.
         budget: where the misfit of the nominal simulation goes; None where it has none.
         seed: of splits and null distributions.
-        quick: whether this is a first look.
+        quick: whether this is quick mode.
         runtime_s: wall time.
     """
 
@@ -67,9 +67,9 @@ class Diagnosis(Diagnosed):
 
     Attributes:
         outliers: samples of each channel that were left out.
-        inputs: what is wrong with the data or their description, and the data put right, which
+        inputs: what is wrong with the data or their description, and the corrected data, which
             everything else is about.
-        final_runs: ids of the runs kept for judging.
+        final_runs: ids of the held-out runs.
         floors: noise of each channel, from the data alone.
         consistency: whether the channels agree among themselves.
         problem: the others.

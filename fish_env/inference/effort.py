@@ -1,4 +1,4 @@
-"""How much a diagnosis spends: all it can, or a first look."""
+"""How much a diagnosis computes: everything, or quick mode."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Effort:
             tails out of step with their beat, weaker causes where something is missing, the final
             runs where that may be chance and nothing is named; and what no cause explains
             described.
-        pictured: most runs that the report shows, those kept for judging first.
+        pictured: most runs that the report shows, held-out ones first.
         left_out: in words, what a full diagnosis does beyond this one.
     """
 
@@ -57,18 +57,18 @@ QUICK = Effort(
     retries=False,
     pictured=2,
     left_out=(
-        "all but the first 20 s of two of the runs for fitting",
-        "fits of rival causes, so nothing comes out as ambiguous",
-        "second looks: from the winner, at tails out of step, for weaker causes, for chance",
-        "a model of what no cause explains",
+        "fitting more than the first 20 s of two runs",
+        "comparison of rival causes, so no answer is ambiguous",
+        "restarts from the best cause, and tests of phase, weaker causes and chance",
+        "a model of the residual",
         "pictures of more than two runs, and the map of where the misfit sits",
         PICTURES,
     ),
 )
-TABLE_LEFT_OUT = (QUICK.left_out[1], "second looks: from the winner, for weaker causes", PICTURES)
-"""What a first look at a table of averages leaves out: it uses all conditions."""
+TABLE_LEFT_OUT = (QUICK.left_out[1], "restarts from the best cause, weaker causes", PICTURES)
+"""What quick mode leaves out of a table of averages: it uses all conditions."""
 
 
 def effort_of(quick: bool) -> Effort:
-    """What a first look spends, or a whole diagnosis."""
+    """The effort of quick mode or of a full diagnosis."""
     return QUICK if quick else FULL

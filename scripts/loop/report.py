@@ -99,12 +99,12 @@ def markdown(record: dict[str, Any], declared: Declaration, rows: Sequence[Score
         _each_fish(primary, _beside(record["beside"], declared.tasks[0], declared.metrics[0])),
         "### Means over fish and seeds",
         "Beside them the PID controller and the policies shipped for "
-        f"`{declared.tasks[0]}`, both made on the printed fish and many around it.",
+        f"`{declared.tasks[0]}`, both made on the nominal fish and many around it.",
         _means_table(record["summary"], record["beside"]),
         "### Differences",
         "With 95 % intervals over the fish; in brackets, on how many of them it is better.",
         _differences_table(record["summary"], len(record["fish"])),
-        "### Share of the gap between printed fish and truth that is closed",
+        "### Share of the gap between nominal fish and truth that is closed",
         "In per cent, with 95 % intervals over the fish. Open: the gap itself could be zero, and "
         "the share mean little.",
         _closed_table(record["summary"]),

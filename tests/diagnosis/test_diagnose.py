@@ -7,9 +7,10 @@ import pytest
 from rich.console import Console
 
 from fish_env.cli import main
-from fish_env.commands.diagnose import diagnose_dataset
+from fish_env.commands.diagnose import diagnose_dataset, print_headline
 from fish_env.diagnosis import diagnose
-from fish_env.diagnosis.answer import FORMAT, words
+from fish_env.diagnosis.answer import FORMAT
+from fish_env.diagnosis.headline import headline
 from fish_env.diagnosis.writing import write_answer
 from fish_env.inference.verdict import VERDICTS
 from fish_env.params import load_fish
@@ -79,7 +80,7 @@ def test_nothing_is_found_where_nothing_is_hidden(tmp_path):
     assert answer["verdict"] in ("no_misfit", "not_excited")
     assert answer["causes"] == []
     assert answer["gain"] is None
-    assert "two of the runs" in answer["left_out"][0]
+    assert "20 s of two runs" in answer["left_out"][0]
     assert not (out / "extended.yaml").exists()
     assert max(pair["extended"] for pair in answer["misfit"].values()) < 1.2
     assert {"refitting the baseline", "screening causes", "testing what is left"} <= set(steps)
@@ -110,15 +111,32 @@ def test_every_verdict_has_words(verdict):
         "verdict": verdict,
         "causes": [CAUSE],
         "alternatives": [[{**CAUSE, "name": "tether"}]],
-        "gain": {"fit_percent": {"baseline": 40.0, "extended": 90.0}},
+        "gain": {
+            "final_runs": ["a"], "share_of_reachable": {"estimate": 0.9, "ci95": [0.8, 1.0]}
+        },
         "preconditions": [{"name": "wave", "excited": False}],
         "unexplained": [{"direction": "surge", "depends_on": "depth"}],
-    }
-    said = words(answer)
-    assert 1 <= said.count(". ") + 1 <= 3
-    mentioned = {
-        "no_misfit": "wave", "not_excited": "wave", "parameters": "current", "cause": "90 %",
-        "ambiguous": "tether", "outside_library": "depth", "partial": "current",
-        "inputs": "With that put right",
     }  # fmt: skip
-    assert mentioned[verdict] in said
+    said = headline(answer)
+    mentioned = {
+        "no_misfit": "detectable", "not_excited": "could not", "parameters": "current",
+        "cause": "lacks current (north 0.04 m/s)", "ambiguous": "or instead tether",
+        "outside_library": "no known effect", "partial": "current", "inputs": "Once corrected",
+    }  # fmt: skip
+    assert mentioned[verdict] in said.verdict
+    assert "90 %" in said.closed
+    assert "1 of 1 known effects" in said.caveats
+    console = Console(file=io.StringIO(), width=400)
+    print_headline(console, answer)
+    assert all(line in console.file.getvalue() for line in said.lines)
+
+
+def test_an_answer_that_closes_hardly_any_gap_says_so_first():
+    answer = {"verdict": "cause", "causes": [CAUSE], "alternatives": []}
+    for share, doubtful in ((0.05, True), (0.5, False)):
+        gain = {
+            "final_runs": ["a"], "share_of_reachable": {"estimate": share, "ci95": [0.0, 1.0]}
+        }  # fmt: skip
+        said = headline({**answer, "gain": gain})
+        assert said.verdict.startswith("Doubtful: the simulation lacks") == doubtful
+        assert said.next_step.startswith("do not use the extended model") == doubtful

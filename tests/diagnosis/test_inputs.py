@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from fish_env.data import Dataset, load_dataset, write_dataset
-from fish_env.diagnosis.answer import words
+from fish_env.diagnosis.headline import headline
 from fish_env.diagnosis.inputs import check as check_module
 from fish_env.diagnosis.inputs import search as search_module
 from fish_env.diagnosis.inputs.changes import Change
@@ -227,11 +227,9 @@ def test_the_answer_says_it_under_every_verdict():
     quiet = {"gain": None, "causes": [], "budget": None, "preconditions": [], "unexplained": [],
              "alternatives": []}  # fmt: skip
     answer = {**quiet, "inputs": entries, "verdict_once_corrected": "no_misfit"}
-    bound = words({**answer, "verdict": "inputs"})
+    bound = headline({**answer, "verdict": "inputs"}).verdict
     assert bound.startswith("r has the wrong sign. Write `channels: {r: {unit: rad/s, sign: -1}}`")
-    assert "With that put right: The simulation explains these runs" in bound
-    beside = words({**answer, "verdict": "outside_library"})
-    assert beside.startswith("r has the wrong sign")
+    assert "Once corrected: No model error is detectable" in bound
     assert "channels: {r: {unit: rad/s, sign: -1}}" in input_checks(answer, None, None)
     assert input_checks({"inputs": []}, None, None) == ""
 

@@ -29,7 +29,7 @@ def full(tmp_path_factory):
 def test_the_page_has_every_part(full):
     page, _ = full
     for part in (
-        "The simulation lacks servo_lag", "0.05 to 0.058", "rf-replay", "r01 (kept for judging)",
+        "The simulation lacks servo_lag", "0.05 to 0.058", "rf-replay", "r01 (held out)",
         "Where the misfit sits", "tail phase 0 to 45 deg", "never visited", "Ranking",
         "could not have shown: surface_drag", "tether (0.61)", "0.004 m/s", "Next experiment",
         "mass.total", "closes 96 %", "Error budget", "cm off", "Next:",
@@ -90,7 +90,7 @@ def test_only_what_the_words_need_is_needed(tmp_path):
 def test_a_steady_table_is_shown_condition_by_condition(tmp_path):
     page = write_report(answer(), steady_series(), tmp_path).read_text()
     assert "Condition by condition" in page
-    assert "f (kept for judging)" in page
+    assert "f (held out)" in page
     assert 'class="rf-replay"' not in page
     assert (tmp_path / "figures" / "steady.svg").exists()
 
@@ -105,7 +105,7 @@ def test_the_answer_about_a_table_is_read_with_its_own_signs_and_units(tmp_path)
     )
     said["gain"]["rmse"] = {"curvature": {"baseline": 0.2, "extended": 0.02}}
     page = write_report(said, None, tmp_path).read_text()
-    assert "On the condition kept for judging" in page
+    assert "On the held-out condition" in page
     assert "1/m" in page
     assert "-2.5" in page
     assert "log score on conditions left out" in page

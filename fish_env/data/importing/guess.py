@@ -114,7 +114,7 @@ def guess_mapping(
     }
     if commands:
         said.append("a command holds until the next (between: hold; or linear)")
-    said.append("start and tail_phase: unknown, and to be estimated from each run")
+    said.append("start and tail_phase: estimated from each run, unless --start rest is given")
     return Guess(content, tuple(said), _left_out(kinds, chosen.values(), times, run_column))
 
 

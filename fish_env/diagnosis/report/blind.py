@@ -27,7 +27,7 @@ def unseen(answer: Answer, series: ReportSeries | SteadySeries | None, album: Al
     said = _blind_words(blind, len(found), "This table" if answer.get("kind") else "These runs")
     heads = (
         "effect", "would be seen", "smallest size seen (power 0.8)", "a plausible robot has",
-        "swallowed by a refit", "looks most like",
+        "absorbed by a refit", "looks most like",
     )  # fmt: skip
     order = sorted(found, key=lambda p: (p["excited"], p["name"]))
     parts = [paragraph(said), table(heads, [_seen(p) for p in order])]

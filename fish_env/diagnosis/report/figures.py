@@ -179,7 +179,7 @@ def _draw_map(
 
 
 def draw_ranking(answer: Plain, album: Album) -> Path:
-    """How much better each cause foretells what it has not seen, with intervals if known."""
+    """How much better each cause predicts held-out runs, with intervals if known."""
     rows = list(answer["ranking"])[::-1]
     accepted = {cause["name"] for cause in answer["causes"]}
     meaning = LEFT_OUT_GAIN.format("conditions" if answer.get("kind") == "steady" else "runs")
@@ -283,7 +283,7 @@ def draw_schedule(schedule: Sequence[Mapping[str, float]], album: Album) -> Path
 
 
 def draw_steady(series: SteadySeries, album: Album) -> Path:
-    """Predicted over measured values; rows kept for judging are filled."""
+    """Predicted over measured values; held-out rows are filled."""
     names = list(series.measured)
     models = {"baseline": (series.baseline, BASELINE, "s")}
     if series.extended:

@@ -95,7 +95,7 @@ def _off(run: RunSeries, motion: Motion) -> float:
 
 
 def draw_budget(budget: Plain, album: Album) -> Path:
-    """The error budget as one bar of shares, largest first, and what is left."""
+    """The error budget as one bar of shares, largest first, and the rest."""
     parts = {item["name"].removeprefix(PARAMETER): item["share"] for item in budget["shares"]}
     shares = {BUDGET_NAMES.get(n, n): max(v, 0.0) for n, v in parts.items()}
     shares = dict(sorted(shares.items(), key=lambda pair: -pair[1]))

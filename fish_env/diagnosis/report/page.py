@@ -46,7 +46,7 @@ PARTS: tuple[Part, ...] = (
 def write_report(answer: Answer, series: Series, out: str | Path) -> Path:
     """Writes ``report.html``, its figures and the next experiment's schedule into a folder.
 
-    Figures are SVG and PNG; a first look has no PNG and no map of where the misfit sits. Those of
+    Figures are SVG and PNG; quick mode has no PNG and no map of where the misfit sits. Those of
     an earlier diagnosis that this one lacks are removed; other files in the folder stay.
 
     Args:

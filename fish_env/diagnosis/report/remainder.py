@@ -33,7 +33,7 @@ def residual_model(answer: Answer) -> str:
         within = f"{number(low)} to {number(high)}"
         scale = number(term["function_rms"])
         rows.append((text(term["direction"]), text(term["depends_on"]), scale, size, within))
-    caption = "An empirical model of what is left: coefficient × function / its rms, all together"
+    caption = "An empirical model of the residual: coefficient × function / its rms, all together"
     heads = ("force or moment in", "function", "its rms (SI units)", "coefficient", "95 % interval")
     return table(heads, rows, caption) + paragraph(_pushes(model) + _elsewhere(model["gain"]))
 
@@ -55,9 +55,9 @@ def _elsewhere(gain: Answer | None) -> str:
         return ""
     score, runs = gain["log_likelihood"], ", ".join(gain["final_runs"])
     low, high = score["ci95"]
-    worse = "It foretells worse what happens in" if high < 0.0 else "It is not shown to foretell"
-    holds = "It foretells" if low > 0.0 else worse
+    worse = "worsens" if high < 0.0 else "is not shown to improve"
+    holds = "improves" if low > 0.0 else worse
     return (
-        f" {holds} {runs}, which did not choose it: one sample ahead, their log likelihood changes "
-        f"by {score['estimate']:.0f} ({low:.0f} to {high:.0f})."
+        f" It {holds} the prediction of the held-out runs {runs}: one sample ahead, their log "
+        f"likelihood changes by {score['estimate']:.0f} ({low:.0f} to {high:.0f})."
     )

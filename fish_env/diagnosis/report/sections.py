@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fish_env.diagnosis.headline import EXPERIMENT_FILE, enough_runs, headline, many_fitted
+from fish_env.diagnosis.headline import EXPERIMENT_FILE, enough_runs, facts, headline, many_fitted
 from fish_env.diagnosis.report import figures as draw
 from fish_env.diagnosis.report.figures import Album
 from fish_env.diagnosis.report.html import (
@@ -38,13 +38,9 @@ MOST_PATHS = 3
 def verdict(answer: Answer, series: Series, album: Album) -> str:
     """Heading: the verdict, the closed share of the gap, what to do next, and the caveats."""
     name, said = str(answer["verdict"]), headline(answer)
-    facts = [
-        f"verdict {name}", f"dataset {answer.get('dataset', '?')}",
-        f"fish {answer.get('fish', '?')}",
-    ]  # fmt: skip
     return (
-        f'<header class="rp-verdict rp-{text(name)}"><p class="rp-facts">{text(" · ".join(facts))}'
-        f"</p><h1>{text(said.verdict)}</h1>{paragraph(said.closed, 'rp-words')}"
+        f'<header class="rp-verdict rp-{text(name)}"><p class="rp-facts">{text(facts(answer))}</p>'
+        f"<h1>{text(said.verdict)}</h1>{paragraph(said.closed, 'rp-words')}"
         f'<p class="rp-words"><b>Next:</b> {text(said.next_step)}</p>'
         f"{paragraph(said.caveats, 'rp-note')}</header>"
     )
@@ -112,7 +108,7 @@ def swimming(answer: Answer, series: Series, album: Album) -> str:
 
 
 def _run_name(id: str, final: bool) -> str:
-    return f"{id} (kept for judging)" if final else id
+    return f"{id} (held out)" if final else id
 
 
 def _drawn(answer: Answer, series: ReportSeries) -> tuple[RunSeries, ...]:
@@ -181,10 +177,10 @@ def gain(answer: Answer, series: Series, album: Album) -> str:
     parts = [_gain_words(found, _noun(answer))]
     runs = _fit_by_run(found, series)
     if runs:
-        caption = "Fit of each run kept for judging, mean over its channels."
+        caption = "Fit of each held-out run, mean over its channels."
         parts.append(figure(draw.draw_gain(runs, album), caption))
         rows = [(text(run), number(a), number(b), number(b - a)) for run, (a, b) in runs.items()]
-        heads = ("final run", "baseline fit (%)", "extended fit (%)", "gained")
+        heads = ("held-out run", "baseline fit (%)", "extended fit (%)", "gained")
         parts.append(table(heads, rows))
     parts.append(_errors(found))
     return section("What the extension gains", *parts, key="gain")
@@ -195,7 +191,7 @@ def _gain_words(found: Answer, noun: str) -> str:
     said = []
     if fit:
         said.append(
-            f"On {_counted(len(found.get('final_runs', ())), noun)} kept for judging, predictions "
+            f"On {_counted(len(found.get('final_runs', ())), noun)}, predictions "
             f"fit {fit['extended']:.0f} % with the extension and {fit['baseline']:.0f} % with the "
             "refitted baseline."
         )
@@ -215,7 +211,7 @@ def _noun(answer: Answer) -> str:
 
 
 def _counted(count: int, noun: str) -> str:
-    return f"the {noun}" if count == 1 else f"{count} {noun}s"
+    return f"the held-out {noun}" if count == 1 else f"{count} held-out {noun}s"
 
 
 def _fit_by_run(found: Answer, series: Series) -> dict[str, tuple[float, float]]:

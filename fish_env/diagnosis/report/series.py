@@ -43,7 +43,7 @@ class RunSeries:
 
     Attributes:
         id: the run's id.
-        final: whether it was kept for judging.
+        final: whether it was held out.
         time_s: (n,) from the run's start, s.
         measured: channel -> (n,) SI, NaN where missing; roll and yaw continuous.
         baseline: the same, predicted by the refitted baseline over windows of three seconds, each
@@ -96,7 +96,7 @@ class SteadySeries:
         measured: observation -> (n,) SI, NaN where missing.
         baseline: the same by the refitted baseline.
         extended: the same by the extended model; empty where nothing was added.
-        left_out: (n,) whether the row was kept for judging.
+        left_out: (n,) whether the row was held out.
     """
 
     conditions: tuple[str, ...]
@@ -121,7 +121,7 @@ def series_from(
         dataset: all measured runs.
         baseline: refitted baseline.
         accepted: accepted explanation, from the same runs; the same object where nothing was added.
-        final_runs: ids of runs kept for judging; they are shown first.
+        final_runs: ids of held-out runs; they are shown first.
         localisation: of the misfit.
         most_runs: how many runs to show, the final ones first.
     """

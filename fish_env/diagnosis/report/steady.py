@@ -29,7 +29,7 @@ def steady_series_from(
         problem: what was fitted of it.
         baseline: refitted baseline.
         accepted: accepted explanation; the same object where nothing was added.
-        final_conditions: names of those kept for judging, as the gain has them.
+        final_conditions: names of the held-out ones, as the gain has them.
     """
     table = table_of(dataset)
     whole = problem.with_table(table)

@@ -27,12 +27,12 @@ Json = Annotated[
 OtherFish = Annotated[
     str | None, typer.Option(help="Another fish than the dataset names: preset or file.")
 ]
-Quick = Annotated[bool, typer.Option("--quick", help="A first look: fewer runs, no rival causes.")]
+Quick = Annotated[
+    bool, typer.Option("--quick", help="Fit 20 s of two runs; compare no rival causes.")
+]
 MeasuredBeats = Annotated[
     bool,
-    typer.Option(
-        "--measured-beats", help="Tail frequencies from the hull's swaying, not as commanded."
-    ),
+    typer.Option("--measured-beats", help="Take tail frequencies from the hull's sway."),
 ]
 Address = Annotated[
     str | None,

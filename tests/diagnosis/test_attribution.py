@@ -6,6 +6,7 @@ from fish_env.effects import catalogue
 from fish_env.inference import attribution
 from fish_env.inference.rivals import explained_away
 from fish_env.inference.shortlist import shortlisted
+from fish_env.inference.vehicle import Drive
 
 
 def screen_of(**statistics):
@@ -80,9 +81,13 @@ def test_what_puts_a_beat_out_of_step_is_tried_whatever_the_screen_makes_of_it(m
         "screen": lambda *a: shown,
     }.items():  # fmt: skip
         monkeypatch.setattr(attribution, name, value)
-    fit = SimpleNamespace(problem=SimpleNamespace(out_of_step=("clock_scale", "battery_sag")))
-    nothing = SimpleNamespace(causes=(), fit=fit, with_relaxed_noise=loose)
+    problem = SimpleNamespace(out_of_step=("clock_scale", "battery_sag"), drive=Drive())
+    nothing = SimpleNamespace(
+        causes=(), fit=SimpleNamespace(problem=problem), with_relaxed_noise=loose
+    )
     found, tried = attribution._under_relaxed_noise(nothing, strong, (), None)
     assert found is loose
     names = [s.cause.name for s in tried]
     assert names == ["sensor_delay", "block_lag", "added_mass", "clock_scale", "battery_sag"]
+    problem.drive = Drive(known=True)
+    assert attribution._under_relaxed_noise(nothing, strong, (), None) is None

@@ -186,7 +186,7 @@ def diagnose(
     json: Json = None,
     trust_effects: TrustEffects = False,
 ) -> None:
-    """Find what the simulation gets wrong: a cause with numbers, or an honest "none I know".
+    """Find what the simulation gets wrong: a cause with numbers, or that no known cause fits.
 
     Refits the coefficients first, then tries every effect of the catalogue, and measures on runs
     kept apart what the best one gains. Writes `diagnosis.json`, and `extended.yaml`, a fish file,

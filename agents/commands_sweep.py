@@ -58,12 +58,14 @@ def sweep(
         raise Interrupted(
             f"stopped; checkpoints stay in {folder}. Run the same command again to go on"
         ) from None
-    _report(console, rows, str(folder / TABLE))
-    if any(row["state"] != FINISHED for row in rows):
+    finished = sum(row["state"] == FINISHED for row in rows)
+    _report(console, rows, finished, str(folder / TABLE))
+    if finished < len(rows):
         raise typer.Exit(1)
 
 
-def _report(console: Console, rows: list[dict[str, Any]], table: str) -> None:
+def _report(console: Console, rows: list[dict[str, Any]], finished: int, table: str) -> None:
+
     for row in rows:
         if row["reason"]:
             said = f"{row['trial']}: {row['state']}: {row['reason']}"
@@ -78,7 +80,6 @@ def _report(console: Console, rows: list[dict[str, Any]], table: str) -> None:
             f"best: {best['trial']}, success {100 * best['best_success_rate']:.0f} %, return "
             f"{best['best_episode_return']:.1f}", highlight=False, markup=False, soft_wrap=True,
         )  # fmt: skip
-    finished = sum(row["state"] == "finished" for row in rows)
     console.print(f"{finished} of {len(rows)} finished; table: {table}", soft_wrap=True)
 
 

@@ -25,6 +25,7 @@ from fish_env.commands.options import (
     MeasuredBeats,
     OtherFish,
     Quick,
+    Seed,
     TrustEffects,
     Version,
 )
@@ -182,7 +183,7 @@ def diagnose(
     fish: OtherFish = None,
     quick: Quick = False,
     measured_beats: MeasuredBeats = False,
-    seed: Annotated[int, typer.Option(min=0, help="Of all that is random.")] = 0,
+    seed: Seed = 0,
     json: Json = None,
     trust_effects: TrustEffects = False,
 ) -> None:

@@ -6,13 +6,16 @@ reader, a kill or a full disk then meets the old file or the new one, never a pa
 
 from __future__ import annotations
 
+import csv
 import errno
+import io
 import os
 import sys
 import uuid
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import Any
 
 from fish_env.errors import OutputError
 
@@ -102,6 +105,27 @@ def write_text(path: str | Path, text: str) -> None:
         OutputError: The file cannot be written.
     """
     write_bytes(path, text.encode("utf-8"))
+
+
+def write_rows(
+    path: str | Path, names: Sequence[str], rows: Iterable[Mapping[str, Any]], missing: Any = ""
+) -> None:
+    """Writes a table as CSV at once, see :func:`replacing`.
+
+    Args:
+        path: The file to write.
+        names: Columns, in their order.
+        rows: Column -> value; no other columns than `names`.
+        missing: What stands where a row has no value.
+
+    Raises:
+        OutputError: The file cannot be written.
+    """
+    text = io.StringIO()
+    table = csv.DictWriter(text, names, restval=missing, lineterminator="\n")
+    table.writeheader()
+    table.writerows(rows)
+    write_text(path, text.getvalue())
 
 
 def cannot_write(path: str | Path, error: OSError) -> OutputError:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import io
 import os
 import socket
 import time
@@ -20,9 +19,9 @@ from agents.training.config import TrainConfig
 from agents.training.lock import Held
 from agents.training.run import CONFIG, EVALUATIONS, POLICY, best_of, config_bytes, train
 from agents.training.schema import build
-from fish_env.cluster import ClusterSettings, connected
+from fish_env.cluster import ClusterSettings, check_version, connected
 from fish_env.errors import ConfigError
-from fish_env.files import write_bytes, write_text
+from fish_env.files import write_rows, write_text
 from fish_env.version import VERSION
 
 PLAN, TABLE, TUNE = "sweep.yaml", "sweep.csv", "tune"
@@ -112,11 +111,7 @@ def _row(trial: Trial, out: Path, reason: str) -> dict[str, Any]:
 
 def _write_table(file: Path, rows: Sequence[dict[str, Any]]) -> None:
     names = list(dict.fromkeys(key for row in rows for key in row if key != "reason"))
-    table = io.StringIO()
-    writer = csv.DictWriter(table, [*names, "reason"], restval="", lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    write_bytes(file, table.getvalue().encode())
+    write_rows(file, [*names, "reason"], rows)
 
 
 def _tune(trials: Sequence[Trial], out: Path, tell: Tell) -> dict[str, str]:
@@ -188,11 +183,7 @@ class _Reporter:
 def _trial(space: dict[str, Any]) -> None:
     """What runs in a worker: one training, from its checkpoint if there is one."""
     spec = space["trial"]
-    if spec["version"] != VERSION:
-        raise ConfigError(
-            f"{socket.gethostname()} has robotic-fish {VERSION}, the sweep {spec['version']}; "
-            "install the same version on all machines"
-        )
+    check_version(spec["version"])
     folder = Path(spec["folder"])
     if not (folder.parent / PLAN).is_file():
         raise ConfigError(

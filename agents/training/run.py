@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -28,7 +26,7 @@ from agents.training.model import Model, make_model
 from agents.training.stack import Stack, make_stack, seed_episodes
 from agents.training.trial import try_policy
 from fish_env.errors import ConfigError
-from fish_env.files import write_bytes
+from fish_env.files import write_bytes, write_rows
 
 CHECKPOINT = "checkpoint.zip"
 POLICY = "policy.npz"
@@ -171,11 +169,7 @@ class _Run:
         )
         rows = self.progress.evaluations
         if rows:
-            table = io.StringIO()
-            writer = csv.DictWriter(table, list(rows[0]), lineterminator="\n")
-            writer.writeheader()
-            writer.writerows(rows)
-            write_bytes(self.folder / EVALUATIONS, table.getvalue().encode())
+            write_rows(self.folder / EVALUATIONS, list(rows[0]), rows)
 
 
 def _merit(row: dict[str, float]) -> tuple[float, float]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, fields
@@ -13,7 +11,7 @@ from typing import Any
 from fish_env.campaign.cases import Case, Diagnosed, Options, Payload, diagnosed, prepare
 from fish_env.cluster import ClusterSettings, Failed, Task, connected, run_tasks
 from fish_env.errors import OutputError, RoboticFishError
-from fish_env.files import write_bytes, write_text
+from fish_env.files import write_bytes, write_rows, write_text
 from fish_env.reading import Unreadable, read_json
 from fish_env.version import VERSION
 
@@ -166,8 +164,4 @@ def _kept(task: Task[Payload], result: Diagnosed | Failed, out: Path) -> Row:
 
 
 def _write_table(file: Path, rows: Sequence[Row]) -> None:
-    table = io.StringIO()
-    writer = csv.DictWriter(table, [field.name for field in fields(Row)], lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(asdict(row) for row in rows)
-    write_text(file, table.getvalue())
+    write_rows(file, [field.name for field in fields(Row)], [asdict(row) for row in rows])

@@ -4,6 +4,6 @@ Nothing here knows of fish. Ray is imported when a cluster is used, and belongs 
 """
 
 from fish_env.cluster.session import ClusterSettings, connected
-from fish_env.cluster.tasks import Failed, Task, run_tasks
+from fish_env.cluster.tasks import Failed, Task, check_version, run_tasks
 
-__all__ = ["ClusterSettings", "Failed", "Task", "connected", "run_tasks"]
+__all__ = ["ClusterSettings", "Failed", "Task", "check_version", "connected", "run_tasks"]

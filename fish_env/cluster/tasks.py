@@ -124,12 +124,24 @@ def _line(error: BaseException) -> str:
     return words if isinstance(error, RoboticFishError) else f"{type(error).__name__}: {words}"
 
 
-def _one(function: Callable[[Any], Any], payload: Any, version: str) -> Any:
-    """What runs in a worker: the function, on one thread, in the right version."""
+def check_version(version: str) -> None:
+    """Refuses to work with another version of the package than the machine that asks.
+
+    Args:
+        version: of the machine that asks.
+
+    Raises:
+        WrongVersion: this machine has another.
+    """
     if version != VERSION:
         raise WrongVersion(
-            f"{socket.gethostname()} has robotic-fish {VERSION}, this machine {version}; results "
-            "would differ. Install the same version on all machines"
+            f"{socket.gethostname()} has robotic-fish {VERSION}, the machine that asks {version}; "
+            "results would differ. Install the same version on all machines"
         )
+
+
+def _one(function: Callable[[Any], Any], payload: Any, version: str) -> Any:
+    """What runs in a worker: the function, on one thread, in the right version."""
+    check_version(version)
     os.environ["ROBOFISH_THREADS"] = "1"
     return function(payload)

@@ -15,6 +15,7 @@ from fish_env.commands.options import (
     MeasuredBeats,
     OtherFish,
     Quick,
+    Seed,
     Temp,
     TrustEffects,
 )
@@ -37,7 +38,7 @@ def campaign(
     fish: OtherFish = None,
     quick: Quick = False,
     measured_beats: MeasuredBeats = False,
-    seed: Annotated[int, typer.Option(min=0, help="Of all that is random.")] = 0,
+    seed: Seed = 0,
     address: Address = None,
     cpus: Cpus = None,
     temp: Temp = None,

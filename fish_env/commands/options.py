@@ -30,6 +30,7 @@ OtherFish = Annotated[
 Quick = Annotated[
     bool, typer.Option("--quick", help="Fit 20 s of two runs; compare no rival causes.")
 ]
+Seed = Annotated[int, typer.Option(min=0, help="Of all that is random.")]
 MeasuredBeats = Annotated[
     bool,
     typer.Option("--measured-beats", help="Take tail frequencies from the hull's sway."),

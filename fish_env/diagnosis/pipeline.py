@@ -156,7 +156,7 @@ def _diagnose_runs(
     fitted, final = fitted_and_final(dataset, seed)
     progress("comparing the beats of the runs")
     every = SeriesProblem(dataset, fish, dt=effort.step_s)
-    every = every.with_drive(tail_drive(inputs.drive, p=inputs.drive_p))
+    every = every.with_drive(tail_drive(inputs.drive, inputs.drive_certain))
     if effort.retries:
         every = with_own_beats(every, own_beats(every))
     chosen = _named(every, fitted)

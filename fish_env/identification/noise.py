@@ -18,7 +18,12 @@ from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point
 from fish_env.params.schema import FishParams
 
-WANDERING = (3e-3, 0.2)
+RELAXED_PHASE_SD = 0.3
+"""Random walk of the phase (rad/s^0.5) that stays in step with a beat that is a tenth off."""
+UNEVEN_PHASE_SD = 0.03
+"""Random walk of the tail's phase (rad/s^0.5) that a fit begins with where runs beat differently:
+no such beat is constant to the last. Its size is then estimated with the disturbance."""
+PHASE_SD_RANGE = (3e-3, 0.2)
 """Random walk of the phase of a tail whose beat is a little different in each run (rad/s^0.5): one
 that is half a per cent off is 0.3 rad off after ten seconds, as is a walk of 0.1."""
 ORDER = 4
@@ -195,8 +200,8 @@ def fit_noise(
     """
     names = ["force_sd", "moment_sd", "correlation_s"]
     limits = [within.force, within.moment, within.correlation]
-    if WANDERING[0] <= start.phase_sd <= WANDERING[1]:
-        names, limits = [*names, "phase_sd"], [*limits, WANDERING]
+    if PHASE_SD_RANGE[0] <= start.phase_sd <= PHASE_SD_RANGE[1]:
+        names, limits = [*names, "phase_sd"], [*limits, PHASE_SD_RANGE]
     bounds = np.log(limits)
 
     def model(x: FloatArray, sensor: FloatArray) -> NoiseModel:

@@ -35,9 +35,6 @@ LEAST = 1.5e-3
 CLEARLY = 0.2
 """Share of what the common beat leaves that a run's own has to take away. Chance takes one per
 cent, for a hundred independent residuals a run."""
-WANDER = 0.03
-"""Random walk of their phases (rad/s^0.5) that a fit begins with where runs beat differently: no
-such beat is constant to the last. Its size is then estimated with the disturbance."""
 FEWEST = 3
 
 
@@ -98,7 +95,7 @@ def with_own_beats(problem: SeriesProblem, beats: OwnBeats) -> SeriesProblem:
     if not beats.own:
         return problem.with_drive(drive)
     runs = [_beating(run, beats.own.get(run.id, 1.0)) for run in problem.runs]
-    return problem.with_runs(runs).with_drive(replace(drive, uneven=True, phase_sd=WANDER))
+    return problem.with_runs(runs).with_drive(replace(drive, uneven=True))
 
 
 def _beating(run: RunData, beat: float) -> RunData:

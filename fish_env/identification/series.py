@@ -17,16 +17,12 @@ from fish_env.effects.extended import ExtendedModel, build_model
 from fish_env.errors import EffectError
 from fish_env.identification.applied_wrench import EFFECT as APPLIED_WRENCH
 from fish_env.identification.channels import usable_channels
-from fish_env.identification.filtering import (
-    Filtered,
-    Measurement,
-    NoiseModel,
-    Pushes,
-    RunFilter,
-)
+from fish_env.identification.filtering import Filtered, Measurement, NoiseModel, Pushes, RunFilter
 from fish_env.identification.generic_forces import BoundForces, generic_forces
 from fish_env.identification.kernel_kinds import LEAN, quickest, with_stages
 from fish_env.identification.noise import (
+    RELAXED_PHASE_SD,
+    UNEVEN_PHASE_SD,
     disturbance_range,
     fitted_noise,
     small_disturbance,
@@ -50,8 +46,6 @@ from fish_env.inference.vehicle import EffectFreedom, freedoms
 from fish_env.model.effect import Effect
 from fish_env.params.io import load_fish
 from fish_env.params.schema import FishParams
-
-RANDOM_WALK_PHASE = 0.3  # rad/s^0.5, enough to stay in step with a beat that is a tenth off
 
 
 class SeriesProblem(Problem):
@@ -193,7 +187,8 @@ class SeriesProblem(Problem):
 
     def default_noise(self) -> NoiseModel:
         """Sensor noise from differences of the data, and a disturbance of a few millinewton."""
-        return replace(small_disturbance(self.sensor_sd), phase_sd=self.drive.phase_sd)
+        phase_sd = UNEVEN_PHASE_SD if self.drive.uneven else 0.0
+        return replace(small_disturbance(self.sensor_sd), phase_sd=phase_sd)
 
     def fitted_noise(
         self,
@@ -231,11 +226,11 @@ class SeriesProblem(Problem):
 
     def relaxed_noise(self, noise: NoiseModel) -> NoiseModel:
         """The noise model with a random-walk tail phase."""
-        return replace(noise, phase_sd=RANDOM_WALK_PHASE)
+        return replace(noise, phase_sd=RELAXED_PHASE_SD)
 
     def follows_drive(self, noise: NoiseModel) -> bool:
         """Whether the tail's phase is a random walk."""
-        return noise.phase_sd >= RANDOM_WALK_PHASE
+        return noise.phase_sd >= RELAXED_PHASE_SD
 
     def starting_grid(self, name: str) -> tuple[Mapping[str, float], ...]:
         """Sizes of an effect that drifts in phase, close enough to put it in step again."""

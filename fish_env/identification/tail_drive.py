@@ -11,8 +11,6 @@ from fish_env.model.effect import Effect
 SCALE = "effects.frequency_scale.scale"
 ORDINARY = 4e-3
 """Share of the beat that a servo is off by, usually."""
-DECISIVE = 0.01
-"""Probability by chance below which a finding of the input step is decisive."""
 BESIDE = (-6e-3, -3e-3, 0.0, 3e-3, 6e-3)
 """Departures from the measured beat that a fit begins from: less than a third of a cycle in a run
 of a minute."""
@@ -24,11 +22,9 @@ class TailDrive(Drive):
 
     Attributes:
         measured: ``effects.<name>.<parameter>`` -> about its value; empty where no beat is clear.
-        phase_sd: random walk of the phase that a fit begins with (rad/s^0.5).
     """
 
     measured: Mapping[str, float] = field(default_factory=dict)
-    phase_sd: float = 0.0
 
     @property
     def scale(self) -> float:
@@ -37,8 +33,8 @@ class TailDrive(Drive):
 
     def at(self, scale: float) -> TailDrive:
         """The same with another beat over the commanded frequency."""
-        drive = tail_drive({**self.measured, SCALE: scale}, self.phase_sd)
-        return replace(drive, certain=self.certain)
+        drive = tail_drive({**self.measured, SCALE: scale}, self.certain)
+        return replace(drive, uneven=self.uneven)
 
     def beside(self, effect: Effect) -> tuple[dict[str, float], ...]:
         """Sizes of an effect that scales the beat, around what was measured.
@@ -54,7 +50,7 @@ class TailDrive(Drive):
         return tuple({scales[0]: self.scale + off} for off in BESIDE)
 
 
-def tail_drive(measured: Mapping[str, float], phase_sd: float = 0.0, p: float = 1.0) -> TailDrive:
+def tail_drive(measured: Mapping[str, float], certain: bool = False) -> TailDrive:
     """What is known of the beat, and which effects put a model in step with it.
 
     None do where all beats are off by one ratio only: several effects do that, and a comparison of
@@ -62,14 +58,16 @@ def tail_drive(measured: Mapping[str, float], phase_sd: float = 0.0, p: float = 
 
     Args:
         measured: ``effects.<name>.<parameter>`` -> about its value.
-        phase_sd: random walk of the phase that a fit begins with (rad/s^0.5).
-        p: probability by chance of what was measured.
+        certain: whether chance is ruled out for what was measured.
     """
     found = dict(measured)
     ordinary = SCALE in found and abs(found[SCALE] - 1.0) <= ORDINARY
     if ordinary:
         found.pop(SCALE)
     in_step = found if found.keys() - {SCALE} else {}
-    certain = bool(in_step) and p < DECISIVE
-    known, uneven = bool(in_step) or ordinary, phase_sd > 0.0
-    return TailDrive(in_step, known, certain, uneven, measured, phase_sd)
+    return TailDrive(
+        in_step,
+        known=bool(in_step) or ordinary,
+        certain=bool(in_step) and certain,
+        measured=measured,
+    )

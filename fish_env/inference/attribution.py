@@ -216,8 +216,8 @@ class Search:
             best: with the best single cause; without one where none shows.
         """
         nothing, problem = begun.accepted, best.fit.problem
-        swamped = problem.swamped(best.fit.noise) or not problem.drive.known
-        if not (self.effort.retries and disturbance_at_limit(best.fit) and swamped):
+        hidden = problem.swamped(best.fit.noise) or not problem.drive.known
+        if not (self.effort.retries and disturbance_at_limit(best.fit) and hidden):
             return None
         more = beside_drive(nothing, best, self.causes, self.rng, self.effort, self.report)
         if more is None:

@@ -66,8 +66,7 @@ def squared_errors(problem: Problem, point: Point, noise: object) -> FloatArray:
     """
     _, evaluations = evaluated(problem, point, noise)
     residuals = np.concatenate([evaluation.residuals for evaluation in evaluations])
-    squares = np.nan_to_num(residuals**2, nan=WORST, posinf=WORST)
-    return np.where(problem.measured, np.minimum(squares, WORST), np.nan)
+    return np.where(problem.measured, np.fmin(residuals**2, WORST), np.nan)
 
 
 def by_window(

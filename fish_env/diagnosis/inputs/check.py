@@ -17,7 +17,7 @@ from fish_env.diagnosis.inputs.clocks import strokes_of
 from fish_env.diagnosis.inputs.drive_law import DriveLaw, drive_law
 from fish_env.diagnosis.inputs.fine import BIAS, Fine, fine_clock
 from fish_env.diagnosis.inputs.ratios import ratio_near
-from fish_env.diagnosis.inputs.search import Found, search
+from fish_env.diagnosis.inputs.search import LEVEL, Found, search
 from fish_env.diagnosis.inputs.weighing import BEAT, Scales
 from fish_env.errors import DatasetError
 from fish_env.identification.beats import own_ratio
@@ -34,8 +34,6 @@ ORDINARY_BEAT = 0.15
 `frequency_scale` describes it, and runs of a real robot differ as much. Beyond, a command or a
 clock is wrong."""
 TIMES = ("clock", "clock_skew", "beat")
-AS_IT_IS = Change("beat", "tail_frequency", None, "-", "", "")
-"""Nothing is read otherwise."""
 PACES = ("frequency_scale", "clock_scale", "clock_skew")
 """Effects by which a fish makes another frequency of the commanded one."""
 
@@ -50,14 +48,14 @@ class Inputs:
         logged: the data as they were given.
         drive: by how much the tail beats otherwise than commanded in all runs, as effects say it:
             ``effects.<name>.<parameter>`` -> about its value.
-        drive_p: probability of that by chance.
+        drive_certain: whether chance is ruled out for that.
     """
 
     faults: tuple[InputFault, ...]
     dataset: Dataset
     logged: Dataset
     drive: Mapping[str, float] = field(default_factory=dict)
-    drive_p: float = 1.0
+    drive_certain: bool = False
 
     @property
     def binding(self) -> bool:
@@ -93,13 +91,13 @@ def check_inputs(dataset: Dataset, fish: FishParams | None = None, seed: int = 0
     left = [one.change for one in found if _left_to_effects(one.change)]
     if seen.of_runs:  # says the same and more
         faults = [fault for fault in faults if fault.fix not in {change.line for change in left}]
-    for fault, change in seen.told:
-        faults.append(fault)
-        if fault.corrected:
-            dataset = change.applied(dataset)
+    faults += seen.faults
+    if seen.fine is not None and seen.faults[-1].corrected:
+        dataset = seen.fine.change.applied(dataset)
     drive = seen.law.starts(math.prod(change.clocks[""].beat for change in left))
     drive = {path: v for path, v in drive.items() if effect_of(path) not in nominal.effects}
-    return Inputs(tuple(faults), _noted(dataset, faults), logged, drive, seen.law.p)
+    certain = seen.law.p < LEVEL
+    return Inputs(tuple(faults), _noted(dataset, faults), logged, drive, certain)
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,26 +106,35 @@ class _Seen:
 
     Attributes:
         law: what the beat does in all runs, and is not put right.
-        told: faults, with what puts them right.
-        of_runs: whether more is known of the beats than their ratio in all runs.
+        fine: a small fault of clocks or beats; None where there is none.
     """
 
     law: DriveLaw
-    told: Sequence[tuple[InputFault, Change]]
-    of_runs: bool
+    fine: Fine | None
+
+    @property
+    def of_runs(self) -> bool:
+        """Whether more is known of the beats than their ratio in all runs."""
+        return bool(self.law.sizes) or _of_single_runs(self.fine)
+
+    @property
+    def faults(self) -> list[InputFault]:
+        """What is told of it, the fine fault last."""
+        law = [_law_fault(self.law)] if self.law.sizes else []
+        return law if self.fine is None else [*law, _fine_fault(self.fine)]
 
 
 def _seen(right: Dataset, rng: np.random.Generator) -> _Seen:
     law = drive_law(right)
     lawful = bool(law.sizes)
     fine = fine_clock(law.following(right), rng, lawful)
-    told = [(_law_fault(law), AS_IT_IS)] if lawful else []
-    if fine is None:
-        return _Seen(law, told, lawful)
-    told.append((_fine_fault(fine), fine.change))
-    single = "" not in fine.change.clocks
     # Ratios of single runs hold what they have in common, unless a law does.
-    return _Seen(law if lawful or not single else replace(law, common=1.0), told, lawful or single)
+    held = not lawful and _of_single_runs(fine)
+    return _Seen(replace(law, common=1.0) if held else law, fine)
+
+
+def _of_single_runs(fine: Fine | None) -> bool:
+    return fine is not None and "" not in fine.change.clocks
 
 
 def _left_to_effects(change: Change) -> bool:
@@ -192,8 +199,8 @@ def _derived_fault(one: Derived) -> InputFault:
 def _law_fault(law: DriveLaw) -> InputFault:
     """What a law of the beat says: nothing to put right, the drive itself does so."""
     return InputFault(
-        AS_IT_IS.kind, AS_IT_IS.target, None, "-", None, law.p, None, "", law.words, BEAT, None,
-        None, decisive=True, binds=False, corrected=False,
+        "beat", "tail_frequency", None, "-", None, law.p, None, "", law.words, BEAT, None, None,
+        decisive=True, binds=False, corrected=False,
     )  # fmt: skip
 
 

@@ -15,9 +15,8 @@ from scipy.special import stdtr
 
 from fish_env.arrays import BoolArray, FloatArray, IntArray
 from fish_env.data.schema import CommandSteps, Dataset, Run
-from fish_env.data.vocabulary import COMMANDS
 from fish_env.diagnosis.inputs.clocks import strokes_of
-from fish_env.diagnosis.inputs.orders import windows_of
+from fish_env.diagnosis.inputs.orders import FREQUENCY, OFFSET, stroke_speed, windows_of
 from fish_env.diagnosis.inputs.ratios import peaks_of, ratio_near
 from fish_env.identification.tail_drive import SCALE
 
@@ -36,9 +35,6 @@ LEVEL = 0.05
 FAR = 3.5
 """Robust standard deviations from which a window's beat is another thing's."""
 ROUNDS = 8
-_OFFSET, _AMPLITUDE, _FREQUENCY = (
-    list(COMMANDS).index(f"tail_{n}") for n in ("offset", "amplitude", "frequency")
-)
 
 
 @dataclass(frozen=True)
@@ -83,11 +79,11 @@ class DriveLaw:
 
     def _following(self, run: Run) -> Run:
         values = run.commands.values.copy()
-        speed = 2.0 * np.pi * values[:, _AMPLITUDE] * values[:, _FREQUENCY]
-        aside = 1.0 - self.sizes.get("beat_load.offset", 0.0) * np.abs(values[:, _OFFSET])
+        speed = stroke_speed(values)
+        aside = 1.0 - self.sizes.get("beat_load.offset", 0.0) * np.abs(values[:, OFFSET])
         loaded = 1.0 - self.sizes.get("beat_load.load", 0.0) * speed
         left = np.maximum(aside, 0.0) * np.maximum(loaded, 0.0)
-        values[:, _FREQUENCY] *= left * (self.common or 1.0)
+        values[:, FREQUENCY] *= left * (self.common or 1.0)
         return replace(run, commands=CommandSteps(run.commands.times_s, values))
 
 

@@ -31,9 +31,19 @@ FINENESS = 0.12
 """Step of the multiples, in cycles at the end of a window."""
 NYQUIST = 0.45
 """Cycles a sample up to which a sway can be seen."""
-_OFFSET, _AMPLITUDE, _FREQUENCY = (
+OFFSET, AMPLITUDE, FREQUENCY = (
     list(COMMANDS).index(f"tail_{n}") for n in ("offset", "amplitude", "frequency")
 )
+
+
+def stroke_speed(commands: FloatArray) -> FloatArray:
+    """Speed of commanded strokes, 2 pi times amplitude times frequency, (n,), rad/s.
+
+    Args:
+        commands: (n, 5) in the order of :data:`COMMANDS`.
+    """
+    speed: FloatArray = 2.0 * np.pi * commands[:, AMPLITUDE] * commands[:, FREQUENCY]
+    return speed
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,13 +73,13 @@ def stroke_of(run: GridRun, steps: CommandSteps) -> Stroke | None:
         return None
     times = run.begin_s + run.since_s
     edges = np.append(steps.times_s, np.inf)
-    frequency = steps.values[:, _FREQUENCY]
+    frequency = steps.values[:, FREQUENCY]
     turned = np.concatenate([[0.0], np.cumsum(np.diff(steps.times_s) * frequency[:-1])])
     row = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, len(frequency) - 1)
     cycles = turned[row] + np.maximum(times - steps.times_s[row], 0.0) * frequency[row]
-    amplitude = steps.values[row, _AMPLITUDE]
-    speed = 2.0 * np.pi * amplitude * frequency[row]
-    terms = np.column_stack([run.since_s, np.abs(steps.values[row, _OFFSET]), speed])
+    amplitude = steps.values[row, AMPLITUDE]
+    speed = stroke_speed(steps.values[row])
+    terms = np.column_stack([run.since_s, np.abs(steps.values[row, OFFSET]), speed])
     return Stroke(2.0 * np.pi * cycles, amplitude, run.channels[channel], run.step_s, terms)
 
 

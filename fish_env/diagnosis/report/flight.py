@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from fish_env.data.vocabulary import COMMANDS
 from fish_env.diagnosis.headline import EXPERIMENT_FILE
-from fish_env.files import write_text
+from fish_env.files import write_rows
 
 
 def write_schedule(answer: Mapping[str, Any], folder: Path) -> list[Path]:
@@ -31,10 +29,6 @@ def write_schedule(answer: Mapping[str, Any], folder: Path) -> list[Path]:
     schedule = (answer.get("next_experiment") or {}).get("schedule")
     if not schedule:
         return []
-    text = io.StringIO()
-    table = csv.DictWriter(text, ("t", *COMMANDS), restval=0.0, lineterminator="\n")
-    table.writeheader()
-    table.writerows(schedule)
     file = folder / EXPERIMENT_FILE
-    write_text(file, text.getvalue())
+    write_rows(file, ("t", *COMMANDS), schedule, missing=0.0)
     return [file]

@@ -105,6 +105,8 @@ def print_fit(console: Console, result: DatasetFit) -> None:
     )
     if result.fit.at_bounds:
         console.print(f"at a bound: {', '.join(result.fit.at_bounds)}")
+    if result.unseen:
+        console.print(f"not fitted, as these runs do not show it: {', '.join(result.unseen)}")
     for step in result.steps:
         verdict = "added" if step.added else "not added"
         console.print(

@@ -93,6 +93,12 @@ class DatasetFit:
     steps: tuple[EffectStep, ...] = ()
 
     @property
+    def unseen(self) -> tuple[str, ...]:
+        """Effects that were asked for, of which the runs show no parameter."""
+        free = {effect_of(e.name) for e in self.estimates if e.name.startswith(PREFIX)}
+        return tuple(name for name in self.effects if name not in free)
+
+    @property
     def mean_errors(self) -> dict[str, float]:
         """Quantity -> mean absolute error of the fit to all runs, SI."""
         return mean_errors(self.errors)
@@ -108,6 +114,7 @@ class DatasetFit:
             "dataset": self.dataset,
             "objective": self.objective,
             "effects": list(self.effects),
+            "effects_unseen": list(self.unseen),
             "estimates": [asdict(e) for e in self.estimates],
             "units": self.units,
             "errors": self.mean_errors,

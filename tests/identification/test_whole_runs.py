@@ -137,6 +137,16 @@ def test_parameters_that_no_channel_shows_are_not_free():
     assert free == {"effects.linear_drag.surge", "effects.linear_drag.sway"}
 
 
+def test_effects_of_either_sign_are_free_where_channels_show_them():
+    """The middle of a range that is alike on both sides would be no effect."""
+    problem = WholeRunProblem(swum(seconds=4.0), paths=PATHS)
+    free = problem.freedoms(["tail_bias", "tail_asymmetry", "depth_bias", "gyro_bias"])
+    assert {one.path for one in free} == {
+        "effects.tail_bias.offset",
+        "effects.tail_asymmetry.ratio",
+    }
+
+
 def test_forces_can_be_looked_for_in_whole_runs(found):
     terms = found.problem.generic_terms(found)
     changes = terms.changes(terms.columns[:2])

@@ -25,7 +25,7 @@ from fish_env.identification.whole_runs.evaluation import RunEvaluation
 from fish_env.identification.whole_runs.forces import forces_of
 from fish_env.identification.whole_runs.noise import SimulationNoise, first_noise, fitted_errors
 from fish_env.identification.whole_runs.own_numbers import PACE, own_numbers
-from fish_env.identification.whole_runs.shown import shown_parameters
+from fish_env.identification.whole_runs.shown import middling, shown_parameters
 from fish_env.identification.whole_runs.simulation import simulation_errors
 from fish_env.identification.whole_runs.starts import (
     MORE_STEPS,
@@ -217,13 +217,10 @@ class WholeRunProblem(Problem):
         )
 
     def _is_shown(self, path: str) -> bool:
-        """Whether the runs show an effect parameter, tried in the middle of its range."""
+        """Whether the runs show an effect parameter, tried at a middling size."""
         if path not in self._shown:
             name = effect_of(path)
-            values = {
-                parameter_path(name, p.name): 0.5 * sum(p.plausible)
-                for p in self.known[name].parameters
-            }
+            values = {parameter_path(name, p.name): middling(p) for p in self.known[name].parameters}
             shown = shown_parameters(self, values)
             self._shown |= {one: one in shown for one in values}
         return self._shown[path]

@@ -7,11 +7,24 @@ from collections.abc import Mapping
 import numpy as np
 
 from fish_env.identification.whole_runs.simulated_runs import SimulatedRuns
+from fish_env.inference.effects import EffectParameter
 
 FEW_RUNS = 3
 SILENT = 0.003
 """Change of every sample by a tenth of a parameter, in standard deviations of a simulation's first
 noise, below which nothing shows the parameter."""
+
+
+def middling(parameter: EffectParameter) -> float:
+    """A size of a parameter at which its effect acts: halfway to an end of its plausible range.
+
+    The middle of a range that lies on both sides of the neutral value would be no effect at all.
+    """
+    low, high = parameter.plausible
+    if not low < parameter.neutral < high:
+        return 0.5 * (low + high)
+    end = max(low, high, key=lambda one: abs(one - parameter.neutral))
+    return 0.5 * (parameter.neutral + end)
 
 
 def shown_parameters(problem: SimulatedRuns, values: Mapping[str, float]) -> set[str]:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from agents.evaluation.labels import LABELS
-from agents.evaluation.leaderboard import SHIPPED, by_metric, overview
-from agents.evaluation.results import read_results
+from robofish_agents.evaluation.labels import LABELS
+from robofish_agents.evaluation.leaderboard import SHIPPED, by_metric, overview
+from robofish_agents.evaluation.results import read_results
 
 ROOT = Path(__file__).resolve().parents[1]
 NOT_YET = "No agent is measured yet; `make benchmark-agents` does it."

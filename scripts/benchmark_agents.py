@@ -19,27 +19,28 @@ from pathlib import Path
 
 import numpy as np
 from rich.console import Console
+from robofish_agents.evaluation.leaderboard import SHIPPED
+from robofish_agents.evaluation.results import Result, evaluate, read_results, write_results
+from robofish_agents.evaluation.suites import Suite, load_suite, suite_names
+from robofish_agents.registry import load_agents
 
-from agents.evaluation.leaderboard import SHIPPED
-from agents.evaluation.results import Result, evaluate, read_results, write_results
-from agents.evaluation.suites import Suite, load_suite, suite_names
-from agents.registry import load_agents
 from fish_env.envs.tasks import TASKS
 from scripts.bench.harness import machine
 
 ROOT = Path(__file__).resolve().parents[1]
 AGENTS = ("pid", "mppi", "pretrained")
+OWN = "agents/robofish_agents"
 SOURCES = {
-    "pid": ("agents/controllers/pid.py", "agents/controllers/seen.py", "configs/controllers"),
-    "mppi": ("agents/controllers/mppi.py", "agents/controllers/prediction.py"),
-    "pretrained": ("agents/pretrained/*/*.npz",),
+    "pid": (f"{OWN}/controllers/pid.py", f"{OWN}/controllers/seen.py", "configs/controllers"),
+    "mppi": (f"{OWN}/controllers/mppi.py", f"{OWN}/controllers/prediction.py"),
+    "pretrained": (f"{OWN}/pretrained/*/*.npz",),
 }
 """What an agent's numbers depend on: files, folders, patterns."""
 
 
 def fingerprint(agent: str, suite: str) -> str:
     """Changes with anything that the numbers depend on, but the environment."""
-    places = (*SOURCES[agent], f"configs/benchmarks/{suite}.yaml", "agents/evaluation/metrics.py")
+    places = (*SOURCES[agent], f"configs/benchmarks/{suite}.yaml", f"{OWN}/evaluation/metrics.py")
     digest = hashlib.sha256()
     for place in places:
         pattern = f"{place}/**/*" if (ROOT / place).is_dir() else place

@@ -1,7 +1,7 @@
 """Compares agents on episodes of a suite's kind that belong to no suite, training or tuning.
 
     python -m scripts.compare_agents pretrained pid --task hold --suite hard
-    python -m scripts.compare_agents agents/pretrained/track out/mine/policies
+    python -m scripts.compare_agents agents/robofish_agents/pretrained/track out/mine/policies
 
 A name is as for `robofish evaluate --agent`. All agents swim the same episodes. Each later one is
 compared with the first, episode by episode; learned ones are means over their training seeds.
@@ -15,11 +15,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from robofish_agents.evaluation.metrics import LATE_S, METRICS, success_rate
+from robofish_agents.evaluation.record import Record, swim_suite
+from robofish_agents.evaluation.suites import RESERVED_SEEDS, Suite, load_suite, suite_names
+from robofish_agents.registry import Agent, load_agents
 
-from agents.evaluation.metrics import LATE_S, METRICS, success_rate
-from agents.evaluation.record import Record, swim_suite
-from agents.evaluation.suites import RESERVED_SEEDS, Suite, load_suite, suite_names
-from agents.registry import Agent, load_agents
 from fish_env.arrays import FloatArray
 from fish_env.envs.tasks import TASKS
 

@@ -10,11 +10,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+from robofish_agents.deployment.c_header import prefix_of
+from robofish_agents.evaluation.suites import load_suite
+from robofish_agents.policies import PolicyFile, PretrainedPolicy
+from robofish_agents.registry import Agent, load_agents
 
-from agents.deployment.c_header import prefix_of
-from agents.evaluation.suites import load_suite
-from agents.policies import PolicyFile, PretrainedPolicy
-from agents.registry import Agent, load_agents
 from fish_env.envs.layout import OBSERVATION, OBSERVATION_LIMIT
 
 SIZE, ACTIONS = len(OBSERVATION), 5

@@ -19,7 +19,7 @@ def main() -> None:
 
 def pictures() -> Mapping[str, str]:
     """The pictures by the name of their file."""
-    imports = imports_of("agents", "fish_env")
+    imports = imports_of("robofish_agents", "fish_env")
     return {
         "imports.svg": drawing(graph_of(imports, part_of), "Imports among the parts of fish_env"),
         "imports-inference.svg": drawing(
@@ -29,9 +29,9 @@ def pictures() -> Mapping[str, str]:
 
 
 def part_of(module: str) -> str:
-    """``agents``, or what stands directly below ``fish_env``; "" for ``fish_env`` itself."""
+    """``robofish_agents``, or what stands directly below ``fish_env``; "" for the latter itself."""
     package, *below = module.split(".")
-    return package if package == "agents" else "".join(below[:1])
+    return package if package == "robofish_agents" else "".join(below[:1])
 
 
 def module_of_inference(module: str) -> str:

@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+from robofish_agents.deployment import export_c, export_onnx, with_int8_weights
+from robofish_agents.evaluation.results import evaluate
+from robofish_agents.evaluation.suites import load_suite
+from robofish_agents.policies import PretrainedPolicy, read_policy, shipped
 
-from agents.deployment import export_c, export_onnx, with_int8_weights
-from agents.evaluation.results import evaluate
-from agents.evaluation.suites import load_suite
-from agents.policies import PretrainedPolicy, read_policy, shipped
 from fish_env.envs.tasks import TASKS
 from scripts.bench.harness import machine, versions
 from scripts.exported import (

@@ -3,7 +3,8 @@
     python -m scripts.ship_policies out/train/ppo-track-seed-* out/train/ppo-hold-all-seed-*
 
 Each folder is that of a finished training; what it trained becomes
-``agents/pretrained/TASK/seed-SEED.npz``, for its own task or those given with --task.
+``agents/robofish_agents/pretrained/TASK/seed-SEED.npz``, for its own task or those given with
+--task.
 """
 
 from __future__ import annotations
@@ -16,13 +17,12 @@ from typing import Any
 import numpy as np
 import yaml
 from rich.progress import track
-
-from agents.evaluation.metrics import METRICS
-from agents.evaluation.record import swim_suite
-from agents.evaluation.suites import load_suite, suite_names
-from agents.policies import PolicyFile, PretrainedPolicy, read_policy, write_policy
-from agents.policies.pretrained import SHIPPED
-from agents.training.run import POLICY
+from robofish_agents.evaluation.metrics import METRICS
+from robofish_agents.evaluation.record import swim_suite
+from robofish_agents.evaluation.suites import load_suite, suite_names
+from robofish_agents.policies import PolicyFile, PretrainedPolicy, read_policy, write_policy
+from robofish_agents.policies.pretrained import SHIPPED
+from robofish_agents.training.run import POLICY
 
 SCORES = ("success_rate", "depth_rmse_m", "heading_rmse_rad", "mean_power_w", "episode_return")
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import typer
+from robofish_agents.commands_train import train
 
-from agents.commands_train import train
 from fish_env.errors import RoboticFishError
 
 

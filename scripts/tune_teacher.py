@@ -21,12 +21,12 @@ import cma
 import numpy as np
 import numpy.typing as npt
 import yaml
+from robofish_agents.controllers import PIDController
+from robofish_agents.evaluation.suites import RESERVED_SEEDS, load_suite
+from robofish_agents.training.config import load_train_config
+from robofish_agents.training.teacher import LIFT, MOMENT, ForesightPID, beyond, true_observations
+from robofish_agents.training.teacher_gains import TEACHER_GAIN_NAMES, TeacherGains, teacher_gains
 
-from agents.controllers import PIDController
-from agents.evaluation.suites import RESERVED_SEEDS, load_suite
-from agents.training.config import load_train_config
-from agents.training.teacher import LIFT, MOMENT, ForesightPID, beyond, true_observations
-from agents.training.teacher_gains import TEACHER_GAIN_NAMES, TeacherGains, teacher_gains
 from fish_env.arrays import FloatArray, IntArray
 from scripts.tune_pid import BOUNDS
 

@@ -11,9 +11,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from robofish_agents.evaluation.intervals import CONFIDENCE, Interval
 from scipy.stats import t as student
 
-from agents.evaluation.intervals import CONFIDENCE, Interval
 from fish_env.arrays import FloatArray
 from scripts.loop.training import BASELINE, TRUTH, WITHOUT_MEASUREMENTS
 

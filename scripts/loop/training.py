@@ -15,14 +15,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from robofish_agents.controllers.pid import PIDController
+from robofish_agents.evaluation.metrics import METRICS
+from robofish_agents.evaluation.record import swim_suite
+from robofish_agents.policies import PretrainedPolicy, shipped
+from robofish_agents.registry import Agent
+from robofish_agents.training.config import TrainConfig
+from robofish_agents.training.run import train
 
-from agents.controllers.pid import PIDController
-from agents.evaluation.metrics import METRICS
-from agents.evaluation.record import swim_suite
-from agents.policies import PretrainedPolicy, shipped
-from agents.registry import Agent
-from agents.training.config import TrainConfig
-from agents.training.run import train
 from scripts.loop.declaration import Declaration
 from scripts.loop.measuring import Known
 from scripts.results import kept

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from robofish_agents.policies import read_policy
+from robofish_agents.training.config import Evaluation, Ppo, TrainConfig
+from robofish_agents.training.run import CHECKPOINT, CONFIG, POLICY, train
 
-from agents.policies import read_policy
-from agents.training.config import Evaluation, Ppo, TrainConfig
-from agents.training.run import CHECKPOINT, CONFIG, POLICY, train
 from fish_env.diagnosis import diagnose
 from fish_env.files import write_bytes
 from scripts import benchmark_diagnosis

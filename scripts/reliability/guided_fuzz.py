@@ -30,8 +30,8 @@ SEEDS = {
     "suite": "configs/benchmarks/*.yaml",
     "training": "configs/train/*.yaml",
     "case": "examples/**/*.json",
-    "results": "agents/evaluation/*.json",
-    "policy": "agents/pretrained/**/*.npz",
+    "results": "agents/robofish_agents/evaluation/*.json",
+    "policy": "agents/robofish_agents/pretrained/**/*.npz",
 }
 """Files that the first inputs of a reader are made from."""
 TRIED = re.compile(r"stat::number_of_executed_units:\s*(\d+)")
@@ -42,7 +42,7 @@ def fuzz_here(reader: str, seconds: int) -> None:
     """Fuzzes one reader in this process, which libFuzzer ends."""
     import atheris
 
-    with atheris.instrument_imports(include=["fish_env", "agents"]):
+    with atheris.instrument_imports(include=["fish_env", "robofish_agents"]):
         from tests.fuzzing.readers import READERS, fault
 
     warnings.simplefilter("ignore")

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-
-from agents.training.course import Course
+from robofish_agents.training.course import Course
 
 PERIOD = 0.1
 TIMES = np.arange(0.0, 12.0, PERIOD)

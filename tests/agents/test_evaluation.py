@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 import typer
 import yaml
+from robofish_agents.controllers import PIDController
+from robofish_agents.episode import swim
+from robofish_agents.evaluation.record import KEPT, swim_suite
+from robofish_agents.evaluation.results import evaluate, read_results, write_results
+from robofish_agents.evaluation.suites import RESERVED_SEEDS, load_suite, suite_names
+from robofish_agents.registry import load_agents
 from typer.testing import CliRunner
 
-from agents.controllers import PIDController
-from agents.episode import swim
-from agents.evaluation.record import KEPT, swim_suite
-from agents.evaluation.results import evaluate, read_results, write_results
-from agents.evaluation.suites import RESERVED_SEEDS, load_suite, suite_names
-from agents.registry import load_agents
 from fish_env import cli
 from fish_env.envs.registration import ENV_ID
 from fish_env.envs.tasks import TASKS

@@ -8,9 +8,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from robofish_agents.deployment import contract_path, export_c, export_onnx, with_int8_weights
+from robofish_agents.policies import (
+    HistorySpec,
+    Network,
+    PolicyFile,
+    read_policy,
+    shipped,
+    write_policy,
+)
 
-from agents.deployment import contract_path, export_c, export_onnx, with_int8_weights
-from agents.policies import HistorySpec, Network, PolicyFile, read_policy, shipped, write_policy
 from fish_env.envs.config import load_env_config
 from fish_env.envs.layout import OBSERVATION
 from fish_env.envs.registration import ENV_ID

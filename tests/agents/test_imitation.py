@@ -5,18 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from robofish_agents.controllers import PIDController
+from robofish_agents.evaluation.suites import load_suite
+from robofish_agents.policies import PretrainedPolicy
+from robofish_agents.policies.export import export_policy
+from robofish_agents.training.config import Evaluation, Imitation, TrainConfig
+from robofish_agents.training.imitation import BLOCK, Swim, _policy, _returns, _stretch, imitate
+from robofish_agents.training.model import make_model
+from robofish_agents.training.stack import make_stack, seed_episodes
+from robofish_agents.training.teacher import ForesightPID, beyond, true_observations
+from robofish_agents.training.teacher_gains import teacher_gains
+from robofish_agents.training.trial import try_policy
 
-from agents.controllers import PIDController
-from agents.evaluation.suites import load_suite
-from agents.policies import PretrainedPolicy
-from agents.policies.export import export_policy
-from agents.training.config import Evaluation, Imitation, TrainConfig
-from agents.training.imitation import BLOCK, Swim, _policy, _returns, _stretch, imitate
-from agents.training.model import make_model
-from agents.training.stack import make_stack, seed_episodes
-from agents.training.teacher import ForesightPID, beyond, true_observations
-from agents.training.teacher_gains import teacher_gains
-from agents.training.trial import try_policy
 from fish_env.errors import ConfigError
 
 CONFIG = TrainConfig(

@@ -3,14 +3,14 @@
 import json
 
 import pytest
+from robofish_agents.evaluation.intervals import Interval
+from robofish_agents.evaluation.labels import LABELS
+from robofish_agents.evaluation.leaderboard import MISSING, SHIPPED, by_metric, overview
+from robofish_agents.evaluation.metrics import STEP_METRICS
+from robofish_agents.evaluation.results import Result, read_results, write_results
+from robofish_agents.evaluation.suites import load_suite, suite_names
 from typer.testing import CliRunner
 
-from agents.evaluation.intervals import Interval
-from agents.evaluation.labels import LABELS
-from agents.evaluation.leaderboard import MISSING, SHIPPED, by_metric, overview
-from agents.evaluation.metrics import STEP_METRICS
-from agents.evaluation.results import Result, read_results, write_results
-from agents.evaluation.suites import load_suite, suite_names
 from fish_env import cli
 from fish_env.envs.registration import ENV_ID
 from fish_env.envs.tasks import TASKS

@@ -10,12 +10,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-
-from agents.policies import PretrainedPolicy
-from agents.training.config import Evaluation, LearningRate, TrainConfig, load_train_config
-from agents.training.run import train
-from agents.training.stack import Shoal
-from agents.training.trial import try_policy
+from robofish_agents.policies import PretrainedPolicy
+from robofish_agents.training.config import Evaluation, LearningRate, TrainConfig, load_train_config
+from robofish_agents.training.run import train
+from robofish_agents.training.stack import Shoal
+from robofish_agents.training.trial import try_policy
 
 LEARNT = 270.0
 STEPS = 100_000

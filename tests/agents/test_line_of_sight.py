@@ -3,12 +3,12 @@
 import gymnasium as gym
 import numpy as np
 import pytest
+from robofish_agents.controllers import PIDController
+from robofish_agents.controllers.line_of_sight import LineOfSight
+from robofish_agents.controllers.path import PathFollower, with_goal
+from robofish_agents.episode import swim
 
 import fish_env  # noqa: F401
-from agents.controllers import PIDController
-from agents.controllers.line_of_sight import LineOfSight
-from agents.controllers.path import PathFollower, with_goal
-from agents.episode import swim
 from fish_env.envs.registration import ENV_ID
 from fish_env.errors import ConfigError
 

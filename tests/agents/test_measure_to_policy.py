@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from robofish_agents.evaluation.suites import RESERVED_SEEDS, load_suite
 
-from agents.evaluation.suites import RESERVED_SEEDS, load_suite
 from fish_env.envs.vector import RoboticFish3DVectorEnv
 from fish_env.errors import ConfigError
 from fish_env.params import load_fish

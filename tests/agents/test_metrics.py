@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-
-from agents.evaluation.intervals import bootstrap, rate
-from agents.evaluation.labels import LABELS
-from agents.evaluation.metrics import METRICS, STEP_METRICS, measure
-from agents.evaluation.record import KEPT, Record
+from robofish_agents.evaluation.intervals import bootstrap, rate
+from robofish_agents.evaluation.labels import LABELS
+from robofish_agents.evaluation.metrics import METRICS, STEP_METRICS, measure
+from robofish_agents.evaluation.record import KEPT, Record
 
 PERIOD, STEPS = 0.1, 400
 TIME = PERIOD * np.arange(1, STEPS + 1)

@@ -4,13 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-from agents.controllers.mppi import MPPIController, MPPISettings
-from agents.controllers.pid import PIDController
-from agents.controllers.prediction import LIFT, MOMENT, UNKNOWNS, Costs, Prediction
-from agents.controllers.seen import Seen
-from agents.evaluation.record import swim_suite
-from agents.evaluation.suites import load_suite
+from robofish_agents.controllers.mppi import MPPIController, MPPISettings
+from robofish_agents.controllers.pid import PIDController
+from robofish_agents.controllers.prediction import LIFT, MOMENT, UNKNOWNS, Costs, Prediction
+from robofish_agents.controllers.seen import Seen
+from robofish_agents.evaluation.record import swim_suite
+from robofish_agents.evaluation.suites import load_suite
 
 SEED = 4_000_000
 CALM = replace(load_suite("calm"), seed=SEED)

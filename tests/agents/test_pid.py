@@ -5,12 +5,12 @@ from dataclasses import replace
 import gymnasium as gym
 import numpy as np
 import pytest
+from robofish_agents.controllers import PIDController, PIDGains
+from robofish_agents.controllers.pid import load_gains, tuned_gains
+from robofish_agents.controllers.seen import Seen
+from robofish_agents.episode import Episode, swim
 
 import fish_env  # noqa: F401
-from agents.controllers import PIDController, PIDGains
-from agents.controllers.pid import load_gains, tuned_gains
-from agents.controllers.seen import Seen
-from agents.episode import Episode, swim
 from fish_env.envs.layout import OBSERVATION
 from fish_env.envs.registration import ENV_ID
 from fish_env.errors import ConfigError

@@ -11,12 +11,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from robofish_agents.policies import (
+    PolicyFile,
+    PretrainedPolicy,
+    read_policy,
+    shipped,
+    write_policy,
+)
+from robofish_agents.policies.export import export_policy
+from robofish_agents.training.config import History, NetworkSettings, Ppo, Sac, TrainConfig
+from robofish_agents.training.model import Model, make_model
+from robofish_agents.training.stack import Stack, make_stack
 
-from agents.policies import PolicyFile, PretrainedPolicy, read_policy, shipped, write_policy
-from agents.policies.export import export_policy
-from agents.training.config import History, NetworkSettings, Ppo, Sac, TrainConfig
-from agents.training.model import Model, make_model
-from agents.training.stack import Stack, make_stack
 from fish_env.envs.layout import OBSERVATION
 from fish_env.errors import ConfigError
 
@@ -87,7 +93,7 @@ def test_it_acts_only_after_a_reset(policy_file):
 
 def test_loading_needs_no_torch(policy_file):
     code = (
-        "import sys; from agents.policies import PretrainedPolicy;"
+        "import sys; from robofish_agents.policies import PretrainedPolicy;"
         f"PretrainedPolicy.load({str(policy_file)!r});"
         "assert 'torch' not in sys.modules and 'stable_baselines3' not in sys.modules"
     )

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from robofish_agents.policies import History, HistorySpec
 
-from agents.policies import History, HistorySpec
 from fish_env.errors import ConfigError
 
 SPEC = HistorySpec(frames=3, low_pass_s=(0.5, 2.0))

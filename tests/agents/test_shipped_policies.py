@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 import yaml
+from robofish_agents.evaluation.metrics import success_rate
+from robofish_agents.evaluation.record import swim_suite
+from robofish_agents.evaluation.suites import load_suite, suite_names
+from robofish_agents.policies import Network, PolicyFile, PretrainedPolicy, read_policy, shipped
+from robofish_agents.policies.pretrained import SHIPPED
 
-from agents.evaluation.metrics import success_rate
-from agents.evaluation.record import swim_suite
-from agents.evaluation.suites import load_suite, suite_names
-from agents.policies import Network, PolicyFile, PretrainedPolicy, read_policy, shipped
-from agents.policies.pretrained import SHIPPED
 from fish_env.envs.registration import ENV_ID
 from fish_env.envs.tasks import TASKS
 

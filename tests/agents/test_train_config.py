@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 import yaml
+from robofish_agents.evaluation.suites import RESERVED_SEEDS
+from robofish_agents.training import stack, trial
+from robofish_agents.training.config import MOST_FISH, load_train_config
 
-from agents.evaluation.suites import RESERVED_SEEDS
-from agents.training import stack, trial
-from agents.training.config import MOST_FISH, load_train_config
 from fish_env.errors import ConfigError
 from fish_env.params.io import config_root
 

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 import yaml
+from robofish_agents.training.config import Ppo, TrainConfig
+from robofish_agents.training.lock import LOCK, locked
+from robofish_agents.training.run import CHECKPOINT, CONFIG, POLICY, train
 
-from agents.training.config import Ppo, TrainConfig
-from agents.training.lock import LOCK, locked
-from agents.training.run import CHECKPOINT, CONFIG, POLICY, train
 from fish_env.errors import ConfigError, OutputError
 from tests.agents.test_training import Quiet
 from tests.command_line import run
@@ -24,7 +24,7 @@ TINY = TrainConfig(
 HOLD = """
 import sys, time
 from pathlib import Path
-from agents.training.lock import locked
+from robofish_agents.training.lock import locked
 with locked(Path(sys.argv[1])):
     print("held", flush=True)
     time.sleep(60)
@@ -130,7 +130,7 @@ def test_one_process_cannot_hold_a_folder_twice(tmp_path):
 
 def test_a_lock_that_was_removed_in_between_is_taken_anew(tmp_path, monkeypatch):
     """A file that its last holder removed after it was opened here locks nobody out."""
-    from agents.training import lock
+    from robofish_agents.training import lock
 
     flock, removed = lock.fcntl.flock, []
 
@@ -154,10 +154,10 @@ def test_a_folder_that_cannot_be_made_is_named(tmp_path):
 FULL = """
 import resource, signal, sys
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-from agents.training.command import run
+from robofish_agents.training.command import run
 from rich.console import Console
 from fish_env.cli import main
-from agents.training import run as training
+from robofish_agents.training import run as training
 write = training.save_checkpoint
 def write_on_a_full_disk(*arguments):
     resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, resource.RLIM_INFINITY))

@@ -11,7 +11,7 @@ INSIDE = "def f():\n    import {name}\n"
 
 
 def test_no_module_imports_itself_by_way_of_others():
-    assert circles_in_words(imports_of("agents", "fish_env")) == []
+    assert circles_in_words(imports_of("robofish_agents", "fish_env")) == []
 
 
 @pytest.mark.parametrize(

@@ -64,7 +64,7 @@ def test_the_contracts_hold():
     [
         ("fish_env/errors.py", "import fish_env.params"),
         ("fish_env/params.py", "import fish_env.model"),
-        ("fish_env/params.py", "import agents"),
+        ("fish_env/params.py", "import robofish_agents"),
         ("fish_env/inference/box_qp.py", "import fish_env.params"),
         ("fish_env/unheard_of.py", ""),
     ],

@@ -78,7 +78,7 @@ def test_the_path_check_notices_one():
 WRITES = {"write_text", "write_bytes", "savefig", "to_parquet", "write_frames", "unlink", "rmtree"}
 """Calls that write or remove; only fish_env.files may do so where a file has its final name."""
 REMOVERS = {
-    "agents/training/lock.py",
+    "agents/robofish_agents/training/lock.py",
     "fish_env/diagnosis/written.py",
     "fish_env/model/compose.py",
     "fish_env/model/kernel_cache.py",

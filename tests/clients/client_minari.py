@@ -6,8 +6,8 @@ import minari
 import numpy as np
 import pytest
 from minari import DataCollector
+from robofish_agents.registry import load_agents
 
-from agents.registry import load_agents
 from fish_env.envs.robotic_fish_3d import RoboticFish3DEnv
 from tests.clients.running import ENV
 

@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from robofish_agents.policies import read_policy
+from robofish_agents.sweep.plan import plan
+from robofish_agents.sweep.run import FINISHED, TABLE, run_sweep
+from robofish_agents.training.run import POLICY, train
 
-from agents.policies import read_policy
-from agents.sweep.plan import plan
-from agents.sweep.run import FINISHED, TABLE, run_sweep
-from agents.training.run import POLICY, train
 from fish_env.cluster import ClusterSettings
 from fish_env.errors import ConfigError
 from tests.agents.test_training import Quiet

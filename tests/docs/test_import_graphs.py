@@ -22,7 +22,7 @@ def test_the_picture_is_made_from_the_imports(made, name):
 
 @pytest.mark.parametrize("node", [part_of, module_of_inference])
 def test_every_module_has_a_box(made, node):
-    graph = graph_of(imports_of("agents", "fish_env"), node)
+    graph = graph_of(imports_of("robofish_agents", "fish_env"), node)
     assert circles(graph) == ()
     boxes = set().union(*(re.findall(r">([\w.]+)</text>", text) for text in made.values()))
     assert set(graph) <= boxes

@@ -7,11 +7,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from agents.evaluation.results import read_results
-from agents.evaluation.suites import load_suite
-from agents.policies.files import read_policy
-from agents.swimming import read_waypoints
-from agents.training.config import load_train_config
+from robofish_agents.evaluation.results import read_results
+from robofish_agents.evaluation.suites import load_suite
+from robofish_agents.policies.files import read_policy
+from robofish_agents.swimming import read_waypoints
+from robofish_agents.training.config import load_train_config
+
 from fish_env.commands.case import read_case
 from fish_env.data import load_dataset
 from fish_env.envs.config import load_env_config

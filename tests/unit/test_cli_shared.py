@@ -112,7 +112,7 @@ def test_ctrl_c_says_what_was_kept(capsys, monkeypatch):
     status, _, err = run(capsys, "diagnose", "msu-steady", "--out", "out/none")
     assert status == 130
     assert "out/none is as it was" in err
-    monkeypatch.setattr("agents.training.command.train", stopped)
+    monkeypatch.setattr("robofish_agents.training.command.train", stopped)
     status, _, err = run(capsys, "train", "ppo-hold", "--out", "out/none")
     assert status == 130
     assert "start anew: robofish train ppo-hold --out out/none" in " ".join(err.split())

@@ -4,8 +4,8 @@ import subprocess
 import sys
 
 import pytest
+from robofish_agents.sweep.plan import plan
 
-from agents.sweep.plan import plan
 from fish_env.campaign import Options, find_cases, run_campaign
 from fish_env.campaign.cases import prepare
 from fish_env.campaign.run import FAILED, FINISHED, MARK

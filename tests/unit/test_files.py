@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from robofish_agents.evaluation.results import write_results
+from robofish_agents.policies import read_policy, shipped, write_policy
 
-from agents.evaluation.results import write_results
-from agents.policies import read_policy, shipped, write_policy
 from fish_env import Simulator, load_fish
 from fish_env.commands.simulate import write_table as write_motion
 from fish_env.diagnosis.report.page import write_report

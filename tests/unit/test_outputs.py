@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 import yaml
+from robofish_agents.evaluation.suites import load_suite
+from robofish_agents.policies import shipped
 
-from agents.evaluation.suites import load_suite
-from agents.policies import shipped
 from fish_env.data import dataset_files
 from fish_env.diagnosis import diagnose
 from fish_env.errors import OutputError

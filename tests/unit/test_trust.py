@@ -7,9 +7,9 @@ from pathlib import Path
 import gymnasium as gym
 import pytest
 import yaml
+from robofish_agents.evaluation.suites import load_suite
+from robofish_agents.training.config import TrainConfig, load_train_config
 
-from agents.evaluation.suites import load_suite
-from agents.training.config import TrainConfig, load_train_config
 from fish_env import Simulator, load_fish
 from fish_env.commands.case import read_case
 from fish_env.comparison import compare

@@ -220,7 +220,9 @@ class WholeRunProblem(Problem):
         """Whether the runs show an effect parameter, tried at a middling size."""
         if path not in self._shown:
             name = effect_of(path)
-            values = {parameter_path(name, p.name): middling(p) for p in self.known[name].parameters}
+            values = {
+                parameter_path(name, p.name): middling(p) for p in self.known[name].parameters
+            }
             shown = shown_parameters(self, values)
             self._shown |= {one: one in shown for one in values}
         return self._shown[path]

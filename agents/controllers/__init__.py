@@ -1,5 +1,0 @@
-"""Classical controllers that act on the environment's own observations."""
-
-from agents.controllers.pid import PIDController, PIDGains
-
-__all__ = ["PIDController", "PIDGains"]

@@ -1,0 +1,75 @@
+"""Tables of results: agents below each other, suites side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from fish_env.errors import ConfigError
+from robofish_agents.evaluation.labels import LABELS, mean_and_range
+from robofish_agents.evaluation.results import Result
+from robofish_agents.evaluation.suites import suite_names
+
+SHIPPED = Path(__file__).with_name("leaderboard.json")
+"""Results of the agents that come with the package, written by scripts/benchmark_agents.py."""
+SHOWN = ("success_rate", "depth_rmse_m", "heading_rmse_rad", "mean_power_w")
+UNITS = ("%", "cm", "°", "mW")
+"""Metrics in each cell of the overview, with the units of their labels."""
+MISSING = "not measured"
+
+
+def overview(results: Sequence[Result]) -> str:
+    """Success, depth and heading RMSE and power on every suite, as Markdown."""
+    return _table(results, _overview_cell)
+
+
+def by_metric(results: Sequence[Result], metric: str) -> str:
+    """One metric with its 95 % intervals on every suite, as Markdown.
+
+    Raises:
+        ConfigError: no such metric.
+    """
+    if metric not in LABELS:
+        raise ConfigError(f"metric '{metric}': one of {', '.join(LABELS)}")
+    return _table(results, lambda result: _metric_cell(result, metric))
+
+
+def _overview_cell(result: Result) -> str:
+    parts = []
+    for metric, unit in zip(SHOWN, UNITS, strict=True):
+        mean, _ = mean_and_range(metric, result.metrics[metric])
+        short = mean.removesuffix(".0") if metric == "success_rate" else mean
+        parts.append(f"{short}{'' if unit == '°' else ' '}{unit}")
+    return ", ".join(parts)
+
+
+def _metric_cell(result: Result, metric: str) -> str:
+    mean, spread = mean_and_range(metric, result.metrics.get(metric))
+    return f"{mean} ({spread})" if spread else mean
+
+
+def _table(results: Sequence[Result], cell: Callable[[Result], str]) -> str:
+    suites = [name for name in suite_names() if any(r.suite == name for r in results)]
+    suites += sorted({r.suite for r in results} - set(suites))
+    lines = [
+        f"| task | agent | {' | '.join(suites)} |",
+        f"| --- | --- |{' --- |' * len(suites)}",
+    ]
+    for task in dict.fromkeys(result.task for result in results):
+        of_task = [result for result in results if result.task == task]
+        for agent in sorted({r.agent for r in of_task}, key=lambda a: _rank(a, of_task)):
+            own = {r.suite: r for r in of_task if r.agent == agent}
+            cells = [cell(own[s]) if s in own else MISSING for s in suites]
+            lines.append(f"| {task} | {_named(own)} | {' | '.join(cells)} |")
+    return "\n".join(lines)
+
+
+def _named(own: dict[str, Result]) -> str:
+    result = next(iter(own.values()))
+    return f"{result.agent}, {result.seeds} seeds" if result.seeds > 1 else result.agent
+
+
+def _rank(agent: str, results: Sequence[Result]) -> tuple[float, str]:
+    """Best mean return first."""
+    returns = [m.mean for r in results if r.agent == agent if (m := r.metrics["episode_return"])]
+    return -sum(returns) / max(len(returns), 1), agent

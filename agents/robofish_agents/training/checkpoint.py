@@ -1,0 +1,122 @@
+"""Checkpoints: one file with all that a later process needs to go on as if nothing had happened.
+
+It is written beside the old one and put in its place at once, so that a kill at any moment leaves
+a whole file. It holds arrays and JSON and no pickles, so that reading one can run no code.
+"""
+
+from __future__ import annotations
+
+import zipfile
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from fish_env.archives import UNREADABLE
+from fish_env.errors import ConfigError
+from robofish_agents.training.config import TrainConfig
+from robofish_agents.training.learner_state import learner_state, restore_learner
+from robofish_agents.training.model import Model, make_model
+from robofish_agents.training.plain import read_plain, write_plain
+from robofish_agents.training.stack import Stack
+
+FORMAT = "robofish-checkpoint-2"
+
+
+@dataclass
+class Progress:
+    """What a training has done so far, over all the processes that worked on it.
+
+    Attributes:
+        steps: control steps of all fish.
+        cpu_s: processor time of training, without evaluation on the side (s).
+        wall_s: the same by the clock on the wall.
+        imitation_cpu_s: part of it spent in imitation, before learning (s).
+        rollout_cpu_s: part of it spent in collecting experience, environment included (s).
+        env_cpu_s: part of that spent in the environment (s).
+        evaluations: rows of the evaluations on the side.
+    """
+
+    steps: int = 0
+    cpu_s: float = 0.0
+    wall_s: float = 0.0
+    imitation_cpu_s: float = 0.0
+    rollout_cpu_s: float = 0.0
+    env_cpu_s: float = 0.0
+    evaluations: tuple[dict[str, float], ...] = ()
+
+
+def save_checkpoint(
+    path: Path, config: TrainConfig, model: Model, stack: Stack, progress: Progress
+) -> None:
+    """Writes a checkpoint; a kill leaves the last one.
+
+    Args:
+        path: the file.
+        config: of the training.
+        model: the learner.
+        stack: its fish.
+        progress: what was done so far.
+
+    Raises:
+        OutputError: the file cannot be written.
+    """
+    tree = {
+        "format": FORMAT,
+        "config": config.tree(),
+        "learner": learner_state(model),
+        "stack": stack.state(),
+        "progress": asdict(progress),
+    }
+    write_plain(tree, path)
+
+
+def load_checkpoint(path: Path, config: TrainConfig, stack: Stack) -> tuple[Model, Progress]:
+    """The learner and its progress; the stack and all random generators are put back.
+
+    Args:
+        path: the file. Reading it runs no code, whatever it holds.
+        config: of the training that goes on.
+        stack: fish of that configuration.
+
+    Raises:
+        ConfigError: not a checkpoint, a damaged one, or one of another configuration or version.
+    """
+    try:
+        tree = read_plain(path)
+        if tree["format"] != FORMAT:
+            raise ValueError(f"its format is {tree['format']!r}, not {FORMAT!r}")
+        saved = tree["config"]
+        _check_same(path, saved, config.tree())
+        model = make_model(config, stack)
+        stack.restore(tree["stack"])
+        restore_learner(model, tree["learner"])
+        rows = tuple(tree["progress"].pop("evaluations"))
+        progress = Progress(**tree["progress"], evaluations=rows)
+    except (*UNREADABLE, TypeError, AttributeError, IndexError) as error:
+        reason = _earlier(path) or f"not a readable checkpoint ({error})"
+        raise ConfigError(
+            f"{path}: {reason}; move it away to start afresh, or train into another folder"
+        ) from None
+    return model, progress
+
+
+def _earlier(path: Path) -> str | None:
+    """What to say of a checkpoint of the first format, which held pickles."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            first = archive.read("format")
+    except UNREADABLE:
+        return None
+    if first != b"robofish-checkpoint-1":
+        return None
+    return "written by an earlier version in a form that could run code, which is not read"
+
+
+def _check_same(path: Path, saved: dict[str, Any], now: dict[str, Any]) -> None:
+    changed = [key for key in now if saved.get(key) != now[key]]
+    if changed:
+        words = "; ".join(f"{key} was {saved.get(key)!r}, is {now[key]!r}" for key in changed)
+        raise ConfigError(
+            f"{path}: of another configuration ({words}); resume with the same one, or train into "
+            "another folder"
+        )

@@ -1,0 +1,145 @@
+"""What a learner of Stable-Baselines3 needs to go on with the same bits, as plain values."""
+
+from __future__ import annotations
+
+import random
+from collections import deque
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import torch
+from stable_baselines3 import SAC
+from stable_baselines3.common.buffers import ReplayBuffer
+
+from robofish_agents.training.model import Model
+
+COUNTS = ("num_timesteps", "_n_updates", "_episode_num", "_current_progress_remaining")
+LATEST = ("_last_obs", "_last_episode_starts", "_last_original_obs")
+EPISODES = ("ep_info_buffer", "ep_success_buffer")
+STORED = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+Plain = dict[str, Any]
+
+
+def learner_state(model: Model) -> Plain:
+    """Weights, optimisers, counters, latest observations, replay buffer, random generators."""
+    entropy = _entropy(model)
+    return {
+        "weights": _arrays(model.policy.state_dict()),
+        "optimisers": {name: _optimiser(item) for name, item in _optimisers(model).items()},
+        "entropy": None if entropy is None else entropy.detach().numpy(),
+        "counts": {name: getattr(model, name) for name in COUNTS},
+        "latest": {name: getattr(model, name) for name in LATEST},
+        "episodes": {name: [*(getattr(model, name) or ())] for name in EPISODES},
+        "replay": _replay(model.replay_buffer) if isinstance(model, SAC) else None,
+        "actions": model.action_space.np_random.bit_generator.state,
+        "random": _random(),
+    }
+
+
+def restore_learner(model: Model, state: Plain) -> None:
+    """Puts a state into a learner of the same configuration; sets the global generators.
+
+    Args:
+        model: as :func:`robofish_agents.training.model.make_model` makes it.
+        state: what :func:`learner_state` gave.
+
+    Raises:
+        KeyError, ValueError, RuntimeError: the state is not that of such a learner.
+    """
+    model.policy.load_state_dict(_tensors(state["weights"]))
+    for name, optimiser in _optimisers(model).items():
+        _restore_optimiser(optimiser, state["optimisers"][name])
+    entropy = _entropy(model)
+    if entropy is not None:
+        entropy.data.copy_(torch.as_tensor(state["entropy"]))
+    for name in COUNTS:
+        setattr(model, name, state["counts"][name])
+    for name in LATEST:
+        setattr(model, name, state["latest"][name])
+    for name in EPISODES:
+        setattr(model, name, deque(state["episodes"][name], maxlen=model._stats_window_size))
+    if isinstance(model, SAC):
+        _restore_replay(model.replay_buffer, state["replay"])
+    model.action_space.np_random.bit_generator.state = state["actions"]
+    _restore_random(state["random"])
+
+
+def _optimisers(model: Model) -> dict[str, torch.optim.Optimizer]:
+    if not isinstance(model, SAC):
+        return {"policy": model.policy.optimizer}
+    found = {"actor": model.actor.optimizer, "critic": model.critic.optimizer}
+    if model.ent_coef_optimizer is not None:
+        found["entropy"] = model.ent_coef_optimizer
+    return found
+
+
+def _entropy(model: Model) -> torch.Tensor | None:
+    """Logarithm of the weight of entropy, where it is learnt."""
+    if not isinstance(model, SAC) or model.ent_coef_optimizer is None:
+        return None
+    weight = model.log_ent_coef
+    assert isinstance(weight, torch.Tensor)
+    return weight
+
+
+def _optimiser(optimiser: torch.optim.Optimizer) -> Plain:
+    saved = optimiser.state_dict()
+    return {
+        "state": {str(key): _arrays(values) for key, values in saved["state"].items()},
+        "rates": [group["lr"] for group in saved["param_groups"]],
+    }
+
+
+def _restore_optimiser(optimiser: torch.optim.Optimizer, state: Plain) -> None:
+    whole = optimiser.state_dict()
+    whole["state"] = {int(key): _tensors(values) for key, values in state["state"].items()}
+    for group, rate in zip(whole["param_groups"], state["rates"], strict=True):
+        group["lr"] = rate
+    optimiser.load_state_dict(whole)
+
+
+def _replay(buffer: ReplayBuffer | None) -> Plain:
+    assert buffer is not None
+    rows = buffer.buffer_size if buffer.full else buffer.pos
+    stored = {name: getattr(buffer, name)[:rows] for name in STORED}
+    return {"position": buffer.pos, "full": buffer.full, "stored": stored}
+
+
+def _restore_replay(buffer: ReplayBuffer | None, state: Plain) -> None:
+    assert buffer is not None
+    buffer.pos, buffer.full = state["position"], state["full"]
+    rows = buffer.buffer_size if buffer.full else buffer.pos
+    for name in STORED:
+        getattr(buffer, name)[:rows] = state["stored"][name]
+
+
+def _random() -> Plain:
+    kind, keys, position, has_gauss, gauss = np.random.get_state()  # noqa: NPY002
+    return {
+        "torch": torch.get_rng_state().numpy(),
+        "numpy": {"keys": keys, "rest": [kind, position, has_gauss, gauss]},
+        "python": random.getstate(),
+    }
+
+
+def _restore_random(state: Plain) -> None:
+    kind, *rest = state["numpy"]["rest"]
+    torch.set_rng_state(torch.as_tensor(state["torch"]))
+    np.random.set_state((kind, state["numpy"]["keys"], *rest))  # noqa: NPY002
+    version, numbers, gauss = state["python"]
+    random.setstate((version, tuple(numbers), gauss))
+
+
+def _arrays(values: Mapping[str, Any]) -> Plain:
+    return {
+        key: value.detach().cpu().numpy() if isinstance(value, torch.Tensor) else value
+        for key, value in values.items()
+    }
+
+
+def _tensors(values: Mapping[str, Any]) -> Plain:
+    return {
+        key: torch.from_numpy(np.array(value)) if isinstance(value, np.ndarray) else value
+        for key, value in values.items()
+    }

@@ -1,0 +1,190 @@
+"""One training from its configuration to a policy file, in one process or over several."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import torch
+import yaml
+from stable_baselines3 import PPO
+from stable_baselines3.common import logger
+
+from fish_env.errors import ConfigError
+from fish_env.files import write_bytes, write_rows
+from robofish_agents.policies.export import export_policy
+from robofish_agents.policies.files import PolicyFile, write_policy
+from robofish_agents.policies.pretrained import PretrainedPolicy
+from robofish_agents.training.callback import Between, Watcher
+from robofish_agents.training.card import card, shares
+from robofish_agents.training.checkpoint import Progress, load_checkpoint, save_checkpoint
+from robofish_agents.training.config import TrainConfig
+from robofish_agents.training.imitation import imitate
+from robofish_agents.training.lock import locked
+from robofish_agents.training.model import Model, make_model
+from robofish_agents.training.stack import Stack, make_stack, seed_episodes
+from robofish_agents.training.trial import try_policy
+
+CHECKPOINT = "checkpoint.zip"
+POLICY = "policy.npz"
+CONFIG, CARD, EVALUATIONS = "config.yaml", "card.yaml", "evaluations.csv"
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a training came to.
+
+    Attributes:
+        policy: file of the policy that did best in the evaluations on the side.
+        best: row of that evaluation.
+        progress: steps, times and all evaluations.
+    """
+
+    policy: Path
+    best: dict[str, float]
+    progress: Progress
+
+
+def train(config: TrainConfig, folder: Path, watcher: Watcher, resume: bool = False) -> Outcome:
+    """Trains, and leaves everything in a folder.
+
+    The folder gets ``policy.npz`` and ``card.yaml`` (best so far), ``checkpoint.zip``,
+    ``evaluations.csv``, ``config.yaml`` and ``tensorboard/``. A training that was stopped at any
+    moment and resumed takes the same steps, to the bit, as one that was not.
+
+    Args:
+        config: what to train.
+        folder: made if missing.
+        watcher: told about steps and evaluations.
+        resume: go on from the folder's checkpoint; from the start, if it was stopped before the
+            first one.
+
+    Raises:
+        ConfigError: the folder has a checkpoint and ``resume`` is False, or one that does not fit;
+            another process trains in it; or it has files of the same names that this training did
+            not write. The folder then stays as it was.
+        OutputError: the folder cannot be written.
+    """
+    with locked(folder), _torch_threads(config.threads.torch):
+        _check_folder(config, folder, resume)
+        run = _Run(config, folder)
+        return run.finish(watcher)
+
+
+def outputs(folder: Path) -> list[Path]:
+    """The files that a training leaves in a folder, beside its log."""
+    return [folder / name for name in (CONFIG, CHECKPOINT, POLICY, CARD, EVALUATIONS)]
+
+
+def config_bytes(config: TrainConfig) -> bytes:
+    """What ``config.yaml`` of a run folder holds."""
+    return _yaml(config.tree())
+
+
+def best_of(evaluations: Sequence[dict[str, float]]) -> dict[str, float]:
+    """The evaluation whose policy is kept: the first of those with the most success."""
+    return max(evaluations, key=_merit)
+
+
+def _check_folder(config: TrainConfig, folder: Path, resume: bool) -> None:
+    """Refuses a folder that has something to lose."""
+    if (folder / CHECKPOINT).exists():
+        if not resume:
+            raise ConfigError(
+                f"{folder}: a training is kept here already; add --resume to go on with it, or "
+                "give another folder with --out"
+            )
+        return
+    present = [file for file in outputs(folder) if file.exists()]
+    kept = folder / CONFIG
+    if present and not (kept.is_file() and kept.read_bytes() == config_bytes(config)):
+        raise ConfigError(
+            f"{present[0]}: this training did not write it and would replace it; move it away, or "
+            "give another folder with --out"
+        )
+
+
+class _Run:
+    """A training with its folder."""
+
+    def __init__(self, config: TrainConfig, folder: Path) -> None:
+        self.config, self.folder = config, folder
+        self.stack: Stack = make_stack(config)
+        self.model: Model
+        checkpoint = folder / CHECKPOINT
+        if checkpoint.exists():
+            self.model, self.progress = load_checkpoint(checkpoint, config, self.stack)
+        else:
+            write_bytes(folder / CONFIG, config_bytes(config))
+            self.model, self.progress = make_model(config, self.stack), Progress()
+            seed_episodes(self.stack, config)
+            if config.imitate.rounds:
+                self._imitate()
+
+    def _imitate(self) -> None:
+        assert isinstance(self.model, PPO)
+        cpu, wall = time.process_time(), time.perf_counter()
+        imitate(self.model, self.stack, self.config, self.config.imitate)
+        self.progress.imitation_cpu_s = time.process_time() - cpu
+        self.progress.cpu_s += self.progress.imitation_cpu_s
+        self.progress.wall_s += time.perf_counter() - wall
+        self.stack.fish.cpu_s = 0.0
+
+    def finish(self, watcher: Watcher) -> Outcome:
+        config, progress = self.config, self.progress
+        left = config.total_steps - progress.steps
+        if left > 0:
+            books = Between(config, progress, watcher, self._evaluate, self._save)
+            self.model.set_logger(
+                logger.configure(str(self.folder / "tensorboard"), ["tensorboard"])
+            )
+            self.model.learn(left, callback=books, reset_num_timesteps=progress.steps == 0)
+        return Outcome(self.folder / POLICY, best_of(progress.evaluations), progress)
+
+    def _evaluate(self) -> dict[str, float]:
+        policy = self._policy({})
+        row = try_policy(self.config, PretrainedPolicy(policy))
+        if all(_merit(row) > _merit(other) for other in self.progress.evaluations):
+            self._keep(row)
+        return row
+
+    def _policy(self, about: dict[str, object]) -> PolicyFile:
+        spec = self.stack.past.history.spec
+        return export_policy(self.model, self.stack.outside, spec, self.config.task, about)
+
+    def _keep(self, row: dict[str, float]) -> None:
+        about = card(self.config, self.progress, row)
+        write_policy(self._policy(about), self.folder / POLICY)
+        write_bytes(self.folder / CARD, _yaml(about))
+
+    def _save(self) -> None:
+        for name, share in shares(self.progress, self.stack.fish.cpu_s).items():
+            self.model.logger.record(f"time/share_{name}", share)
+        self.progress.env_cpu_s = self.stack.fish.cpu_s
+        save_checkpoint(
+            self.folder / CHECKPOINT, self.config, self.model, self.stack, self.progress
+        )
+        rows = self.progress.evaluations
+        if rows:
+            write_rows(self.folder / EVALUATIONS, list(rows[0]), rows)
+
+
+def _merit(row: dict[str, float]) -> tuple[float, float]:
+    return row["success_rate"], row["episode_return"]
+
+
+def _yaml(tree: dict[str, object]) -> bytes:
+    return yaml.safe_dump(tree, sort_keys=False, allow_unicode=True).encode()
+
+
+@contextmanager
+def _torch_threads(count: int) -> Iterator[None]:
+    before = torch.get_num_threads()
+    torch.set_num_threads(count)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)

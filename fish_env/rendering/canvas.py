@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import numpy.typing as npt
 import pygame
 
 from fish_env.arrays import BoolArray, FloatArray, IntArray
 from fish_env.rendering.camera import NEAR, Camera
-from fish_env.rendering.light import clearness, hazed, lit, water_colour
-from fish_env.rendering.mesh import OPAQUE, Mesh
+from fish_env.rendering.faces import Faces
+from fish_env.rendering.light import clearness, hazed, lengths, water_colour
+from fish_env.rendering.mesh import OPAQUE
 
 Colour = tuple[int, int, int]
 LARGEST = 20000.0
@@ -32,23 +31,16 @@ class Canvas:
         self.camera = camera
         self.unit = unit
 
-    def mesh(self, mesh: Mesh) -> None:
-        """Draw the faces of a mesh that look at the eye, the farthest first."""
-        eye = self.camera.eye
-        seen = mesh.chosen(mesh.facing(eye))
-        pixels, ahead = self.camera.project(seen.corners)
-        if not len(pixels) or ahead.min() < NEAR:
+    def faces(self, faces: Faces) -> None:
+        """Draw the faces of one mesh, the farthest first; none if one is too near to the eye."""
+        if not len(faces.pixels) or faces.nearest.min() < NEAR:
             return
-        middles = seen.middles
-        colours = hazed(lit(seen.colours, middles, seen.normals, eye), middles, eye)
-        order = np.argsort(-ahead.mean(axis=1), kind="stable")
-        rows = np.column_stack([colours, seen.alphas])[order]
-        if rows[:, 3].min() >= OPAQUE:
-            _fill(self.surface, pixels[order], rows)
+        if faces.colours[:, 3].min() >= OPAQUE:
+            _fill(self.surface, faces.pixels, faces.colours)
         else:
-            self._glaze(pixels[order], rows)
+            self._glaze(faces.pixels, faces.colours)
 
-    def _glaze(self, pixels: FloatArray, rows: FloatArray) -> None:
+    def _glaze(self, pixels: FloatArray, rows: IntArray) -> None:
         """Faces that something shows through: they do not overlap, so one layer holds them."""
         layer, low = self._layer(pixels.reshape(-1, 2))
         if layer is not None:
@@ -68,7 +60,8 @@ class Canvas:
         """A flat polygon (n, 3) in a colour as seen, without light or haze."""
         pixels, ahead = self.camera.project(points)
         if ahead.min() > NEAR:
-            pygame.draw.polygon(self.surface, _whole(np.asarray(colour)), _held(pixels).tolist())
+            shade = _whole(np.asarray(colour)).tolist()
+            pygame.draw.polygon(self.surface, shade, _held(pixels).tolist())
 
     def lines(
         self,
@@ -90,17 +83,25 @@ class Canvas:
         if not len(starts):
             return
         starts, ends, kept = self._clipped(starts, ends)
-        if not kept.any():
+        (first, near), (last, _) = (self.camera.project(points) for points in (starts, ends))
+        pixels = self.camera.scale * widths / near
+        thick = np.maximum(np.rint(pixels), max(1.0, round(0.7 * self.unit)))
+        shown = np.flatnonzero(kept & self._touching(first, last, thick))
+        if not len(shown):
             return
-        middles = 0.5 * (starts + ends)[kept]
-        mixed = self.faded(colours[kept], middles, ground)
-        (first, near), (last, _) = (self.camera.project(points[kept]) for points in (starts, ends))
-        pixels = self.camera.scale * widths[kept] / near
-        thick = np.maximum(np.rint(pixels), max(1.0, round(0.7 * self.unit))).astype(int)
+        middles = 0.5 * (starts + ends)[shown]
+        mixed = _packed(self.surface, _whole(self.faded(colours[shown], middles, ground)))
         line, surface = pygame.draw.line, self.surface
-        pairs = zip(_whole(mixed), first.tolist(), last.tolist(), thick.tolist(), strict=True)
-        for colour, a, b, width in pairs:
+        columns = (rows[shown].tolist() for rows in (first, last, thick.astype(int)))
+        for colour, a, b, width in zip(mixed, *columns, strict=True):
             line(surface, colour, a, b, width)
+
+    def _touching(self, first: FloatArray, last: FloatArray, thick: FloatArray) -> BoolArray:
+        """(n,) lines between pixels (n, 2) that are not altogether beside the picture."""
+        margin = thick[:, None] + 2.0
+        after = np.maximum(first, last) > -margin
+        before = np.minimum(first, last) < self.surface.get_size() + margin
+        return np.asarray((after & before).all(axis=1))
 
     def faded(
         self, colours: FloatArray, points: FloatArray, ground: npt.ArrayLike | None = None
@@ -113,7 +114,7 @@ class Canvas:
         if ground is not None:
             return hazed(left * own + (1.0 - left) * np.asarray(ground), points, eye)
         ray = points - eye
-        down = ray[:, 2] / np.linalg.norm(ray, axis=1)
+        down = ray[:, 2] / lengths(ray)
         return left * hazed(own, points, eye) + (1.0 - left) * water_colour(down)
 
     def _clipped(
@@ -137,9 +138,8 @@ class Canvas:
         size = self.camera.scale * radii[inside] / ahead[inside]
         mixed = self.faded(colours[inside], points[inside])
         circle, surface = pygame.draw.circle, self.surface
-        for colour, at, radius in zip(
-            _whole(mixed), pixels[inside].tolist(), size.tolist(), strict=True
-        ):
+        columns = _packed(surface, _whole(mixed)), pixels[inside].tolist(), size.tolist()
+        for colour, at, radius in zip(*columns, strict=True):
             circle(surface, colour, at, max(radius, 0.6 * self.unit))
 
     def sheet(self, outline: FloatArray, colour: Colour, alpha: float) -> None:
@@ -172,18 +172,31 @@ class Canvas:
         return np.array(kept).reshape(-1, 3)
 
 
-def _fill(surface: pygame.Surface, pixels: FloatArray, rows: FloatArray) -> None:
+def _fill(surface: pygame.Surface, pixels: FloatArray, rows: IntArray) -> None:
     """Fill four-cornered faces (n, 4, 2) with colours and alphas (n, 4)."""
     polygon = pygame.draw.polygon
     # Columns: a list for each face would keep the garbage collector busy.
-    columns = (*_whole(rows.T), *_held(pixels).reshape(-1, 8).T.tolist())
-    for red, green, blue, alpha, ax, ay, bx, by, cx, cy, dx, dy in zip(*columns, strict=True):
-        polygon(surface, (red, green, blue, alpha), ((ax, ay), (bx, by), (cx, cy), (dx, dy)))
+    columns = (_packed(surface, rows), *_held(pixels).reshape(-1, 8).T.tolist())
+    for colour, ax, ay, bx, by, cx, cy, dx, dy in zip(*columns, strict=True):
+        polygon(surface, colour, ((ax, ay), (bx, by), (cx, cy), (dx, dy)))
 
 
-def _whole(colours: FloatArray) -> list[Any]:
-    rows: list[Any] = np.clip(colours, 0.0, 255.0).astype(int).tolist()
-    return rows
+def _packed(surface: pygame.Surface, colours: IntArray) -> list[int]:
+    """Colours (n, 3), or (n, 4) with alphas, as the numbers that a surface keeps of them.
+
+    The drawing library takes a number as it is; a tuple costs it as much as a small face.
+    """
+    shifts = surface.get_shifts()
+    rows = colours.T
+    numbers = (rows[0] << shifts[0]) | (rows[1] << shifts[1]) | (rows[2] << shifts[2])
+    if surface.get_masks()[3]:
+        numbers |= (rows[3] if len(rows) == 4 else 255) << shifts[3]
+    packed: list[int] = numbers.tolist()
+    return packed
+
+
+def _whole(colours: FloatArray) -> IntArray:
+    return np.clip(colours, 0.0, 255.0).astype(np.int64)
 
 
 def _held(pixels: FloatArray) -> FloatArray:

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Callable, Iterable
+from itertools import repeat
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 import pygame
@@ -91,10 +96,8 @@ class Canvas:
             return
         middles = 0.5 * (starts + ends)[shown]
         mixed = _packed(self.surface, _whole(self.faded(colours[shown], middles, ground)))
-        line, surface = pygame.draw.line, self.surface
         columns = (rows[shown].tolist() for rows in (first, last, thick.astype(int)))
-        for colour, a, b, width in zip(mixed, *columns, strict=True):
-            line(surface, colour, a, b, width)
+        _each(pygame.draw.line, self.surface, mixed, *columns)
 
     def _touching(self, first: FloatArray, last: FloatArray, thick: FloatArray) -> BoolArray:
         """(n,) lines between pixels (n, 2) that are not altogether beside the picture."""
@@ -137,10 +140,9 @@ class Canvas:
         inside = (ahead > 3.0 * NEAR) & np.all((pixels > 0) & (pixels < (width, height)), axis=1)
         size = self.camera.scale * radii[inside] / ahead[inside]
         mixed = self.faded(colours[inside], points[inside])
-        circle, surface = pygame.draw.circle, self.surface
-        columns = _packed(surface, _whole(mixed)), pixels[inside].tolist(), size.tolist()
-        for colour, at, radius in zip(*columns, strict=True):
-            circle(surface, colour, at, max(radius, 0.6 * self.unit))
+        rims = np.maximum(size, 0.6 * self.unit).tolist()
+        shades = _packed(self.surface, _whole(mixed))
+        _each(pygame.draw.circle, self.surface, shades, pixels[inside].tolist(), rims)
 
     def sheet(self, outline: FloatArray, colour: Colour, alpha: float) -> None:
         """A flat outline (n, 3) filled with a colour that lets things through (alpha 0 to 1)."""
@@ -174,11 +176,15 @@ class Canvas:
 
 def _fill(surface: pygame.Surface, pixels: FloatArray, rows: IntArray) -> None:
     """Fill four-cornered faces (n, 4, 2) with colours and alphas (n, 4)."""
-    polygon = pygame.draw.polygon
     # Columns: a list for each face would keep the garbage collector busy.
-    columns = (_packed(surface, rows), *_held(pixels).reshape(-1, 8).T.tolist())
-    for colour, ax, ay, bx, by, cx, cy, dx, dy in zip(*columns, strict=True):
-        polygon(surface, colour, ((ax, ay), (bx, by), (cx, cy), (dx, dy)))
+    ax, ay, bx, by, cx, cy, dx, dy = _held(pixels).reshape(-1, 8).T.tolist()
+    faces = zip(zip(ax, ay), zip(bx, by), zip(cx, cy), zip(dx, dy))
+    _each(pygame.draw.polygon, surface, _packed(surface, rows), faces)
+
+
+def _each(draw: Callable[..., object], surface: pygame.Surface, *columns: Iterable[Any]) -> None:
+    """Call a drawing function for each row of the columns, without a loop of the interpreter."""
+    deque(map(draw, repeat(surface), *columns), maxlen=0)
 
 
 def _packed(surface: pygame.Surface, colours: IntArray) -> list[int]:

@@ -87,9 +87,10 @@ class Canvas:
         """
         if not len(starts):
             return
-        starts, ends, kept = self._clipped(starts, ends)
-        (first, near), (last, _) = (self.camera.project(points) for points in (starts, ends))
-        pixels = self.camera.scale * widths / near
+        starts, ends, kept, seen = self._clipped(starts, ends)
+        (first, near), (last, _) = (self.camera.pictured(points) for points in seen)
+        # What is behind the eye is not drawn, but must not divide by zero either.
+        pixels = self.camera.scale * widths / np.maximum(near, 0.5 * NEAR)
         thick = np.maximum(np.rint(pixels), max(1.0, round(0.7 * self.unit)))
         shown = np.flatnonzero(kept & self._touching(first, last, thick))
         if not len(shown):
@@ -122,16 +123,22 @@ class Canvas:
 
     def _clipped(
         self, starts: FloatArray, ends: FloatArray
-    ) -> tuple[FloatArray, FloatArray, BoolArray]:
-        """Lines cut off where they come too near to the eye, and which are left."""
-        ahead = [self.camera.seen(points)[:, 0] for points in (starts, ends)]
+    ) -> tuple[FloatArray, FloatArray, BoolArray, list[FloatArray]]:
+        """Lines cut off where they come too near to the eye, which are left, and as seen."""
+        seen = [self.camera.seen(points) for points in (starts, ends)]
+        ahead = seen[0][:, 0], seen[1][:, 0]
         kept = np.maximum(*ahead) > NEAR
+        crossing = kept & (np.minimum(*ahead) < NEAR)
+        if not crossing.any():
+            return starts, ends, kept, seen
         span = np.where(np.abs(ahead[1] - ahead[0]) > 1e-9, ahead[1] - ahead[0], 1.0)
         share = ((NEAR - ahead[0]) / span)[:, None]
         cut = starts + share * (ends - starts)
-        first = np.where((ahead[0] < NEAR)[:, None], cut, starts)
-        last = np.where((ahead[1] < NEAR)[:, None], cut, ends)
-        return first, last, kept
+        first, last = (
+            np.where((crossing & (far < NEAR))[:, None], cut, points)
+            for far, points in zip(ahead, (starts, ends), strict=True)
+        )
+        return first, last, kept, [self.camera.seen(points) for points in (first, last)]
 
     def discs(self, points: FloatArray, radii: FloatArray, colours: FloatArray) -> None:
         """Small round things (n, 3) with radii (n,) (m) and colours (n, 3 or 4)."""
@@ -149,13 +156,13 @@ class Canvas:
         corners = self._in_front(outline)
         if len(corners) < 3:
             return
-        pixels, _ = self.camera.project(corners)
-        layer, low = self._layer(_held(pixels))
+        pixels = _held(self.camera.project(corners)[0])
+        layer, low = self._layer(pixels)
         if layer is None:
             return
         distance = float(np.linalg.norm(corners.mean(axis=0) - self.camera.eye))
         strength = round(255 * alpha * float(clearness(0.5 * distance)))
-        pygame.draw.polygon(layer, (*colour, strength), (_held(pixels) - low).tolist())
+        pygame.draw.polygon(layer, (*colour, strength), (pixels - low).tolist())
         self.surface.blit(layer, low.tolist())
 
     def _in_front(self, outline: FloatArray) -> FloatArray:

@@ -51,17 +51,18 @@ def seen(meshes: Sequence[Mesh], camera: Camera) -> list[Faces]:
     )
     owners = np.repeat(np.arange(len(meshes)), [len(mesh.corners) for mesh in meshes])
     which = whole.facing(eye)
-    middles, normals = whole.middles[which], whole.normals[which]
-    pixels, ahead = camera.project(whole.corners[which])
-    colours = hazed(lit(whole.colours[which], middles, normals, eye), middles, eye)
-    owners, far = owners[which], ahead.mean(axis=1)
-    order = np.lexsort((-far, owners))
-    rows = np.column_stack([colours, whole.alphas[which]])[order]
+    if not which.all():
+        whole, owners = whole.chosen(which), owners[which]
+    middles = whole.middles
+    pixels, ahead = camera.project(whole.corners)
+    colours = hazed(lit(whole.colours, middles, whole.normals, eye), middles, eye)
+    a, b, c, d = ahead.T
+    order = np.lexsort((-((a + b + c + d) / 4.0), owners))
     together = Faces(
         pixels[order],
-        ahead.min(axis=1)[order],
+        np.minimum(np.minimum(a, b), np.minimum(c, d))[order],
         middles[order, 2],
-        np.clip(rows, 0.0, 255.0).astype(np.int64),
+        np.column_stack([colours, whole.alphas])[order].clip(0.0, 255.0).astype(np.int64),
     )
     ends = np.searchsorted(owners[order], np.arange(len(meshes) + 1))
     return [

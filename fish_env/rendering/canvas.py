@@ -184,8 +184,9 @@ class Canvas:
 def _fill(surface: pygame.Surface, pixels: FloatArray, rows: IntArray) -> None:
     """Fill four-cornered faces (n, 4, 2) with colours and alphas (n, 4)."""
     # Columns: a list for each face would keep the garbage collector busy.
-    ax, ay, bx, by, cx, cy, dx, dy = _held(pixels).reshape(-1, 8).T.tolist()
-    faces = zip(zip(ax, ay), zip(bx, by), zip(cx, cy), zip(dx, dy))
+    columns = _held(pixels).reshape(-1, 8).T.tolist()
+    corners = (zip(*columns[i : i + 2], strict=True) for i in (0, 2, 4, 6))
+    faces = zip(*corners, strict=True)
     _each(pygame.draw.polygon, surface, _packed(surface, rows), faces)
 
 

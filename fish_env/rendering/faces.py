@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -65,6 +66,4 @@ def seen(meshes: Sequence[Mesh], camera: Camera) -> list[Faces]:
         np.column_stack([colours, whole.alphas])[order].clip(0.0, 255.0).astype(np.int64),
     )
     ends = np.searchsorted(owners[order], np.arange(len(meshes) + 1))
-    return [
-        together.chosen(slice(a, b)) for a, b in zip(ends[:-1], ends[1:], strict=True)
-    ]
+    return [together.chosen(slice(a, b)) for a, b in pairwise(ends)]

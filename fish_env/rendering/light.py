@@ -32,7 +32,8 @@ def water_colour(down: npt.ArrayLike) -> FloatArray:
     share = np.asarray(down, float)
     up = share < 0.0
     amount = np.minimum(np.abs(share), 1.0) ** np.where(up, 0.8, 0.6)
-    return LEVEL + np.where(up[..., None], UP - LEVEL, DOWN - LEVEL) * amount[..., None]
+    towards = np.where(up[..., None], UP - LEVEL, DOWN - LEVEL)
+    return np.asarray(LEVEL + towards * amount[..., None])
 
 
 def clearness(distance: npt.ArrayLike) -> FloatArray:

@@ -31,8 +31,10 @@ def as_array(surface: pygame.Surface) -> Frame:
     # The drawing library copies between its own surfaces faster than it writes text of bytes.
     packed = pygame.Surface((width, height), 0, 24, RED_FIRST)
     packed.blit(surface, (0, 0))
-    rows = np.frombuffer(packed.get_buffer(), np.uint8).reshape(height, packed.get_pitch())
-    return rows[:, : 3 * width].reshape(height, width, 3).copy()
+    # An array over the surface's own bytes; its rows may be longer than the picture's.
+    held: Frame = np.asarray(packed.get_buffer()).view(np.uint8)
+    rows = held.reshape(height, packed.get_pitch())[:, : 3 * width]
+    return rows.reshape(height, width, 3).copy()
 
 
 class View:

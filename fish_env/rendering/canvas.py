@@ -165,6 +165,27 @@ class Canvas:
         pygame.draw.polygon(layer, (*colour, strength), (pixels - low).tolist())
         self.surface.blit(layer, low.tolist())
 
+    def sheets(self, outlines: FloatArray, colour: Colour, alpha: float) -> None:
+        """As :meth:`sheet`, of several outlines (k, n, 3), the first of them drawn first."""
+        seen = self.camera.seen(outlines)
+        if seen[..., 0].min() <= 1.01 * NEAR:
+            for outline in outlines:
+                self.sheet(outline, colour, alpha)
+            return
+        pixels = _held(self.camera.pictured(seen)[0])
+        distances = lengths(outlines.mean(axis=1) - self.camera.eye)
+        strengths = np.rint(255 * alpha * clearness(0.5 * distances)).astype(int).tolist()
+        size = self.surface.get_size()
+        lows = np.clip(np.floor(pixels.min(axis=1)) - 1, 0, size).astype(int)
+        highs = np.clip(np.ceil(pixels.max(axis=1)) + 2, 0, size).astype(int)
+        inside = (pixels - lows[:, None]).tolist()
+        corners = lows.tolist(), (highs - lows).tolist()
+        for low, room, points, strength in zip(*corners, inside, strengths, strict=True):
+            if min(room) > 0:
+                layer = pygame.Surface(room, pygame.SRCALPHA)
+                pygame.draw.polygon(layer, (*colour, strength), points)
+                self.surface.blit(layer, low)
+
     def _in_front(self, outline: FloatArray) -> FloatArray:
         """The outline without what is behind the eye (Sutherland and Hodgman)."""
         ahead = self.camera.seen(outline)[:, 0] - 1.01 * NEAR

@@ -104,5 +104,6 @@ def draw_shadow(canvas: Canvas, outline: FloatArray, tank: Tank) -> None:
     flat = outline.copy()
     flat[:, 2] = tank.bottom
     middle = flat.mean(axis=0)
-    for size in np.linspace(1.0 + 0.9 * height, 0.8, 7):
-        canvas.sheet(middle + size * (flat - middle), (16, 30, 34), 0.13 / (1.0 + 1.2 * height))
+    sizes = np.linspace(1.0 + 0.9 * height, 0.8, 7)
+    outlines = middle + sizes[:, None, None] * (flat - middle)
+    canvas.sheets(outlines, (16, 30, 34), 0.13 / (1.0 + 1.2 * height))

@@ -48,7 +48,8 @@ class Mesh:
 
     def facing(self, eye: FloatArray) -> BoolArray:
         """(n,) which faces look at a point (3,)."""
-        return np.asarray(self.normals @ eye > self._reaches)
+        # Not by way of the planes' distances: a sheet seen edge-on would then flicker.
+        return np.asarray(np.einsum("ij,ij->i", self.normals, eye - self.middles) > 0.0)
 
     def turned_over(self) -> Mesh:
         """The same faces seen from the other side."""
@@ -69,11 +70,6 @@ class Mesh:
         bx, by, bz = (corners[:, 3] - corners[:, 1]).T
         across = np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
         return across / np.maximum(lengths(across), 1e-12)[:, None]
-
-    @cached_property
-    def _reaches(self) -> FloatArray:
-        """(n,) how far the plane of each face lies along its normal from the origin (m)."""
-        return np.asarray(np.einsum("ij,ij->i", self.normals, self.middles))
 
 
 def grid_mesh(points: FloatArray, colour: npt.ArrayLike, alpha: npt.ArrayLike = OPAQUE) -> Mesh:

@@ -102,7 +102,10 @@ class Swimmer:
 
     def _draw(self, faces: Faces, side: Side | None) -> None:
         if side is not None:
-            faces = faces.chosen(side.has(faces.depths))
+            chosen = side.has(faces.depths)
+            if not chosen.any():
+                return
+            faces = faces if chosen.all() else faces.chosen(chosen)
         self.canvas.faces(faces)
 
     def _draw_eyes(self, side: Side | None) -> None:

@@ -69,6 +69,7 @@ class Fish:
         fins: on the back and on both sides.
         rail: what the weight block slides along.
         tail: at rest, its joint at the origin.
+        eyes: on both sides of the nose.
     """
 
     shape: FishShape
@@ -78,6 +79,7 @@ class Fish:
     fins: tuple[Fin, ...]
     rail: Mesh
     tail: Mesh
+    eyes: tuple[Eye, ...]
 
     @classmethod
     def built(cls, shape: FishShape) -> Fish:
@@ -85,7 +87,7 @@ class Fish:
         hull = _hull(shape)
         glass = hull.alphas < OPAQUE
         lining = _lining(hull, shape)
-        others = _fins(shape), _rail(shape), _tail(shape)
+        others = _fins(shape), _rail(shape), _tail(shape), _eyes(shape)
         return cls(shape, hull.chosen(~glass), hull.chosen(glass), lining, *others)
 
     def swung_tail(self, angle: float) -> Mesh:
@@ -239,7 +241,7 @@ def _rail(shape: FishShape) -> Mesh:
     return box((shape.block[0] + 0.05, 0.006, 0.006), RAIL).placed(np.eye(3), shape.block_rest)
 
 
-def eyes(shape: FishShape) -> list[Eye]:
+def _eyes(shape: FishShape) -> tuple[Eye, ...]:
     """The eyes on both sides of the nose."""
     found = []
     along = 0.115
@@ -251,4 +253,4 @@ def eyes(shape: FishShape) -> list[Eye]:
         first /= np.linalg.norm(first)
         axes = 0.052 * shape.height * np.stack([first, np.cross(outward, first)])
         found.append(Eye(middle + 0.001 * outward, outward, axes))
-    return found
+    return tuple(found)

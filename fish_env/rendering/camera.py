@@ -46,11 +46,15 @@ class Camera:
 
     def seen(self, points: FloatArray) -> FloatArray:
         """(..., 3) points as seen: distance ahead, to the right and down (m)."""
-        return (points - self.eye) @ self.axes.T
+        away = (points - self.eye).reshape(-1, 3)
+        return (away @ self.axes.T).reshape(points.shape)
 
     def project(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Pixels (..., 2) of points (..., 3), and their distances ahead (...,) (m)."""
-        seen = self.seen(points)
+        return self.pictured(self.seen(points))
+
+    def pictured(self, seen: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """As :meth:`project`, of points (..., 3) as :meth:`seen`."""
         ahead = seen[..., 0]
         factor = self.scale / np.maximum(ahead, NEAR)
         middle = np.array([0.5 * self.width, 0.5 * self.height])

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Callable, Iterable
+from itertools import repeat
 from typing import Any
 
 import numpy as np
@@ -10,8 +13,9 @@ import pygame
 
 from fish_env.arrays import BoolArray, FloatArray, IntArray
 from fish_env.rendering.camera import NEAR, Camera
-from fish_env.rendering.light import clearness, hazed, lit, water_colour
-from fish_env.rendering.mesh import OPAQUE, Mesh
+from fish_env.rendering.faces import Faces
+from fish_env.rendering.light import clearness, hazed, lengths, water_colour
+from fish_env.rendering.mesh import OPAQUE
 
 Colour = tuple[int, int, int]
 LARGEST = 20000.0
@@ -32,23 +36,16 @@ class Canvas:
         self.camera = camera
         self.unit = unit
 
-    def mesh(self, mesh: Mesh) -> None:
-        """Draw the faces of a mesh that look at the eye, the farthest first."""
-        eye = self.camera.eye
-        seen = mesh.chosen(mesh.facing(eye))
-        pixels, ahead = self.camera.project(seen.corners)
-        if not len(pixels) or ahead.min() < NEAR:
+    def faces(self, faces: Faces) -> None:
+        """Draw the faces of one mesh, the farthest first; none if one is too near to the eye."""
+        if not len(faces.pixels) or faces.nearest.min() < NEAR:
             return
-        middles = seen.middles
-        colours = hazed(lit(seen.colours, middles, seen.normals, eye), middles, eye)
-        order = np.argsort(-ahead.mean(axis=1), kind="stable")
-        rows = np.column_stack([colours, seen.alphas])[order]
-        if rows[:, 3].min() >= OPAQUE:
-            _fill(self.surface, pixels[order], rows)
+        if faces.colours[:, 3].min() >= OPAQUE:
+            _fill(self.surface, faces.pixels, faces.colours)
         else:
-            self._glaze(pixels[order], rows)
+            self._glaze(faces.pixels, faces.colours)
 
-    def _glaze(self, pixels: FloatArray, rows: FloatArray) -> None:
+    def _glaze(self, pixels: FloatArray, rows: IntArray) -> None:
         """Faces that something shows through: they do not overlap, so one layer holds them."""
         layer, low = self._layer(pixels.reshape(-1, 2))
         if layer is not None:
@@ -68,7 +65,8 @@ class Canvas:
         """A flat polygon (n, 3) in a colour as seen, without light or haze."""
         pixels, ahead = self.camera.project(points)
         if ahead.min() > NEAR:
-            pygame.draw.polygon(self.surface, _whole(np.asarray(colour)), _held(pixels).tolist())
+            shade = _whole(np.asarray(colour)).tolist()
+            pygame.draw.polygon(self.surface, shade, _held(pixels).tolist())
 
     def lines(
         self,
@@ -89,18 +87,25 @@ class Canvas:
         """
         if not len(starts):
             return
-        starts, ends, kept = self._clipped(starts, ends)
-        if not kept.any():
+        starts, ends, kept, seen = self._clipped(starts, ends)
+        (first, near), (last, _) = (self.camera.pictured(points) for points in seen)
+        # What is behind the eye is not drawn, but must not divide by zero either.
+        pixels = self.camera.scale * widths / np.maximum(near, 0.5 * NEAR)
+        thick = np.maximum(np.rint(pixels), max(1.0, round(0.7 * self.unit)))
+        shown = np.flatnonzero(kept & self._touching(first, last, thick))
+        if not len(shown):
             return
-        middles = 0.5 * (starts + ends)[kept]
-        mixed = self.faded(colours[kept], middles, ground)
-        (first, near), (last, _) = (self.camera.project(points[kept]) for points in (starts, ends))
-        pixels = self.camera.scale * widths[kept] / near
-        thick = np.maximum(np.rint(pixels), max(1.0, round(0.7 * self.unit))).astype(int)
-        line, surface = pygame.draw.line, self.surface
-        pairs = zip(_whole(mixed), first.tolist(), last.tolist(), thick.tolist(), strict=True)
-        for colour, a, b, width in pairs:
-            line(surface, colour, a, b, width)
+        middles = 0.5 * (starts + ends)[shown]
+        mixed = _packed(self.surface, _whole(self.faded(colours[shown], middles, ground)))
+        columns = (rows[shown].tolist() for rows in (first, last, thick.astype(int)))
+        _each(pygame.draw.line, self.surface, mixed, *columns)
+
+    def _touching(self, first: FloatArray, last: FloatArray, thick: FloatArray) -> BoolArray:
+        """(n,) lines between pixels (n, 2) that are not altogether beside the picture."""
+        margin = thick[:, None] + 2.0
+        after = np.maximum(first, last) > -margin
+        before = np.minimum(first, last) < self.surface.get_size() + margin
+        return np.asarray((after & before).all(axis=1))
 
     def faded(
         self, colours: FloatArray, points: FloatArray, ground: npt.ArrayLike | None = None
@@ -113,21 +118,27 @@ class Canvas:
         if ground is not None:
             return hazed(left * own + (1.0 - left) * np.asarray(ground), points, eye)
         ray = points - eye
-        down = ray[:, 2] / np.linalg.norm(ray, axis=1)
+        down = ray[:, 2] / lengths(ray)
         return left * hazed(own, points, eye) + (1.0 - left) * water_colour(down)
 
     def _clipped(
         self, starts: FloatArray, ends: FloatArray
-    ) -> tuple[FloatArray, FloatArray, BoolArray]:
-        """Lines cut off where they come too near to the eye, and which are left."""
-        ahead = [self.camera.seen(points)[:, 0] for points in (starts, ends)]
+    ) -> tuple[FloatArray, FloatArray, BoolArray, list[FloatArray]]:
+        """Lines cut off where they come too near to the eye, which are left, and as seen."""
+        seen = [self.camera.seen(points) for points in (starts, ends)]
+        ahead = seen[0][:, 0], seen[1][:, 0]
         kept = np.maximum(*ahead) > NEAR
+        crossing = kept & (np.minimum(*ahead) < NEAR)
+        if not crossing.any():
+            return starts, ends, kept, seen
         span = np.where(np.abs(ahead[1] - ahead[0]) > 1e-9, ahead[1] - ahead[0], 1.0)
         share = ((NEAR - ahead[0]) / span)[:, None]
         cut = starts + share * (ends - starts)
-        first = np.where((ahead[0] < NEAR)[:, None], cut, starts)
-        last = np.where((ahead[1] < NEAR)[:, None], cut, ends)
-        return first, last, kept
+        first, last = (
+            np.where((crossing & (far < NEAR))[:, None], cut, points)
+            for far, points in zip(ahead, (starts, ends), strict=True)
+        )
+        return first, last, kept, [self.camera.seen(points) for points in (first, last)]
 
     def discs(self, points: FloatArray, radii: FloatArray, colours: FloatArray) -> None:
         """Small round things (n, 3) with radii (n,) (m) and colours (n, 3 or 4)."""
@@ -136,25 +147,44 @@ class Canvas:
         inside = (ahead > 3.0 * NEAR) & np.all((pixels > 0) & (pixels < (width, height)), axis=1)
         size = self.camera.scale * radii[inside] / ahead[inside]
         mixed = self.faded(colours[inside], points[inside])
-        circle, surface = pygame.draw.circle, self.surface
-        for colour, at, radius in zip(
-            _whole(mixed), pixels[inside].tolist(), size.tolist(), strict=True
-        ):
-            circle(surface, colour, at, max(radius, 0.6 * self.unit))
+        rims = np.maximum(size, 0.6 * self.unit).tolist()
+        shades = _packed(self.surface, _whole(mixed))
+        _each(pygame.draw.circle, self.surface, shades, pixels[inside].tolist(), rims)
 
     def sheet(self, outline: FloatArray, colour: Colour, alpha: float) -> None:
         """A flat outline (n, 3) filled with a colour that lets things through (alpha 0 to 1)."""
         corners = self._in_front(outline)
         if len(corners) < 3:
             return
-        pixels, _ = self.camera.project(corners)
-        layer, low = self._layer(_held(pixels))
+        pixels = _held(self.camera.project(corners)[0])
+        layer, low = self._layer(pixels)
         if layer is None:
             return
         distance = float(np.linalg.norm(corners.mean(axis=0) - self.camera.eye))
         strength = round(255 * alpha * float(clearness(0.5 * distance)))
-        pygame.draw.polygon(layer, (*colour, strength), (_held(pixels) - low).tolist())
+        pygame.draw.polygon(layer, (*colour, strength), (pixels - low).tolist())
         self.surface.blit(layer, low.tolist())
+
+    def sheets(self, outlines: FloatArray, colour: Colour, alpha: float) -> None:
+        """As :meth:`sheet`, of several outlines (k, n, 3), the first of them drawn first."""
+        seen = self.camera.seen(outlines)
+        if seen[..., 0].min() <= 1.01 * NEAR:
+            for outline in outlines:
+                self.sheet(outline, colour, alpha)
+            return
+        pixels = _held(self.camera.pictured(seen)[0])
+        distances = lengths(outlines.mean(axis=1) - self.camera.eye)
+        strengths = np.rint(255 * alpha * clearness(0.5 * distances)).astype(int).tolist()
+        size = self.surface.get_size()
+        lows = np.clip(np.floor(pixels.min(axis=1)) - 1, 0, size).astype(int)
+        highs = np.clip(np.ceil(pixels.max(axis=1)) + 2, 0, size).astype(int)
+        inside = (pixels - lows[:, None]).tolist()
+        corners = lows.tolist(), (highs - lows).tolist()
+        for low, room, points, strength in zip(*corners, inside, strengths, strict=True):
+            if min(room) > 0:
+                layer = pygame.Surface(room, pygame.SRCALPHA)
+                pygame.draw.polygon(layer, (*colour, strength), points)
+                self.surface.blit(layer, low)
 
     def _in_front(self, outline: FloatArray) -> FloatArray:
         """The outline without what is behind the eye (Sutherland and Hodgman)."""
@@ -172,18 +202,36 @@ class Canvas:
         return np.array(kept).reshape(-1, 3)
 
 
-def _fill(surface: pygame.Surface, pixels: FloatArray, rows: FloatArray) -> None:
+def _fill(surface: pygame.Surface, pixels: FloatArray, rows: IntArray) -> None:
     """Fill four-cornered faces (n, 4, 2) with colours and alphas (n, 4)."""
-    polygon = pygame.draw.polygon
     # Columns: a list for each face would keep the garbage collector busy.
-    columns = (*_whole(rows.T), *_held(pixels).reshape(-1, 8).T.tolist())
-    for red, green, blue, alpha, ax, ay, bx, by, cx, cy, dx, dy in zip(*columns, strict=True):
-        polygon(surface, (red, green, blue, alpha), ((ax, ay), (bx, by), (cx, cy), (dx, dy)))
+    columns = _held(pixels).reshape(-1, 8).T.tolist()
+    corners = (zip(*columns[i : i + 2], strict=True) for i in (0, 2, 4, 6))
+    faces = zip(*corners, strict=True)
+    _each(pygame.draw.polygon, surface, _packed(surface, rows), faces)
 
 
-def _whole(colours: FloatArray) -> list[Any]:
-    rows: list[Any] = np.clip(colours, 0.0, 255.0).astype(int).tolist()
-    return rows
+def _each(draw: Callable[..., object], surface: pygame.Surface, *columns: Iterable[Any]) -> None:
+    """Call a drawing function for each row of the columns, without a loop of the interpreter."""
+    deque(map(draw, repeat(surface), *columns), maxlen=0)
+
+
+def _packed(surface: pygame.Surface, colours: IntArray) -> list[int]:
+    """Colours (n, 3), or (n, 4) with alphas, as the numbers that a surface keeps of them.
+
+    The drawing library takes a number as it is; a tuple costs it as much as a small face.
+    """
+    shifts = surface.get_shifts()
+    rows = colours.T
+    numbers = (rows[0] << shifts[0]) | (rows[1] << shifts[1]) | (rows[2] << shifts[2])
+    if surface.get_masks()[3]:
+        numbers |= (rows[3] if len(rows) == 4 else 255) << shifts[3]
+    packed: list[int] = numbers.tolist()
+    return packed
+
+
+def _whole(colours: FloatArray) -> IntArray:
+    return np.clip(colours, 0.0, 255.0).astype(np.int64)
 
 
 def _held(pixels: FloatArray) -> FloatArray:

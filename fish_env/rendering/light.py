@@ -21,12 +21,19 @@ GOAL = (140, 255, 200)
 FISH = (255, 158, 54)
 
 
+def lengths(vectors: FloatArray) -> FloatArray:
+    """Lengths (...,) of vectors (..., 3); on these few columns faster than numpy's own norm."""
+    x, y, z = vectors[..., 0], vectors[..., 1], vectors[..., 2]
+    return np.asarray(np.sqrt(x * x + y * y + z * z))
+
+
 def water_colour(down: npt.ArrayLike) -> FloatArray:
     """Colours (..., 3) of water seen in directions whose downward part (...,) is -1 to 1."""
-    share = np.asarray(down, float)[..., None]
-    upper = LEVEL + (UP - LEVEL) * np.clip(-share, 0.0, 1.0) ** 0.8
-    lower = LEVEL + (DOWN - LEVEL) * np.clip(share, 0.0, 1.0) ** 0.6
-    return np.asarray(np.where(share < 0.0, upper, lower))
+    share = np.asarray(down, float)
+    up = share < 0.0
+    amount = np.minimum(np.abs(share), 1.0) ** np.where(up, 0.8, 0.6)
+    towards = np.where(up[..., None], UP - LEVEL, DOWN - LEVEL)
+    return np.asarray(LEVEL + towards * amount[..., None])
 
 
 def clearness(distance: npt.ArrayLike) -> FloatArray:
@@ -38,7 +45,7 @@ def clearness(distance: npt.ArrayLike) -> FloatArray:
 def hazed(colours: FloatArray, points: FloatArray, eye: FloatArray) -> FloatArray:
     """Colours (..., 3) of points (..., 3) seen through the water."""
     ray = points - eye
-    distance = np.linalg.norm(ray, axis=-1)
+    distance = lengths(ray)
     left = clearness(distance)[..., None]
     return left * colours + (1.0 - left) * water_colour(ray[..., 2] / np.maximum(distance, 1e-9))
 
@@ -55,9 +62,9 @@ def lit(
         eye: (3,) m.
     """
     to_eye = eye - points
-    to_eye /= np.linalg.norm(to_eye, axis=-1, keepdims=True)
+    to_eye /= lengths(to_eye)[..., None]
     half = to_eye + SUN
-    half /= np.linalg.norm(half, axis=-1, keepdims=True)
+    half /= lengths(half)[..., None]
     sky = 0.5 - 0.5 * normals[:, 2]
     direct = np.clip(normals @ SUN, 0.0, 1.0)
     shine = np.clip(np.einsum("ij,ij->i", normals, half), 0.0, 1.0) ** 28

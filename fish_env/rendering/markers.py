@@ -23,19 +23,19 @@ def draw_goal_plane(canvas: Canvas, scene: Scene, goal: Goal) -> None:
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * PLANE_HALF_M + (north, east)
     canvas.sheet(np.column_stack([corners, np.full(4, goal.depth)]), GOAL, 0.14)
     steps = np.arange(-PLANE_HALF_M, PLANE_HALF_M + 1e-9, PLANE_STEP_M)
-    starts, ends = [], []
+    ends = []
     for axis in (0, 1):
         middle = scene.position[axis]
         inside = np.round(middle / PLANE_STEP_M) * PLANE_STEP_M + steps
         inside = inside[np.abs(inside - middle) < PLANE_HALF_M]
-        for value in [middle - PLANE_HALF_M, *inside, middle + PLANE_HALF_M]:
-            line = np.full((2, 3), goal.depth)
-            line[:, axis] = value
-            line[:, 1 - axis] = scene.position[1 - axis] + np.array([-1.0, 1.0]) * PLANE_HALF_M
-            starts.append(line[0])
-            ends.append(line[1])
-    colours = np.tile(0.75 * np.array(GOAL), (len(starts), 1))
-    canvas.lines(np.array(starts), np.array(ends), colours, np.full(len(starts), 0.0008))
+        values = np.array([middle - PLANE_HALF_M, *inside, middle + PLANE_HALF_M])
+        both = np.full((2, len(values), 3), goal.depth)
+        both[..., axis] = values
+        both[..., 1 - axis] = scene.position[1 - axis] + np.array([[-PLANE_HALF_M], [PLANE_HALF_M]])
+        ends.append(both)
+    first, last = np.concatenate(ends, axis=1)
+    colours = np.tile(0.75 * np.array(GOAL), (len(first), 1))
+    canvas.lines(first, last, colours, np.full(len(first), 0.0008))
 
 
 def draw_goal_heading(canvas: Canvas, scene: Scene, goal: Goal, length: float) -> None:
@@ -104,5 +104,6 @@ def draw_shadow(canvas: Canvas, outline: FloatArray, tank: Tank) -> None:
     flat = outline.copy()
     flat[:, 2] = tank.bottom
     middle = flat.mean(axis=0)
-    for size in np.linspace(1.0 + 0.9 * height, 0.8, 7):
-        canvas.sheet(middle + size * (flat - middle), (16, 30, 34), 0.13 / (1.0 + 1.2 * height))
+    sizes = np.linspace(1.0 + 0.9 * height, 0.8, 7)
+    outlines = middle + sizes[:, None, None] * (flat - middle)
+    canvas.sheets(outlines, (16, 30, 34), 0.13 / (1.0 + 1.2 * height))

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from functools import cache, lru_cache
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from fish_env.arrays import BoolArray, FloatArray
+from fish_env.arrays import FloatArray
 from fish_env.rendering.canvas import Canvas
 from fish_env.rendering.light import clearness
 from fish_env.rendering.scene import Tank
@@ -21,16 +22,32 @@ LINE, WALL = np.array([96.0, 104.0, 96.0]), np.array([170.0, 214.0, 220.0])
 SPECKS, CLOUD_M = 170, 2.4
 
 
+class Lines(NamedTuple):
+    """Lines that stand still in the water.
+
+    Attributes:
+        first: (n, 3) where they begin (m).
+        last: (n, 3) where they end (m).
+        middles: (n, 3) between both (m).
+        colours: (n, 4) with how much of the colour is left, 0 to 1.
+        widths: (n,) (m).
+    """
+
+    first: FloatArray
+    last: FloatArray
+    middles: FloatArray
+    colours: FloatArray
+    widths: FloatArray
+
+
 def draw_floor_grid(canvas: Canvas, tank: Tank) -> None:
     """Lines every 25 cm, stronger each metre, inside the walls or as far as one sees."""
-    first, last, strong = _floor_grid(*_extent(canvas, tank), tank.bottom)
-    opacity, widths = np.where(strong, 0.8, 0.45), np.where(strong, 0.004, 0.002)
-    _draw(canvas, first, last, LINE, opacity, widths, 0.78 * SAND)
+    _draw(canvas, _floor_grid(*_extent(canvas, tank), tank.bottom), 0.78 * SAND)
 
 
 @lru_cache(maxsize=8)
-def _floor_grid(north: Span, east: Span, bottom: float) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Both ends (n, 3) of the lines, in short pieces, and which (n,) lie at whole metres."""
+def _floor_grid(north: Span, east: Span, bottom: float) -> Lines:
+    """The grid in short pieces, kept until the eye has moved on by one of them."""
     starts, ends, strong = [], [], []
     for axis, (low, high) in enumerate((north, east)):
         other = (east, north)[axis]
@@ -39,17 +56,19 @@ def _floor_grid(north: Span, east: Span, bottom: float) -> tuple[FloatArray, Flo
             starts.append(line[:-1])
             ends.append(line[1:])
             strong += [abs(value - round(value)) < 1e-9] * (len(line) - 1)
-    return np.concatenate(starts), np.concatenate(ends), np.array(strong)
+    return _lines(starts, ends, LINE, np.where(strong, 0.8, 0.45), np.where(strong, 0.004, 0.002))
 
 
 def draw_walls(canvas: Canvas, tank: Tank) -> None:
     """Level lines every 25 cm and upright ones every half metre on the walls, if there are any."""
-    if tank.walls is None:
-        return
-    north, east = tank.walls[:2], tank.walls[2:]
-    depths = np.linspace(
-        tank.top, tank.bottom, max(2, round((tank.bottom - tank.top) / GRID_M) + 1)
-    )
+    if tank.walls is not None:
+        _draw(canvas, _wall_lines(tank.top, tank.bottom, tank.walls))
+
+
+@lru_cache(maxsize=8)
+def _wall_lines(top: float, bottom: float, walls: tuple[float, float, float, float]) -> Lines:
+    north, east = walls[:2], walls[2:]
+    depths = np.linspace(top, bottom, max(2, round((bottom - top) / GRID_M) + 1))
     starts, ends = [], []
     for axis, sides in enumerate((north, east)):
         along = (east, north)[axis]
@@ -58,11 +77,23 @@ def draw_walls(canvas: Canvas, tank: Tank) -> None:
                 line = _pieces(axis, side, along, float(depth))
                 starts.append(line[:-1])
                 ends.append(line[1:])
-            upper = _pieces(axis, side, along, tank.top)
+            upper = _pieces(axis, side, along, top)
             starts.append(upper)
-            ends.append(upper + np.array([0.0, 0.0, tank.bottom - tank.top]))
+            ends.append(upper + np.array([0.0, 0.0, bottom - top]))
+    return _lines(starts, ends, WALL, 0.5, 0.003)
+
+
+def _lines(
+    starts: list[FloatArray],
+    ends: list[FloatArray],
+    colour: FloatArray,
+    opacity: npt.ArrayLike,
+    widths: npt.ArrayLike,
+) -> Lines:
     first, last = np.concatenate(starts), np.concatenate(ends)
-    _draw(canvas, first, last, WALL, np.full(len(first), 0.5), np.full(len(first), 0.003))
+    left, wide = (np.broadcast_to(np.asarray(v, float), len(first)) for v in (opacity, widths))
+    colours = np.column_stack([np.tile(colour, (len(first), 1)), left])
+    return Lines(first, last, 0.5 * (first + last), colours, wide)
 
 
 def _extent(canvas: Canvas, tank: Tank) -> tuple[Span, Span]:
@@ -81,20 +112,13 @@ def _pieces(axis: int, value: float, other: Span, depth: float) -> FloatArray:
     return points
 
 
-def _draw(
-    canvas: Canvas,
-    first: FloatArray,
-    last: FloatArray,
-    colour: FloatArray,
-    opacity: FloatArray,
-    widths: FloatArray,
-    ground: npt.ArrayLike | None = None,
-) -> None:
+def _draw(canvas: Canvas, lines: Lines, ground: npt.ArrayLike | None = None) -> None:
     """Lines over what is painted, so faint that they need no layer of their own."""
-    near = canvas.camera.seen(0.5 * (first + last))[:, 0]
-    kept = (near > -PIECE_M) & (opacity * clearness(np.abs(near)) > 0.06)
-    colours = np.column_stack([np.tile(colour, (len(first), 1)), opacity])[kept]
-    canvas.lines(first[kept], last[kept], colours, widths[kept], ground)
+    near = canvas.camera.seen(lines.middles)[:, 0]
+    opacity = lines.colours[:, 3]
+    kept = np.flatnonzero((near > -PIECE_M) & (opacity * clearness(np.abs(near)) > 0.06))
+    first, last, _, colours, widths = (rows[kept] for rows in lines)
+    canvas.lines(first, last, colours, widths, ground)
 
 
 @cache

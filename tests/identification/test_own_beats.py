@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fish_env.data import CommandSteps
-from fish_env.identification.own_beats import OwnBeats, own_beats, with_own_beats
+from fish_env.identification.own_beats import ALSO, CLEARLY, OwnBeats, own_beats, with_own_beats
 from fish_env.identification.runs import FREQUENCY
 from fish_env.identification.series import SeriesProblem
 from tests.identification.synthetic import Setup, simulate
@@ -56,3 +56,15 @@ def test_the_commands_are_those_that_the_tail_followed(dataset):
     assert np.allclose(right.runs[1].command_values, expected)
     assert right.runs[1].own_beat == 1.008
     assert with_own_beats(problem, OwnBeats()).runs is problem.runs
+
+
+def test_a_run_that_differs_little_has_its_own_beat_only_where_another_differs_clearly():
+    """Where the model misses something, as it does before causes are known."""
+    wrong = simulate(replace(SETUP, changes={"tail.lift.c1": 6.5}))
+    alone = own_beats(SeriesProblem(told(wrong, [1.0, 1.0, 1.0, 1.0, 1.003])))
+    assert ALSO < alone.gains["r4"] < CLEARLY
+    assert alone.own == {}
+    beside = own_beats(SeriesProblem(told(wrong, [1.0, 1.012, 0.992, 1.0, 1.002])))
+    assert {"r1", "r2", "r4"} == set(beside.own)
+    assert ALSO < beside.gains["r4"] < CLEARLY
+    assert beside.own["r4"] == pytest.approx(1.002, abs=5e-4)

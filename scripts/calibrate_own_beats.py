@@ -1,0 +1,72 @@
+"""How clearly runs' own beats show where they differ, and where they do not.
+
+Sets of runs with one beat come from tiers of hidden cases with one cause or none; sets whose beats
+differ as those of servos do from the realistic tier. Of each run whose own beat is another the
+share is kept that it takes away of what the common beat leaves. Cases are numbered from 70000 on.
+
+    python scripts/calibrate_own_beats.py --cases 5
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "ROBOFISH_THREADS"):
+    os.environ.setdefault(variable, "1")
+
+from rich.progress import track  # noqa: E402
+
+from fish_env.data import load_dataset  # noqa: E402
+from fish_env.data.schema import Dataset  # noqa: E402
+from fish_env.diagnosis.inputs.check import check_inputs  # noqa: E402
+from fish_env.identification.own_beats import ALSO, CLEARLY, own_beats  # noqa: E402
+from fish_env.identification.series import SeriesProblem  # noqa: E402
+from fish_env.identification.tail_drive import tail_drive  # noqa: E402
+from scripts.results import RESULTS, write_dated  # noqa: E402
+from tests.hidden import cases as one_beat  # noqa: E402
+from tests.hidden.realistic import cases as own_beat  # noqa: E402
+
+FIRST = 70000
+STEP_S = 0.02
+ALIKE = ("null", "rich", "camera", "closed_loop", "outside", "designs")
+DIFFERENT = ("realistic",)
+
+
+def measured(tier: str, seed: int) -> dict[str, Any]:
+    """Gains of the runs of one case."""
+    make = own_beat.make_case if tier in DIFFERENT else one_beat.make_case
+    with tempfile.TemporaryDirectory() as place:
+        truth = make(tier, seed, Path(place) / "data")
+        dataset = load_dataset(Path(place) / "data")
+    assert isinstance(dataset, Dataset)
+    inputs = check_inputs(dataset)
+    problem = SeriesProblem(inputs.dataset, None, dt=STEP_S)
+    beats = own_beats(problem.with_drive(tail_drive(inputs.drive, inputs.drive_certain)))
+    gains = {run: round(float(gain), 4) for run, gain in beats.gains.items()}
+    return {"tier": tier, "seed": seed, "hidden": truth.label, "gains": gains}
+
+
+def main() -> None:
+    """Reads the command line."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--cases", type=int, default=5, help="of each tier")
+    parser.add_argument("--out", type=Path, default=RESULTS)
+    options = parser.parse_args()
+    jobs = [(t, FIRST + i) for i in range(options.cases) for t in (*ALIKE, *DIFFERENT)]
+    rows = [measured(*job) for job in track(jobs)]
+    for name, tiers in (("one beat", ALIKE), ("own beats", DIFFERENT)):
+        own = [row for row in rows if row["tier"] in tiers]
+        clear = sum(max(row["gains"].values(), default=0.0) > CLEARLY for row in own)
+        print(f"{name}: {clear} of {len(own)} sets have a run above {CLEARLY}")
+    print(write_dated(options.out, "own-beats", {"clearly": CLEARLY, "also": ALSO, "rows": rows}))
+
+
+if __name__ == "__main__":
+    main()

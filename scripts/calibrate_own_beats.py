@@ -26,7 +26,7 @@ from rich.progress import track  # noqa: E402
 from fish_env.data import load_dataset  # noqa: E402
 from fish_env.data.schema import Dataset  # noqa: E402
 from fish_env.diagnosis.inputs.check import check_inputs  # noqa: E402
-from fish_env.identification.own_beats import ALSO, CLEARLY, own_beats  # noqa: E402
+from fish_env.identification.own_beats import CLEARLY, own_beats  # noqa: E402
 from fish_env.identification.series import SeriesProblem  # noqa: E402
 from fish_env.identification.tail_drive import tail_drive  # noqa: E402
 from scripts.results import RESULTS, write_dated  # noqa: E402
@@ -65,7 +65,7 @@ def main() -> None:
         own = [row for row in rows if row["tier"] in tiers]
         clear = sum(max(row["gains"].values(), default=0.0) > CLEARLY for row in own)
         print(f"{name}: {clear} of {len(own)} sets have a run above {CLEARLY}")
-    print(write_dated(options.out, "own-beats", {"clearly": CLEARLY, "also": ALSO, "rows": rows}))
+    print(write_dated(options.out, "own-beats", {"clearly": CLEARLY, "rows": rows}))
 
 
 if __name__ == "__main__":

@@ -2,10 +2,9 @@
 
 A tail that beats half a per cent quicker than in the other runs is a radian off after thirty
 seconds, and then nothing fits. So every run is filtered with a comb of frequencies at once, its
-starting phase being free within what servos differ by. Runs differ where the frequency that leaves
-least in one of them leaves clearly less than the one which suits all runs together. Every run is
-then given its own, but for those in which chance does as much. What the runs share is a cause, to
-be found and named.
+starting phase being free within what servos differ by. The frequency that leaves least is taken for
+a run's own where it leaves clearly less than the one which suits all runs together. What the runs
+share is a cause, to be found and named.
 """
 
 from __future__ import annotations
@@ -33,11 +32,11 @@ USUAL_BEAT = 4e-3
 """Ordinary spread of servos' frequencies over runs."""
 LEAST = 1.5e-3
 """Difference of two beats below which the comb cannot tell them apart."""
-CLEARLY, ALSO = 0.2, 0.03
-"""Share of what the common beat leaves that its own has to take away: in one run, to say that
-runs differ, and in each other one then. `scripts/calibrate_own_beats.py` says how often that is so
-of runs with one beat and of others. Chance takes one per cent, for a hundred independent residuals
-a run."""
+CLEARLY = 0.2
+"""Share of what the common beat leaves that a run's own has to take away. Of 24 sets of runs with
+one beat two had such a run, where beats differ as servos do four of four
+(`scripts/calibrate_own_beats.py`). A lower one for the other runs of such a set made fits no better:
+the random walk of the phase follows what they differ by."""
 FEWEST = 3
 
 
@@ -86,10 +85,9 @@ def own_beats(problem: SeriesProblem) -> OwnBeats:
             continue
         beat = _minimum(mine, comb, own) / together
         if abs(beat - 1.0) >= LEAST:
-            found[run.id], gains[run.id] = beat, 1.0 - mine[own] / mine[common]
-    differ = max(gains.values(), default=0.0) > CLEARLY
-    kept = {run: beat for run, beat in found.items() if differ and gains[run] > ALSO}
-    return OwnBeats(together, kept, gains)
+            found[run.id], gains[run.id] = beat, 1.0 - float(mine[own] / mine[common])
+    clear = {run: beat for run, beat in found.items() if gains[run] > CLEARLY}
+    return OwnBeats(together, clear, gains)
 
 
 def with_own_beats(problem: SeriesProblem, beats: OwnBeats) -> SeriesProblem:

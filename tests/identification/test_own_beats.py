@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fish_env.data import CommandSteps
-from fish_env.identification.own_beats import ALSO, CLEARLY, OwnBeats, own_beats, with_own_beats
+from fish_env.identification.own_beats import CLEARLY, OwnBeats, own_beats, with_own_beats
 from fish_env.identification.runs import FREQUENCY
 from fish_env.identification.series import SeriesProblem
 from tests.identification.synthetic import Setup, simulate
@@ -58,13 +58,9 @@ def test_the_commands_are_those_that_the_tail_followed(dataset):
     assert with_own_beats(problem, OwnBeats()).runs is problem.runs
 
 
-def test_a_run_that_differs_little_has_its_own_beat_only_where_another_differs_clearly():
+def test_a_run_whose_own_beat_takes_little_away_keeps_the_common_one():
     """Where the model misses something, as it does before causes are known."""
     wrong = simulate(replace(SETUP, changes={"tail.lift.c1": 6.5}))
-    alone = own_beats(SeriesProblem(told(wrong, [1.0, 1.0, 1.0, 1.0, 1.003])))
-    assert ALSO < alone.gains["r4"] < CLEARLY
-    assert alone.own == {}
-    beside = own_beats(SeriesProblem(told(wrong, [1.0, 1.012, 0.992, 1.0, 1.002])))
-    assert {"r1", "r2", "r4"} == set(beside.own)
-    assert ALSO < beside.gains["r4"] < CLEARLY
-    assert beside.own["r4"] == pytest.approx(1.002, abs=5e-4)
+    beats = own_beats(SeriesProblem(told(wrong, [1.0, 1.012, 0.992, 1.0, 1.002])))
+    assert set(beats.own) == {"r1", "r2"}
+    assert 0.0 < beats.gains["r4"] < CLEARLY

@@ -35,8 +35,8 @@ LEAST = 1.5e-3
 CLEARLY = 0.2
 """Share of what the common beat leaves that a run's own has to take away. Of 24 sets of runs with
 one beat two had such a run, where beats differ as servos do four of four
-(`scripts/calibrate_own_beats.py`). A lower one for the other runs of such a set made fits no better:
-the random walk of the phase follows what they differ by."""
+(`scripts/calibrate_own_beats.py`). A lower one for the other runs of such a set made fits no
+better: the random walk of the phase follows what they differ by."""
 FEWEST = 3
 
 

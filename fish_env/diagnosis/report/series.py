@@ -230,9 +230,10 @@ def _series(
 
 
 def _simulator(fit: Fit, dataset: Dataset) -> Simulator:
-    """The fish of a fit, swimming alone."""
+    """The fish of a fit, swimming alone, also where final runs leave the range of those fitted."""
     own = _own_effects(series_of(fit))
-    return Simulator(identified_fish(fit), LONGEST_STEP_S, user_effects=own)
+    fish = replace(identified_fish(fit), posterior=None)  # would warn of that range
+    return Simulator(fish, LONGEST_STEP_S, user_effects=own)
 
 
 def _own_effects(problem: SeriesProblem) -> list[Any]:

@@ -28,9 +28,9 @@ from fish_env.rendering import (
 from fish_env.rendering.shape import FishShape
 
 if TYPE_CHECKING:
-    from fish_env.rendering.mosaic import Mosaic
-    from fish_env.rendering.view import View
-    from fish_env.rendering.window import Window
+    from fish_env.rendering.mosaics import Mosaic
+    from fish_env.rendering.views import View
+    from fish_env.rendering.windows import Window
 
 Frame = npt.NDArray[np.uint8]
 WAKE_S = 30.0

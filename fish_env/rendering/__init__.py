@@ -17,9 +17,9 @@ from fish_env.rendering.shape import FishShape
 from fish_env.rendering.trajectory import scenes_of
 
 if TYPE_CHECKING:
-    from fish_env.rendering.mosaic import Mosaic
-    from fish_env.rendering.view import View
-    from fish_env.rendering.window import Window
+    from fish_env.rendering.mosaics import Mosaic
+    from fish_env.rendering.views import View
+    from fish_env.rendering.windows import Window
 
 __all__ = [
     "FishShape",
@@ -63,7 +63,7 @@ def view(setting: Setting, size: tuple[int, int] = PICTURE_SIZE) -> View:
         MissingExtraError: pygame is not installed.
     """
     check_installed()
-    from fish_env.rendering.view import View
+    from fish_env.rendering.views import View
 
     return View(setting, size)
 
@@ -75,7 +75,7 @@ def mosaic(setting: Setting, count: int, size: tuple[int, int] = PICTURE_SIZE) -
         MissingExtraError: pygame is not installed.
     """
     check_installed()
-    from fish_env.rendering.mosaic import Mosaic
+    from fish_env.rendering.mosaics import Mosaic
 
     return Mosaic(setting, count, size)
 
@@ -88,7 +88,7 @@ def window(setting: Setting, count: int = 1, size: tuple[int, int] = PICTURE_SIZ
         ConfigError: there is no screen.
     """
     check_installed()
-    from fish_env.rendering.window import Window
+    from fish_env.rendering.windows import Window
 
     return Window(setting, count, size)
 

@@ -10,7 +10,7 @@ import numpy as np
 from fish_env.errors import ConfigError, missing_extra
 from fish_env.files import replacing
 from fish_env.rendering.scene import Scene, Setting, between
-from fish_env.rendering.view import View
+from fish_env.rendering.views import View
 
 QUALITY = 6
 """Of imageio-ffmpeg, 0 to 10."""

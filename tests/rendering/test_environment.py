@@ -45,7 +45,7 @@ def test_gymnasium_has_nothing_to_complain_about(mode):
 @pytest.mark.parametrize("options", [{}, RICH], ids=["plain", "everything"])
 @pytest.mark.parametrize("mode", ["rgb_array", "human"])
 def test_drawing_changes_no_bit_of_the_motion(mode, options, monkeypatch):
-    monkeypatch.setattr("fish_env.rendering.window.FRAMES_S", 1000)
+    monkeypatch.setattr("fish_env.rendering.windows.FRAMES_S", 1000)
     actions = random_actions(12)
     expected = run(RoboticFish3DEnv(**options), actions)
     drawn = RoboticFish3DEnv(render_mode=mode, **SMALL, **options)
@@ -196,7 +196,7 @@ def test_a_mosaic_shows_the_first_fish():
 
 @pytest.mark.parametrize("mode", ["mosaic", "rgb_array", "human"])
 def test_drawing_changes_no_bit_of_a_batch(mode, monkeypatch):
-    monkeypatch.setattr("fish_env.rendering.window.FRAMES_S", 1000)
+    monkeypatch.setattr("fish_env.rendering.windows.FRAMES_S", 1000)
     plain = RoboticFish3DVectorEnv(3, max_episode_steps=4)
     drawn = RoboticFish3DVectorEnv(3, max_episode_steps=4, render_mode=mode, **SMALL)
     plain.reset(seed=0)

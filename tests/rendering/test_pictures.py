@@ -2,13 +2,15 @@
 
 import warnings
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from fish_env import rendering
 from fish_env.rendering import Goal, Setting, Tank, mosaic, view
-from fish_env.rendering.mosaic import layout
-from fish_env.rendering.view import View
+from fish_env.rendering.mosaics import layout
+from fish_env.rendering.views import View
 from tests.rendering.scenes import AHEAD, LEVEL, SETTING, changed, line_of, mint, orange, scene
 
 UPPER = slice(30, 340)
@@ -152,3 +154,9 @@ def test_a_mosaic_shows_each_fish_as_it_would_be_alone():
     alone = view(SETTING, (320, 240)).frame(moments[3])
     np.testing.assert_array_equal(frame[242:, 322:], alone)
     assert not np.array_equal(frame[:240, :320], alone)
+
+
+def test_functions_of_the_package_stay_functions_after_they_were_used():
+    """No module of the package has the name of one of its functions."""
+    package = Path(rendering.__file__).parent
+    assert not {file.stem for file in package.glob("*.py")} & {*rendering.__all__}

@@ -14,7 +14,7 @@ import pytest
 from fish_env.envs.robotic_fish_3d import RoboticFish3DEnv
 from fish_env.errors import ConfigError
 from fish_env.rendering import window as open_window
-from fish_env.rendering.window import Window
+from fish_env.rendering.windows import Window
 from tests.conformance.cases import random_actions
 from tests.rendering.scenes import SETTING, scene
 

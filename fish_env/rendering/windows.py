@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import pygame
 
 from fish_env.errors import ConfigError
-from fish_env.rendering.mosaic import Mosaic
+from fish_env.rendering.mosaics import Mosaic
 from fish_env.rendering.notes import draw_help, draw_note
 from fish_env.rendering.scene import PICTURE_SIZE, Scene, Setting, between
 

@@ -8,7 +8,7 @@ import numpy as np
 import pygame
 
 from fish_env.rendering.scene import PICTURE_SIZE, Scene, Setting
-from fish_env.rendering.view import Frame, View, as_array
+from fish_env.rendering.views import Frame, View, as_array
 
 GAP = 2
 FRAME = (8, 20, 30)

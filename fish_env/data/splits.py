@@ -4,8 +4,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fish_env.arrays import FloatArray, IntArray
 from fish_env.data.schema import Dataset, SteadyDataset
 from fish_env.errors import DatasetError
 
@@ -56,7 +56,7 @@ def split_runs(
     return Split(*(tuple(id for id in dataset.ids if id in part) for part in parts))
 
 
-def _check_fractions(fractions: tuple[float, float, float]) -> NDArray[np.float64]:
+def _check_fractions(fractions: tuple[float, float, float]) -> FloatArray:
     shares = np.asarray(fractions, dtype=np.float64)
     possible = shares.shape == (3,) and bool((shares >= 0.0).all())
     if not possible or not np.isclose(shares.sum(), 1.0):
@@ -79,7 +79,7 @@ def _groups(dataset: Dataset | SteadyDataset, by: str) -> dict[tuple[str, str], 
     return groups
 
 
-def _counts(total: int, shares: NDArray[np.float64], owner: str) -> NDArray[np.int64]:
+def _counts(total: int, shares: FloatArray, owner: str) -> IntArray:
     needed = (shares > 0.0).astype(int)
     if total < needed.sum():
         raise DatasetError(
@@ -87,7 +87,7 @@ def _counts(total: int, shares: NDArray[np.float64], owner: str) -> NDArray[np.i
             "or set the fraction of a part to 0."
         )
     wanted = shares * total
-    counts: NDArray[np.int64] = np.maximum(np.floor(wanted).astype(int), needed)
+    counts: IntArray = np.maximum(np.floor(wanted).astype(int), needed)
     while counts.sum() != total:
         # One at a time to or from the part furthest from its share, none emptied.
         step = 1 if counts.sum() < total else -1

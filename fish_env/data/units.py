@@ -11,8 +11,8 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fish_env.arrays import FloatArray
 from fish_env.data.place import Place
 from fish_env.data.vocabulary import Quantity
 from fish_env.reading import short
@@ -137,7 +137,7 @@ def _registry() -> Any:
     return registry
 
 
-def unwrap_angle(angle_rad: NDArray[np.float64]) -> NDArray[np.float64]:
+def unwrap_angle(angle_rad: FloatArray) -> FloatArray:
     """Removes the jumps of whole turns from a measured angle.
 
     A yaw is kept as it was measured, wrapped or winding on; this makes it continuous where a

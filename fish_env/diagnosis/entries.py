@@ -8,9 +8,9 @@ from math import isfinite
 from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import ndtri
 
+from fish_env.arrays import FloatArray
 from fish_env.diagnosis.gain import Gain, Pair
 from fish_env.diagnosis.next_experiment import Proposal
 from fish_env.diagnosis.residual_model import ResidualModel, Term
@@ -50,7 +50,7 @@ class Identified(Protocol):
         """Free parameters, (n,), baseline paths first."""
 
     @property
-    def estimates(self) -> npt.NDArray[np.float64]:
+    def estimates(self) -> FloatArray:
         """(n,) in physical units."""
 
     def interval(self, name: str, /) -> tuple[float, float]:

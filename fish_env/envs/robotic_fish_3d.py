@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.spaces import Box
 
+from fish_env.arrays import FloatArray
 from fish_env.effects.extended import EffectValues
 from fish_env.envs.batch import FishBatch, real_actions
 from fish_env.envs.layout import OBSERVATION, OBSERVATION_LIMIT, OUTPUTS
@@ -238,7 +239,7 @@ class RoboticFish3DEnv(Watched, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.
         return dict(zip(names, self._batch.state[:, 0].tolist(), strict=True))
 
     @property
-    def actuators(self) -> npt.NDArray[np.float64]:
+    def actuators(self) -> FloatArray:
         """(5,) actuator positions (rad, rad, Hz, m, rad)."""
         return self._batch.inputs[:, 0].copy()
 

@@ -19,12 +19,12 @@ from pathlib import Path
 
 import numpy as np
 from rich.console import Console
+
+from fish_env.envs.tasks import TASKS
 from robofish_agents.evaluation.leaderboard import SHIPPED
 from robofish_agents.evaluation.results import Result, evaluate, read_results, write_results
 from robofish_agents.evaluation.suites import Suite, load_suite, suite_names
 from robofish_agents.registry import load_agents
-
-from fish_env.envs.tasks import TASKS
 from scripts.bench.harness import machine
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -15,13 +15,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+
+from fish_env.arrays import FloatArray
+from fish_env.envs.tasks import TASKS
 from robofish_agents.evaluation.metrics import LATE_S, METRICS, success_rate
 from robofish_agents.evaluation.record import Record, swim_suite
 from robofish_agents.evaluation.suites import RESERVED_SEEDS, Suite, load_suite, suite_names
 from robofish_agents.registry import Agent, load_agents
-
-from fish_env.arrays import FloatArray
-from fish_env.envs.tasks import TASKS
 
 FIRST_SEED = 19_000_000
 assert FIRST_SEED not in RESERVED_SEEDS

@@ -10,12 +10,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
+
+from fish_env.envs.layout import OBSERVATION, OBSERVATION_LIMIT
 from robofish_agents.deployment.c_header import prefix_of
 from robofish_agents.evaluation.suites import load_suite
 from robofish_agents.policies import PolicyFile, PretrainedPolicy
 from robofish_agents.registry import Agent, load_agents
-
-from fish_env.envs.layout import OBSERVATION, OBSERVATION_LIMIT
 
 SIZE, ACTIONS = len(OBSERVATION), 5
 FLAGS = ("-std=c99", "-O2", "-Wall", "-Wextra", "-pedantic", "-Werror")

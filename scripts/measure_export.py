@@ -14,12 +14,12 @@ from pathlib import Path
 from typing import Any
 
 from rich.console import Console
+
+from fish_env.envs.tasks import TASKS
 from robofish_agents.deployment import export_c, export_onnx, with_int8_weights
 from robofish_agents.evaluation.results import evaluate
 from robofish_agents.evaluation.suites import load_suite
 from robofish_agents.policies import PretrainedPolicy, read_policy, shipped
-
-from fish_env.envs.tasks import TASKS
 from scripts.bench.harness import machine, versions
 from scripts.exported import (
     CompiledPolicy,

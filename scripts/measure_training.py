@@ -9,14 +9,16 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from statistics import median
 from typing import Any
 
 from rich.console import Console
-from robofish_agents.sweep.plan import plan
-from robofish_agents.training.run import train
 
+from robofish_agents.sweep.plan import plan
+from robofish_agents.training.callback import Quiet
+from robofish_agents.training.run import train
 from scripts.bench.harness import machine, versions
 from scripts.results import RESULTS, ROOT, kept, write_dated
 
@@ -43,14 +45,6 @@ COLUMNS = (
 )
 
 
-class _Quiet:
-    def stepped(self, steps: int) -> None:
-        """Nothing is told."""
-
-    def evaluated(self, row: dict[str, float]) -> None:
-        """Nothing is told."""
-
-
 def trained(recipe: str, seed: int, folder: Path) -> dict[str, Any]:
     """One training: its times (s) and evaluations.
 
@@ -60,7 +54,7 @@ def trained(recipe: str, seed: int, folder: Path) -> dict[str, Any]:
         folder: for its run folder, which must not exist.
     """
     (trial,) = plan(CONFIG, str(seed), (*RECIPES[recipe], EVERY))
-    progress = train(trial.config, folder, _Quiet()).progress
+    progress = train(trial.config, folder, Quiet()).progress
     rows = progress.evaluations
     reached = [row["cpu_s"] for row in rows if row["success_rate"] >= GOAL]
     return {
@@ -104,12 +98,9 @@ def main() -> None:
     console, rows = Console(), []
     for seed in range(options.seeds):
         for number, recipe in enumerate(RECIPES):
-            name = f"{number}-{seed}"
-
-            def make(recipe: str = recipe, seed: int = seed, name: str = name) -> dict[str, Any]:
-                return trained(recipe, seed, options.out / name)
-
-            rows.append(kept(options.out / f"{name}.json", make))
+            folder = options.out / f"{number}-{seed}"
+            make = partial(trained, recipe, seed, folder)
+            rows.append(kept(folder.with_suffix(".json"), make))
             console.print(f"{recipe}, seed {seed}: {rows[-1]['wall_s']:.1f} s")
     content = {"machine": machine(), "versions": versions(), "rows": rows}
     page = f"# Time to train {CONFIG}\n\n{table(rows)}"

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import yaml
 from rich.progress import track
+
 from robofish_agents.evaluation.metrics import METRICS
 from robofish_agents.evaluation.record import swim_suite
 from robofish_agents.evaluation.suites import load_suite, suite_names

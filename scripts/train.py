@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import typer
-from robofish_agents.commands_train import train
 
 from fish_env.errors import RoboticFishError
+from robofish_agents.commands_train import train
 
 
 def main() -> None:

@@ -18,12 +18,12 @@ import numpy as np
 import yaml
 from rich.console import Console
 from rich.progress import Progress
-from robofish_agents.controllers.pid import GAIN_NAMES, PIDController, PIDGains, load_gains
-from robofish_agents.evaluation.suites import RESERVED_SEEDS, Suite, load_suite
 from scipy.optimize import differential_evolution
 
 from fish_env.arrays import FloatArray
 from fish_env.envs.tasks import TASKS
+from robofish_agents.controllers.pid import GAIN_NAMES, PIDController, PIDGains, load_gains
+from robofish_agents.evaluation.suites import RESERVED_SEEDS, Suite, load_suite
 
 FILE = Path(__file__).resolve().parents[1] / "configs" / "controllers" / "pid.yaml"
 SUITES = ("calm", "hard")

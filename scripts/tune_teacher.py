@@ -21,13 +21,13 @@ import cma
 import numpy as np
 import numpy.typing as npt
 import yaml
+
+from fish_env.arrays import FloatArray, IntArray
 from robofish_agents.controllers import PIDController
 from robofish_agents.evaluation.suites import RESERVED_SEEDS, load_suite
 from robofish_agents.training.config import load_train_config
 from robofish_agents.training.teacher import LIFT, MOMENT, ForesightPID, beyond, true_observations
 from robofish_agents.training.teacher_gains import TEACHER_GAIN_NAMES, TeacherGains, teacher_gains
-
-from fish_env.arrays import FloatArray, IntArray
 from scripts.tune_pid import BOUNDS
 
 FIRST_SEED, CHECK_SEED = 6_000_000, 7_000_000

@@ -65,7 +65,6 @@ def sweep(
 
 
 def _report(console: Console, rows: list[dict[str, Any]], finished: int, table: str) -> None:
-
     for row in rows:
         if row["reason"]:
             said = f"{row['trial']}: {row['state']}: {row['reason']}"

@@ -28,7 +28,7 @@ from fish_env.identification.objectives import (
     objective_named,
 )
 from fish_env.inference.estimate.fit import Fit
-from fish_env.inference.hypotheses import PREFIX, effect_of, parameter_of
+from fish_env.inference.hypotheses import PREFIX, effect_of, effects_of, parameter_of
 from fish_env.params.io import load_fish, save_fish
 from fish_env.params.schema import FishParams
 from fish_env.version import versioned
@@ -95,7 +95,7 @@ class DatasetFit:
     @property
     def unseen(self) -> tuple[str, ...]:
         """Effects that were asked for, of which the runs show no parameter."""
-        free = {effect_of(e.name) for e in self.estimates if e.name.startswith(PREFIX)}
+        free = effects_of(e.name for e in self.estimates if e.name.startswith(PREFIX))
         return tuple(name for name in self.effects if name not in free)
 
     @property

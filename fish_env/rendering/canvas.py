@@ -156,14 +156,8 @@ class Canvas:
         corners = self._in_front(outline)
         if len(corners) < 3:
             return
-        pixels = _held(self.camera.project(corners)[0])
-        layer, low = self._layer(pixels)
-        if layer is None:
-            return
-        distance = float(np.linalg.norm(corners.mean(axis=0) - self.camera.eye))
-        strength = round(255 * alpha * float(clearness(0.5 * distance)))
-        pygame.draw.polygon(layer, (*colour, strength), (pixels - low).tolist())
-        self.surface.blit(layer, low.tolist())
+        pixels = self.camera.project(corners)[0]
+        self._tint(pixels[None], corners.mean(axis=0)[None], colour, alpha)
 
     def sheets(self, outlines: FloatArray, colour: Colour, alpha: float) -> None:
         """As :meth:`sheet`, of several outlines (k, n, 3), the first of them drawn first."""
@@ -172,8 +166,13 @@ class Canvas:
             for outline in outlines:
                 self.sheet(outline, colour, alpha)
             return
-        pixels = _held(self.camera.pictured(seen)[0])
-        distances = lengths(outlines.mean(axis=1) - self.camera.eye)
+        self._tint(self.camera.pictured(seen)[0], outlines.mean(axis=1), colour, alpha)
+
+    def _tint(
+        self, outlines: FloatArray, middles: FloatArray, colour: Colour, alpha: float
+    ) -> None:
+        """Fill outlines (k, n, 2) on the picture, whose middles (k, 3) say how hazy they are."""
+        pixels, distances = _held(outlines), lengths(middles - self.camera.eye)
         strengths = np.rint(255 * alpha * clearness(0.5 * distances)).astype(int).tolist()
         size = self.surface.get_size()
         lows = np.clip(np.floor(pixels.min(axis=1)) - 1, 0, size).astype(int)

@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from robofish_agents.evaluation.metrics import METRICS
-from robofish_agents.evaluation.suites import Suite, load_suite
-from robofish_agents.training.config import TrainConfig, load_train_config
-from robofish_agents.training.schema import build
 
 from fish_env.envs.tasks import TASKS
 from fish_env.errors import ConfigError
 from fish_env.params.io import merged
+from robofish_agents.evaluation.metrics import METRICS
+from robofish_agents.evaluation.suites import Suite, load_suite
+from robofish_agents.training.config import TrainConfig, load_train_config
+from robofish_agents.training.schema import build
 from tests.hidden.cases import NOMINAL
 from tests.hidden.plans import PLANS
 from tests.hidden.sizes import SIZES

@@ -11,10 +11,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from robofish_agents.evaluation.intervals import CONFIDENCE, Interval
 from scipy.stats import t as student
 
 from fish_env.arrays import FloatArray
+from robofish_agents.evaluation.intervals import CONFIDENCE, Interval
 from scripts.loop.training import BASELINE, TRUTH, WITHOUT_MEASUREMENTS
 
 Scores = Mapping[str, FloatArray]

@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
+
 from robofish_agents.evaluation.intervals import Interval
 from robofish_agents.evaluation.labels import LABELS
-
 from scripts.loop.declaration import Declaration
 from scripts.loop.gains import Scores, difference, over_seeds, per_fish, share_closed
 from scripts.loop.measuring import Known

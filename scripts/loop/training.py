@@ -15,14 +15,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 from robofish_agents.controllers.pid import PIDController
 from robofish_agents.evaluation.metrics import METRICS
 from robofish_agents.evaluation.record import swim_suite
 from robofish_agents.policies import PretrainedPolicy, shipped
 from robofish_agents.registry import Agent
+from robofish_agents.training.callback import Quiet
 from robofish_agents.training.config import TrainConfig
 from robofish_agents.training.run import train
-
 from scripts.loop.declaration import Declaration
 from scripts.loop.measuring import Known
 from scripts.results import kept
@@ -43,16 +44,6 @@ PID, SHIPPED = "PID", "shipped"
 """Who swims beside them, and was trained on none of these."""
 Means = Mapping[str, Mapping[str, float]]
 """Task -> metric -> mean over the episodes."""
-
-
-class Quiet:
-    """Watches a training and says nothing."""
-
-    def stepped(self, steps: int) -> None:
-        """Steps are not shown."""
-
-    def evaluated(self, row: dict[str, float]) -> None:
-        """Neither are evaluations."""
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from robofish_agents.policies import read_policy
-from robofish_agents.training.config import Evaluation, Ppo, TrainConfig
-from robofish_agents.training.run import CHECKPOINT, CONFIG, POLICY, train
 
 from fish_env.diagnosis import diagnose
 from fish_env.files import write_bytes
+from robofish_agents.policies import read_policy
+from robofish_agents.training.callback import Quiet
+from robofish_agents.training.config import Evaluation, Ppo, TrainConfig
+from robofish_agents.training.run import CHECKPOINT, CONFIG, POLICY, train
 from scripts import benchmark_diagnosis
 from tests.diagnosis.small_cases import small_case
 from tests.hidden.stubs import all_knowing
@@ -48,16 +49,6 @@ class Work(ABC):
     def damage(self, folder: Path, whole: Path) -> list[str]:
         """What is damaged in a folder right after a kill, in words."""
         return []
-
-
-class Quiet:
-    """Watches a training and says nothing."""
-
-    def stepped(self, steps: int) -> None:
-        """Nothing."""
-
-    def evaluated(self, row: dict[str, float]) -> None:
-        """Nothing."""
 
 
 class Training(Work):

@@ -9,15 +9,14 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from fish_env.diagnosis import diagnose
 from robofish_agents.evaluation.results import evaluate, write_results
 from robofish_agents.evaluation.suites import load_suite
 from robofish_agents.registry import load_agents
+from robofish_agents.training.callback import Quiet
 from robofish_agents.training.config import Evaluation, Ppo, TrainConfig
 from robofish_agents.training.run import train
-
-from fish_env.diagnosis import diagnose
 from scripts.reliability import watch
-from scripts.reliability.crash_works import Quiet
 from tests.diagnosis.small_cases import small_case
 
 TRAINING = TrainConfig(

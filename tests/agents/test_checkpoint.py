@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+
+from fish_env.errors import ConfigError
 from robofish_agents.training.checkpoint import FORMAT, Progress, load_checkpoint, save_checkpoint
 from robofish_agents.training.config import Ppo, Sac, TrainConfig
 from robofish_agents.training.learner_state import learner_state
@@ -20,8 +22,6 @@ from robofish_agents.training.model import make_model
 from robofish_agents.training.plain import read_plain, write_plain
 from robofish_agents.training.run import CHECKPOINT, train
 from robofish_agents.training.stack import make_stack, seed_episodes
-
-from fish_env.errors import ConfigError
 from tests.agents.test_training import Quiet
 
 ROOT = Path(__file__).resolve().parents[2]

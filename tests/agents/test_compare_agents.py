@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+
 from robofish_agents.controllers import PIDController
 from robofish_agents.evaluation.suites import RESERVED_SEEDS
-
 from scripts import compare_agents
 
 SIZES = ["--task", "hold", "--suite", "calm", "--episodes", "4"]

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from robofish_agents.training.course import Course
 
 PERIOD = 0.1

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 from rich.console import Console
-from robofish_agents import demo
-from robofish_agents.episode import Episode
 
 from fish_env.commands.demo import GROUP
 from fish_env.envs.config import load_env_config
+from robofish_agents import demo
+from robofish_agents.episode import Episode
 
 CONFIG = load_env_config(None, None, None)
 

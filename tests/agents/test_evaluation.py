@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 import typer
 import yaml
-from robofish_agents.controllers import PIDController
-from robofish_agents.episode import swim
-from robofish_agents.evaluation.record import KEPT, swim_suite
-from robofish_agents.evaluation.results import evaluate, read_results, write_results
-from robofish_agents.evaluation.suites import RESERVED_SEEDS, load_suite, suite_names
-from robofish_agents.registry import load_agents
 from typer.testing import CliRunner
 
 from fish_env import cli
 from fish_env.envs.registration import ENV_ID
 from fish_env.envs.tasks import TASKS
 from fish_env.errors import ConfigError
+from robofish_agents.controllers import PIDController
+from robofish_agents.episode import swim
+from robofish_agents.evaluation.record import KEPT, swim_suite
+from robofish_agents.evaluation.results import evaluate, read_results, write_results
+from robofish_agents.evaluation.suites import RESERVED_SEEDS, load_suite, suite_names
+from robofish_agents.registry import load_agents
 
 EPISODES = 3
 CALM = load_suite("calm")

@@ -8,6 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
+from fish_env.envs.config import load_env_config
+from fish_env.envs.layout import OBSERVATION
+from fish_env.envs.registration import ENV_ID
+from fish_env.envs.robotic_fish_3d import RoboticFish3DEnv
+from fish_env.errors import ConfigError
 from robofish_agents.deployment import contract_path, export_c, export_onnx, with_int8_weights
 from robofish_agents.policies import (
     HistorySpec,
@@ -17,12 +23,6 @@ from robofish_agents.policies import (
     shipped,
     write_policy,
 )
-
-from fish_env.envs.config import load_env_config
-from fish_env.envs.layout import OBSERVATION
-from fish_env.envs.registration import ENV_ID
-from fish_env.envs.robotic_fish_3d import RoboticFish3DEnv
-from fish_env.errors import ConfigError
 from scripts.exported import CompiledPolicy, OnnxPolicy, compiler, differences
 from tests.command_line import run
 

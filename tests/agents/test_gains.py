@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from robofish_agents.evaluation.intervals import Interval
 from scipy.stats import ttest_1samp
 
+from robofish_agents.evaluation.intervals import Interval
 from scripts.loop import gains
 from scripts.loop.gains import difference, over_seeds, per_fish, share_closed
 from scripts.loop.training import WITHOUT_MEASUREMENTS

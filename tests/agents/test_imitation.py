@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+
+from fish_env.errors import ConfigError
 from robofish_agents.controllers import PIDController
 from robofish_agents.evaluation.suites import load_suite
 from robofish_agents.policies import PretrainedPolicy
@@ -16,8 +18,6 @@ from robofish_agents.training.stack import make_stack, seed_episodes
 from robofish_agents.training.teacher import ForesightPID, beyond, true_observations
 from robofish_agents.training.teacher_gains import teacher_gains
 from robofish_agents.training.trial import try_policy
-
-from fish_env.errors import ConfigError
 
 CONFIG = TrainConfig(
     "imitation", "ppo", "hold", 100, imitate=Imitation(3, 8), evaluation=Evaluation(100, 16)

@@ -3,18 +3,18 @@
 import json
 
 import pytest
-from robofish_agents.evaluation.intervals import Interval
-from robofish_agents.evaluation.labels import LABELS
-from robofish_agents.evaluation.leaderboard import MISSING, SHIPPED, by_metric, overview
-from robofish_agents.evaluation.metrics import STEP_METRICS
-from robofish_agents.evaluation.results import Result, read_results, write_results
-from robofish_agents.evaluation.suites import load_suite, suite_names
 from typer.testing import CliRunner
 
 from fish_env import cli
 from fish_env.envs.registration import ENV_ID
 from fish_env.envs.tasks import TASKS
 from fish_env.errors import ConfigError
+from robofish_agents.evaluation.intervals import Interval
+from robofish_agents.evaluation.labels import LABELS
+from robofish_agents.evaluation.leaderboard import MISSING, SHIPPED, by_metric, overview
+from robofish_agents.evaluation.metrics import STEP_METRICS
+from robofish_agents.evaluation.results import Result, read_results, write_results
+from robofish_agents.evaluation.suites import load_suite, suite_names
 from scripts import agents_report, benchmark_agents
 
 

@@ -10,7 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from robofish_agents.policies import PretrainedPolicy
+from robofish_agents.training.callback import Quiet
 from robofish_agents.training.config import Evaluation, LearningRate, TrainConfig, load_train_config
 from robofish_agents.training.run import train
 from robofish_agents.training.stack import Shoal
@@ -18,14 +20,6 @@ from robofish_agents.training.trial import try_policy
 
 LEARNT = 270.0
 STEPS = 100_000
-
-
-class Quiet:
-    def stepped(self, steps: int) -> None:
-        pass
-
-    def evaluated(self, row: dict[str, float]) -> None:
-        pass
 
 
 def short(**changes: object) -> TrainConfig:

@@ -3,14 +3,14 @@
 import gymnasium as gym
 import numpy as np
 import pytest
-from robofish_agents.controllers import PIDController
-from robofish_agents.controllers.line_of_sight import LineOfSight
-from robofish_agents.controllers.path import PathFollower, with_goal
-from robofish_agents.episode import swim
 
 import fish_env  # noqa: F401
 from fish_env.envs.registration import ENV_ID
 from fish_env.errors import ConfigError
+from robofish_agents.controllers import PIDController
+from robofish_agents.controllers.line_of_sight import LineOfSight
+from robofish_agents.controllers.path import PathFollower, with_goal
+from robofish_agents.episode import swim
 
 NORTH = [[0.0, 0.0, 0.4], [3.0, 0.0, 0.7]]
 CORNER = [[0.0, 0.0, 0.4], [2.0, 0.0, 0.4], [2.0, 2.0, 0.5]]

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from robofish_agents.evaluation.suites import RESERVED_SEEDS, load_suite
 
 from fish_env.envs.vector import RoboticFish3DVectorEnv
 from fish_env.errors import ConfigError
 from fish_env.params import load_fish
+from robofish_agents.evaluation.suites import RESERVED_SEEDS, load_suite
 from scripts import measure_to_policy
 from scripts.loop import training
 from scripts.loop.declaration import DECLARED, load_declaration

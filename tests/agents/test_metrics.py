@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+
 from robofish_agents.evaluation.intervals import bootstrap, rate
 from robofish_agents.evaluation.labels import LABELS
 from robofish_agents.evaluation.metrics import METRICS, STEP_METRICS, measure

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from robofish_agents.controllers.mppi import MPPIController, MPPISettings
 from robofish_agents.controllers.pid import PIDController
 from robofish_agents.controllers.prediction import LIFT, MOMENT, UNKNOWNS, Costs, Prediction

@@ -5,15 +5,15 @@ from dataclasses import replace
 import gymnasium as gym
 import numpy as np
 import pytest
-from robofish_agents.controllers import PIDController, PIDGains
-from robofish_agents.controllers.pid import load_gains, tuned_gains
-from robofish_agents.controllers.seen import Seen
-from robofish_agents.episode import Episode, swim
 
 import fish_env  # noqa: F401
 from fish_env.envs.layout import OBSERVATION
 from fish_env.envs.registration import ENV_ID
 from fish_env.errors import ConfigError
+from robofish_agents.controllers import PIDController, PIDGains
+from robofish_agents.controllers.pid import load_gains, tuned_gains
+from robofish_agents.controllers.seen import Seen
+from robofish_agents.episode import Episode, swim
 
 SEEDS = range(100, 120)
 NAMES = [name for name, _ in OBSERVATION]

@@ -11,6 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
+from fish_env.envs.layout import OBSERVATION
+from fish_env.errors import ConfigError
 from robofish_agents.policies import (
     PolicyFile,
     PretrainedPolicy,
@@ -22,9 +25,6 @@ from robofish_agents.policies.export import export_policy
 from robofish_agents.training.config import History, NetworkSettings, Ppo, Sac, TrainConfig
 from robofish_agents.training.model import Model, make_model
 from robofish_agents.training.stack import Stack, make_stack
-
-from fish_env.envs.layout import OBSERVATION
-from fish_env.errors import ConfigError
 
 SIZE = len(OBSERVATION)
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from robofish_agents.policies import History, HistorySpec
 
 from fish_env.errors import ConfigError
+from robofish_agents.policies import History, HistorySpec
 
 SPEC = HistorySpec(frames=3, low_pass_s=(0.5, 2.0))
 SIZE = 4

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 import yaml
+
+from fish_env.envs.registration import ENV_ID
+from fish_env.envs.tasks import TASKS
 from robofish_agents.evaluation.metrics import success_rate
 from robofish_agents.evaluation.record import swim_suite
 from robofish_agents.evaluation.suites import load_suite, suite_names
 from robofish_agents.policies import Network, PolicyFile, PretrainedPolicy, read_policy, shipped
 from robofish_agents.policies.pretrained import SHIPPED
-
-from fish_env.envs.registration import ENV_ID
-from fish_env.envs.tasks import TASKS
 
 FILES = sorted(SHIPPED.rglob("*.npz"))
 NAMES = [str(file.relative_to(SHIPPED)) for file in FILES]

@@ -8,16 +8,16 @@ from pathlib import Path
 import gymnasium as gym
 import numpy as np
 import pytest
-from robofish_agents.controllers import PIDController
-from robofish_agents.episode import swim
-from robofish_agents.keep import Keeper
-from robofish_agents.swimming import read_waypoints
 from typer.testing import CliRunner
 
 import fish_env  # noqa: F401
 from fish_env import cli
 from fish_env.envs.registration import ENV_ID
 from fish_env.errors import ConfigError
+from robofish_agents.controllers import PIDController
+from robofish_agents.episode import swim
+from robofish_agents.keep import Keeper
+from robofish_agents.swimming import read_waypoints
 
 
 @pytest.fixture

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 import yaml
-from robofish_agents.evaluation.suites import RESERVED_SEEDS
-from robofish_agents.training import stack, trial
-from robofish_agents.training.config import MOST_FISH, load_train_config
 
 from fish_env.errors import ConfigError
 from fish_env.params.io import config_root
+from robofish_agents.evaluation.suites import RESERVED_SEEDS
+from robofish_agents.training import stack, trial
+from robofish_agents.training.config import MOST_FISH, load_train_config
 
 SHIPPED = sorted(file.stem for file in (config_root() / "train").glob("*.yaml"))
 GOOD = {"algorithm": "ppo", "task": "hold", "total_steps": 1000}

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+
+from fish_env.errors import ConfigError
 from robofish_agents.policies import read_policy
 from robofish_agents.training.config import Evaluation, History, Imitation, Ppo, Sac, TrainConfig
 from robofish_agents.training.run import CHECKPOINT, POLICY, Outcome, train
-
-from fish_env.errors import ConfigError
 
 ROOT = Path(__file__).resolve().parents[2]
 PPO = TrainConfig(

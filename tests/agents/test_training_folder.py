@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 import yaml
+
+from fish_env.errors import ConfigError, OutputError
 from robofish_agents.training.config import Ppo, TrainConfig
 from robofish_agents.training.lock import LOCK, locked
 from robofish_agents.training.run import CHECKPOINT, CONFIG, POLICY, train
-
-from fish_env.errors import ConfigError, OutputError
 from tests.agents.test_training import Quiet
 from tests.command_line import run
 

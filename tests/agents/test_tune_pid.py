@@ -3,9 +3,9 @@
 from dataclasses import asdict
 
 import pytest
+
 from robofish_agents.controllers.pid import GAIN_NAMES, load_gains, tuned_gains
 from robofish_agents.evaluation.suites import RESERVED_SEEDS
-
 from scripts import tune_pid
 
 

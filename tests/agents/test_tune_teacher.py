@@ -1,9 +1,9 @@
 """The search for a teacher's gains finds what it is told to, and its trials see differences."""
 
 import numpy as np
+
 from robofish_agents.training.config import load_train_config
 from robofish_agents.training.teacher_gains import TEACHER_GAIN_NAMES, teacher_gains
-
 from scripts.tune_teacher import AIMS, HIGH, LOW, Trial, evolve, merit
 
 

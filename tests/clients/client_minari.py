@@ -6,9 +6,9 @@ import minari
 import numpy as np
 import pytest
 from minari import DataCollector
-from robofish_agents.registry import load_agents
 
 from fish_env.envs.robotic_fish_3d import RoboticFish3DEnv
+from robofish_agents.registry import load_agents
 from tests.clients.running import ENV
 
 EPISODES, STEPS = 4, 120

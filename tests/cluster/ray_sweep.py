@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+
+from fish_env.cluster import ClusterSettings
+from fish_env.errors import ConfigError
 from robofish_agents.policies import read_policy
 from robofish_agents.sweep.plan import plan
 from robofish_agents.sweep.run import FINISHED, TABLE, run_sweep
 from robofish_agents.training.run import POLICY, train
-
-from fish_env.cluster import ClusterSettings
-from fish_env.errors import ConfigError
 from tests.agents.test_training import Quiet
 from tests.cluster.machines import KillOnce, machines
 

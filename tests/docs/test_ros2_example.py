@@ -7,10 +7,10 @@ from dataclasses import dataclass, field, make_dataclass
 
 import numpy as np
 import pytest
-from robofish_agents.deployment import export_onnx
-from robofish_agents.policies import PretrainedPolicy, read_policy, shipped
 
 from fish_env.envs.robotic_fish_3d import RoboticFish3DEnv
+from robofish_agents.deployment import export_onnx
+from robofish_agents.policies import PretrainedPolicy, read_policy, shipped
 from tests.docs.pages import ROOT
 
 FILE = ROOT / "examples" / "ros2_policy.py"

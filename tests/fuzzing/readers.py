@@ -7,12 +7,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from robofish_agents.evaluation.results import read_results
-from robofish_agents.evaluation.suites import load_suite
-from robofish_agents.policies.files import read_policy
-from robofish_agents.swimming import read_waypoints
-from robofish_agents.training.config import load_train_config
-
 from fish_env.commands.case import read_case
 from fish_env.data import load_dataset
 from fish_env.envs.config import load_env_config
@@ -20,6 +14,11 @@ from fish_env.envs.record import read_episode
 from fish_env.errors import RoboticFishError
 from fish_env.params import fish_files, load_fish
 from fish_env.replay.reading import read_replay_file
+from robofish_agents.evaluation.results import read_results
+from robofish_agents.evaluation.suites import load_suite
+from robofish_agents.policies.files import read_policy
+from robofish_agents.swimming import read_waypoints
+from robofish_agents.training.config import load_train_config
 
 LONGEST_S = 10.0
 """A reader takes at most a few seconds for any file; the rest is for slow machines."""

@@ -16,13 +16,13 @@ import pytest
 import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from robofish_agents.policies.files import read_policy
-from robofish_agents.policies.pretrained import shipped
-from robofish_agents.training.plain import read_plain, write_plain
 
 from fish_env.archives import UNREADABLE, digest
 from fish_env.envs.options import env_options
 from fish_env.params.io import config_root
+from robofish_agents.policies.files import read_policy
+from robofish_agents.policies.pretrained import shipped
+from robofish_agents.training.plain import read_plain, write_plain
 from tests.fixtures.measured_data import DESCRIPTION, RUN, STEADY, TABLE, write_folder
 from tests.fuzzing.found_inputs import OPTIONS
 from tests.fuzzing.readers import READERS, fault

@@ -4,7 +4,6 @@ import subprocess
 import sys
 
 import pytest
-from robofish_agents.sweep.plan import plan
 
 from fish_env.campaign import Options, find_cases, run_campaign
 from fish_env.campaign.cases import prepare
@@ -13,6 +12,7 @@ from fish_env.cluster import ClusterSettings
 from fish_env.data import load_dataset, write_dataset
 from fish_env.errors import ConfigError, DatasetError, OutputError
 from fish_env.files import write_text
+from robofish_agents.sweep.plan import plan
 from tests.command_line import run
 
 DEMO = "demo-trials"

@@ -11,8 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from robofish_agents.evaluation.results import write_results
-from robofish_agents.policies import read_policy, shipped, write_policy
 
 from fish_env import Simulator, load_fish
 from fish_env.commands.simulate import write_table as write_motion
@@ -24,6 +22,8 @@ from fish_env.params import save_fish
 from fish_env.plotting.style import drawing, save
 from fish_env.rendering import write_video
 from fish_env.replay import write_replay
+from robofish_agents.evaluation.results import write_results
+from robofish_agents.policies import read_policy, shipped, write_policy
 from tests.diagnosis.report_cases import answer
 from tests.rendering.scenes import SETTING, scene
 

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 import yaml
-from robofish_agents.evaluation.suites import load_suite
-from robofish_agents.policies import shipped
 
 from fish_env.data import dataset_files
 from fish_env.diagnosis import diagnose
 from fish_env.errors import OutputError
 from fish_env.params import fish_files, load_fish
+from robofish_agents.evaluation.suites import load_suite
+from robofish_agents.policies import shipped
 from tests.command_line import run
 from tests.fixtures.measured_data import good_folder, steady_folder
 

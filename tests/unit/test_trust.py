@@ -7,8 +7,6 @@ from pathlib import Path
 import gymnasium as gym
 import pytest
 import yaml
-from robofish_agents.evaluation.suites import load_suite
-from robofish_agents.training.config import TrainConfig, load_train_config
 
 from fish_env import Simulator, load_fish
 from fish_env.commands.case import read_case
@@ -20,6 +18,8 @@ from fish_env.effects.extended import build_model
 from fish_env.envs.vector import RoboticFish3DVectorEnv
 from fish_env.errors import ConfigError, EffectError, ParameterError, RoboticFishError
 from fish_env.params import as_fish, save_fish
+from robofish_agents.evaluation.suites import load_suite
+from robofish_agents.training.config import TrainConfig, load_train_config
 from tests.command_line import run
 from tests.fixtures.measured_data import good_folder, steady_folder
 

@@ -26,6 +26,16 @@ class Watcher(Protocol):
         """An evaluation on the side is done."""
 
 
+class Quiet:
+    """Watches a training and says nothing."""
+
+    def stepped(self, steps: int) -> None:
+        """Steps are not shown."""
+
+    def evaluated(self, row: dict[str, float]) -> None:
+        """Neither are evaluations."""
+
+
 class Between(BaseCallback):
     """Keeps a training's books.
 

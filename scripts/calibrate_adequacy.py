@@ -15,7 +15,6 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-import tempfile
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
@@ -28,11 +27,10 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "ROBOFISH_THREADS"):
 import numpy as np  # noqa: E402
 from rich.progress import track  # noqa: E402
 
-from fish_env.data import load_dataset  # noqa: E402
-from fish_env.data.schema import Dataset  # noqa: E402
 from fish_env.identification.series import Problem  # noqa: E402
 from fish_env.inference.adequacy import strongest_alarm  # noqa: E402
 from fish_env.inference.estimate.fit import fit  # noqa: E402
+from scripts.hidden_runs import hidden_runs  # noqa: E402
 from scripts.results import RESULTS, write_dated  # noqa: E402
 from tests.hidden.cases import make_case  # noqa: E402
 
@@ -42,13 +40,9 @@ LEVELS = (0.8, 0.9, 0.95, 0.98)
 
 def ratio(seed: int) -> dict[str, object]:
     """Smallest log p-value of a case over the threshold for white residuals."""
-    with tempfile.TemporaryDirectory() as place:
-        folder = Path(place) / "data"
-        truth = make_case("null_strong", seed, folder)
-        dataset = load_dataset(folder)
-        assert isinstance(dataset, Dataset)
-        fitted = fit(Problem(dataset, None, dataset.ids[:6]), rounds=2)
-        smallest, threshold = strongest_alarm(fitted, np.random.default_rng(seed))
+    truth, dataset = hidden_runs(make_case, "null_strong", seed)
+    fitted = fit(Problem(dataset, None, dataset.ids[:6]), rounds=2)
+    smallest, threshold = strongest_alarm(fitted, np.random.default_rng(seed))
     return {"seed": seed, **truth.disturbance, "ratio": smallest / threshold}
 
 

@@ -14,7 +14,6 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-import tempfile
 from collections import Counter
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -28,13 +27,12 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "ROBOFISH_THREADS"):
 
 from rich.progress import track  # noqa: E402
 
-from fish_env.data import load_dataset  # noqa: E402
-from fish_env.data.schema import Dataset  # noqa: E402
 from fish_env.diagnosis.inputs.check import check_inputs  # noqa: E402
 from fish_env.diagnosis.inputs.library import readings  # noqa: E402
 from fish_env.diagnosis.inputs.search import best_reading  # noqa: E402
 from fish_env.diagnosis.inputs.weighing import Scales  # noqa: E402
 from fish_env.params import load_fish  # noqa: E402
+from scripts.hidden_runs import hidden_runs  # noqa: E402
 from scripts.results import RESULTS, write_dated  # noqa: E402
 from tests.diagnosis.mistakes import SENSORS, found_by, mistakes_of, sensed  # noqa: E402
 from tests.hidden.cases import make_case  # noqa: E402
@@ -49,10 +47,7 @@ OF_TIME = ("clock_scale", "clock_skew", "frequency_scale", "battery_sag")
 def good(job: tuple[str, int]) -> dict[str, Any]:
     """What the input step says of a case without a mistake."""
     tier, seed = job
-    with tempfile.TemporaryDirectory() as place:
-        truth = make_case(tier, seed, Path(place) / "data")
-        dataset = load_dataset(Path(place) / "data")
-    assert isinstance(dataset, Dataset)
+    truth, dataset = hidden_runs(make_case, tier, seed)
     found = check_inputs(dataset)
     scales = Scales(load_fish(dataset.fish))
     best = best_reading(dataset, scales, scales.weigh(dataset), readings(dataset))

@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -23,12 +22,11 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "ROBOFISH_THREADS"):
 
 from rich.progress import track  # noqa: E402
 
-from fish_env.data import load_dataset  # noqa: E402
-from fish_env.data.schema import Dataset  # noqa: E402
 from fish_env.diagnosis.inputs.check import check_inputs  # noqa: E402
 from fish_env.identification.own_beats import CLEARLY, own_beats  # noqa: E402
 from fish_env.identification.series import SeriesProblem  # noqa: E402
 from fish_env.identification.tail_drive import tail_drive  # noqa: E402
+from scripts.hidden_runs import hidden_runs  # noqa: E402
 from scripts.results import RESULTS, write_dated  # noqa: E402
 from tests.hidden import cases as one_beat  # noqa: E402
 from tests.hidden.realistic import cases as own_beat  # noqa: E402
@@ -42,14 +40,11 @@ DIFFERENT = ("realistic",)
 def measured(tier: str, seed: int) -> dict[str, Any]:
     """Gains of the runs of one case."""
     make = own_beat.make_case if tier in DIFFERENT else one_beat.make_case
-    with tempfile.TemporaryDirectory() as place:
-        truth = make(tier, seed, Path(place) / "data")
-        dataset = load_dataset(Path(place) / "data")
-    assert isinstance(dataset, Dataset)
+    truth, dataset = hidden_runs(make, tier, seed)
     inputs = check_inputs(dataset)
     problem = SeriesProblem(inputs.dataset, None, dt=STEP_S)
     beats = own_beats(problem.with_drive(tail_drive(inputs.drive, inputs.drive_certain)))
-    gains = {run: round(float(gain), 4) for run, gain in beats.gains.items()}
+    gains = {run: round(gain, 4) for run, gain in beats.gains.items()}
     return {"tier": tier, "seed": seed, "hidden": truth.label, "gains": gains}
 
 

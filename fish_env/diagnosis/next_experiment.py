@@ -97,8 +97,8 @@ def plausible_sizes(effect: Effect) -> dict[str, float]:
     sizes = {}
     for p in effect.parameters:
         low, high = p.plausible
-        far = high if abs(high - p.neutral) >= abs(low - p.neutral) else low
-        sizes[p.name] = low if np.isinf(p.neutral) else 0.5 * (low + high) if p.shapes else far
+        shaping = 0.5 * (low + high) if p.shapes else p.far_end(p.neutral)
+        sizes[p.name] = low if np.isinf(p.neutral) else shaping
     return sizes
 
 

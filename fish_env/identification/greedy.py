@@ -128,9 +128,7 @@ def _switched_on(problem: Problem, name: str) -> dict[str, float]:
     values = problem.beginning([name])
     for p in problem.known[name].parameters:
         path = next(v for v in values if v.endswith(f".{p.name}"))
-        low, high = p.plausible
-        far = high if abs(high - values[path]) >= abs(low - values[path]) else low
-        values[path] += 0.3 * (far - values[path])
+        values[path] += 0.3 * (p.far_end(values[path]) - values[path])
     return values
 
 

@@ -33,6 +33,11 @@ class EffectParameter:
     shapes: bool = False
     probed: bool = True
 
+    def far_end(self, value: float) -> float:
+        """The end of the plausible range that is farther from a value, the upper of two alike."""
+        low, high = self.plausible
+        return high if abs(high - value) >= abs(low - value) else low
+
 
 class Switched:
     """Something with parameters that switch it on."""

@@ -355,8 +355,7 @@ def _ends(p: EffectParameter) -> tuple[float, float]:
     if np.isinf(p.neutral):
         mild = high if p.neutral > 0.0 else low
         return mild, float(np.copysign(np.sqrt(low * high), mild))
-    far = high if abs(high - p.neutral) >= abs(low - p.neutral) else low
-    return _small(p), p.neutral + 0.6 * (far - p.neutral)
+    return _small(p), p.neutral + 0.6 * (p.far_end(p.neutral) - p.neutral)
 
 
 def _small(p: EffectParameter) -> float:

@@ -91,9 +91,9 @@ def check_inputs(dataset: Dataset, fish: FishParams | None = None, seed: int = 0
     left = [one.change for one in found if _left_to_effects(one.change)]
     if seen.of_runs:  # says the same and more
         faults = [fault for fault in faults if fault.fix not in {change.line for change in left}]
-    told = seen.faults
-    faults += told
-    if seen.fine is not None and told[-1].corrected:
+    closer = seen.faults
+    faults += closer
+    if seen.fine is not None and closer[-1].corrected:
         dataset = seen.fine.change.applied(dataset)
     drive = seen.law.starts(math.prod(change.clocks[""].beat for change in left))
     drive = {path: v for path, v in drive.items() if effect_of(path) not in nominal.effects}

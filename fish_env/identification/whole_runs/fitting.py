@@ -78,9 +78,8 @@ def _effects_on(problem: WholeRunProblem, names: Sequence[str]) -> dict[str, flo
         if name in problem.fish.effects or name == FREQUENCY_SCALE:
             continue
         for p in problem.known[name].parameters:
-            path, (low, high) = parameter_path(name, p.name), p.plausible
-            far = high if abs(high - values[path]) >= abs(low - values[path]) else low
-            values[path] += SHARE * (far - values[path])
+            path = parameter_path(name, p.name)
+            values[path] += SHARE * (p.far_end(values[path]) - values[path])
     return values
 
 

@@ -23,8 +23,7 @@ def middling(parameter: EffectParameter) -> float:
     low, high = parameter.plausible
     if not low < parameter.neutral < high:
         return 0.5 * (low + high)
-    end = max(low, high, key=lambda one: abs(one - parameter.neutral))
-    return 0.5 * (parameter.neutral + end)
+    return 0.5 * (parameter.neutral + parameter.far_end(parameter.neutral))
 
 
 def shown_parameters(problem: SimulatedRuns, values: Mapping[str, float]) -> set[str]:

@@ -193,6 +193,7 @@ def disturbance_entry(noise: NoiseModel) -> Plain:
         "moment_sd": noise.moment_sd,
         "correlation_s": noise.correlation_s,
         "phase_sd": noise.phase_sd,
+        "jitter_sd": noise.jitter_sd,
     }
 
 

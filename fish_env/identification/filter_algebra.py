@@ -142,7 +142,7 @@ def predict_covariance(p, f, keep, variance, wander, scratch, turned):
 
 
 @kernel
-def update_covariance(p, rows, measured, noise_variance, s, w, seen, gain):
+def update_covariance(p, rows, measured, noise_variance, smear, s, w, seen, gain):
     """Take a sample into the covariance, in place.
 
     Channels first, error states last: the innermost loops run over rows of memory.
@@ -152,6 +152,8 @@ def update_covariance(p, rows, measured, noise_variance, s, w, seen, gain):
         rows: (C, 19) slopes of the channels.
         measured: (C,) NaN where missing; such a channel must have a row of zeros.
         noise_variance: (C,).
+        smear: (C,) standard deviation that all channels have together, as from a sample that is
+            taken early or late.
         s: (C, C) scratch.
         w: (C, C) becomes the inverse Cholesky factor of the innovations' covariance.
         seen: (C, 24) scratch: covariance of channels and error states.
@@ -180,6 +182,10 @@ def update_covariance(p, rows, measured, noise_variance, s, w, seen, gain):
                     s[i, j] += slope * seen[j, m]
         present = measured[i] == measured[i]
         s[i, i] += noise_variance[i] if present else 1.0
+        if present:
+            for j in range(i + 1):
+                if measured[j] == measured[j]:
+                    s[i, j] += smear[i] * smear[j]
     log_det = cholesky_inverse(s, w)
     for j in range(channels):  # the gain is w' w seen; at first w seen, which p loses the square of
         for i in range(WIDE):

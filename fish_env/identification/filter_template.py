@@ -86,8 +86,9 @@ def carry(work, width, known, sample, sign, count):
 @entry_point
 def ekf_run(
     state0, swimming, par, pace_one, skew_one, delay_one, gain, bias, lens_one, clock, substeps,
-    times, values, measured, codes, noise_variance, covariance0, wrench_variance, wrench_decay_s,
-    wander, history_rows, known, tables, k_out, w_out, e_out, x_out, d_out, f_out, h_out, raw_out,
+    times, values, measured, codes, noise_variance, smear, covariance0, wrench_variance,
+    wrench_decay_s, wander, history_rows, known, tables, k_out, w_out, e_out, x_out, d_out, f_out,
+    h_out, raw_out,
 ):  # fmt: skip
     """Extended Kalman filter over one run, relinearised at every sample.
 
@@ -108,6 +109,7 @@ def ekf_run(
         measured: (T, C), NaN where missing.
         codes: (C, 3) kind, index and column of each channel.
         noise_variance: (C,).
+        smear: (T, C) standard deviations that the channels of a sample have together.
         covariance0: (19, 19) of the initial error state.
         wrench_variance: (6,) stationary variance of the wrench.
         wrench_decay_s: its correlation time (s).
@@ -170,7 +172,7 @@ def ekf_run(
         observation_rows(work, width, codes, gain, lens, measured[sample], rows)
         innovations_of(work, width, measured[sample], codes, gains, biases, lens, e)
         log_det = update_covariance(
-            p, rows, measured[sample], noise_variance, s, w, seen, k_gain
+            p, rows, measured[sample], noise_variance, smear[sample], s, w, seen, k_gain
         )  # fmt: skip
         log_likelihood -= 0.5 * log_det
         for i in range(channels):

@@ -16,6 +16,7 @@ from fish_env.arrays import FloatArray, IntArray
 from fish_env.effects.extended import ExtendedModel
 from fish_env.identification.applied_wrench import EFFECT as APPLIED_WRENCH
 from fish_env.identification.channels import codes_of
+from fish_env.identification.jitter import channel_rates
 from fish_env.identification.runs import RunData
 from fish_env.identification.state_blocks import N_ERROR, N_MOVING
 from fish_env.identification.variation import EVERY, varied_bias, varied_delay, varied_records
@@ -46,6 +47,7 @@ class NoiseModel:
         moment_sd: of the disturbance moment, each axis (N m).
         correlation_s: correlation time of the disturbance (s).
         phase_sd: random walk of the tail's phase about its command (rad/s^0.5).
+        jitter_sd: how early or late samples are, all channels of one alike (s).
         spread: (K,) standard deviation over runs of what differs between them.
     """
 
@@ -54,6 +56,7 @@ class NoiseModel:
     moment_sd: float
     correlation_s: float
     phase_sd: float = 0.0
+    jitter_sd: float = 0.0
     spread: FloatArray = field(default_factory=lambda: np.zeros(len(EVERY)))
 
     def is_close(self, other: NoiseModel, share: float) -> bool:
@@ -179,6 +182,11 @@ class RunFilter:
         self.codes = codes_of(channels)
         self.kernels = filter_kernels(model)
 
+    @cached_property
+    def rates(self) -> list[FloatArray]:
+        """Of each run, rates of change (T, C) of its measured channels (SI per s)."""
+        return [channel_rates(run.clock, run.measured, self.channels) for run in self.runs]
+
     def _history_rows(self, records: FloatArray, data: RunData) -> int:
         """Room for tail commands that come late."""
         return history_rows(self.kernels.longest_delay(records), data.shortest_step)
@@ -245,7 +253,8 @@ class RunFilter:
         """
         entry = self.kernels.entry("ekf_run")
 
-        def one(data: RunData) -> Filtered:
+        def one(job: tuple[RunData, FloatArray]) -> Filtered:
+            data, rates = job
             record, measurement = self._of_run(data, records, sensors)
             samples, channels = data.measured.shape
             states = len(self.kernels.state_names)
@@ -266,14 +275,14 @@ class RunFilter:
                 measurement.delay[0], measurement.gain[:, 0], measurement.bias[:, 0],
                 measurement.lens, data.clock,
                 data.steps(corners), data.command_times, data.command_values,
-                data.measured, self.codes, noise.sensor_sd**2,
+                data.measured, self.codes, noise.sensor_sd**2, noise.jitter_sd * rates,
                 data.covariance0, noise.wrench_variance, noise.correlation_s, noise.phase_sd**2,
                 self._history_rows(record, data), data.known_wrench, self.model.tables,
                 k, w, e, x, d, slopes.motion, slopes.channels, slopes.raw,
             )  # fmt: skip
             return Filtered(k, w, e, x, d, float(value), slopes if keep_slopes else None, corners)
 
-        return list(_threads().map(one, self.runs))
+        return list(_threads().map(one, zip(self.runs, self.rates, strict=True)))
 
     def replay(
         self, filtered: Sequence[Filtered], made_with: NoiseModel, noise: NoiseModel
@@ -287,18 +296,19 @@ class RunFilter:
         """
         entry = self.kernels.entry("replay_run")
 
-        def one(job: tuple[RunData, Filtered]) -> float:
-            data, result = job
+        def one(job: tuple[RunData, FloatArray, Filtered]) -> float:
+            data, rates, result = job
             assert result.slopes is not None
             slopes = result.slopes
             value = entry(
                 data.clock, data.measured, slopes.motion, slopes.channels, slopes.raw, result.gains,
-                result.wrench, made_with.correlation_s, noise.sensor_sd**2, data.covariance0,
+                result.wrench, made_with.correlation_s, noise.sensor_sd**2,
+                noise.jitter_sd * rates, data.covariance0,
                 noise.wrench_variance, noise.correlation_s, noise.phase_sd**2,
             )  # fmt: skip
             return float(value)
 
-        return sum(_threads().map(one, zip(self.runs, filtered, strict=True)))
+        return sum(_threads().map(one, zip(self.runs, self.rates, filtered, strict=True)))
 
     def innovations(
         self,

@@ -26,6 +26,11 @@ no such beat is constant to the last. Its size is then estimated with the distur
 PHASE_SD_RANGE = (3e-3, 0.2)
 """Random walk of the phase of a tail whose beat is a little different in each run (rad/s^0.5): one
 that is half a per cent off is 0.3 rad off after ten seconds, as is a walk of 0.1."""
+JITTER_SD_RANGE = (2e-4, 0.01)
+"""How early or late samples may be (s): a camera's exposures jitter by a few milliseconds."""
+JITTER_TRIALS = (1e-3, 2e-3, 4e-3)
+"""Jitters (s) that are tried before one is fitted: beside twice or half its best size, it still
+has most of its likelihood."""
 ORDER = 4
 WINDOW = 30
 QUANTILE = 0.15
@@ -168,10 +173,16 @@ def fitted_noise(
         # The lean filter will do: covariances are replayed, and no effect is computed again.
         replay = partial(problem.lean_filter.replay, runs, made_with)
         small = replace(
-            small_disturbance(found.sensor_sd), phase_sd=found.phase_sd, spread=found.spread
+            small_disturbance(found.sensor_sd),
+            phase_sd=found.phase_sd,
+            jitter_sd=found.jitter_sd,
+            spread=found.spread,
         )
         start = max((found, small), key=replay)
         found = fit_noise(replay, start, plausible, 45, largest_sensor_sd)
+        jittery = jitter_worth_fitting(replay, found)
+        if jittery.jitter_sd != found.jitter_sd:
+            found = fit_noise(replay, jittery, plausible, 45, largest_sensor_sd)
         if plausible.left_by(found):
             # What is missing shows in whitened residuals only if the noise is as large as it is.
             start = max((found, start), key=replay)
@@ -179,6 +190,24 @@ def fitted_noise(
         if made_with.is_close(found, 0.4):
             break
     return found
+
+
+def jitter_worth_fitting(
+    log_likelihood: Callable[[NoiseModel], float], noise: NoiseModel
+) -> NoiseModel:
+    """The noise model with jitter of the sample times where the data show it, else without.
+
+    Args:
+        log_likelihood: of a noise model, the parameters of the fish being fixed.
+        noise: the present noise model.
+    """
+    without = replace(noise, jitter_sd=0.0)
+    tried = (
+        (noise,) if noise.jitter_sd else tuple(replace(noise, jitter_sd=sd) for sd in JITTER_TRIALS)
+    )
+    best = max(tried, key=log_likelihood)
+    gain = 2.0 * (log_likelihood(best) - log_likelihood(without))
+    return best if gain > POLICY.jitter_gain else without
 
 
 def fit_noise(
@@ -192,7 +221,8 @@ def fit_noise(
 
     Args:
         log_likelihood: of a noise model, the parameters of the fish being fixed.
-        start: first guess; a phase that follows its command, or is relaxed, does so still.
+        start: first guess; a phase that follows its command, or is relaxed, does so still, and
+            sample times without jitter have none.
         within: what the disturbance may be.
         evaluations: effort for the three numbers of the disturbance.
         largest_sensor_sd: (C,) bound on each channel's noise; the noise is then fitted too.
@@ -202,6 +232,8 @@ def fit_noise(
     limits = [within.force, within.moment, within.correlation]
     if PHASE_SD_RANGE[0] <= start.phase_sd <= PHASE_SD_RANGE[1]:
         names, limits = [*names, "phase_sd"], [*limits, PHASE_SD_RANGE]
+    if start.jitter_sd > 0.0:
+        names, limits = [*names, "jitter_sd"], [*limits, JITTER_SD_RANGE]
     bounds = np.log(limits)
 
     def model(x: FloatArray, sensor: FloatArray) -> NoiseModel:

@@ -28,8 +28,8 @@ from fish_env.model.composed import entry_point
 
 @entry_point
 def replay_run(
-    clock, measured, f_in, h_in, raw_in, k_in, d_in, decay_in_s, noise_variance, covariance0,
-    wrench_variance, wrench_decay_s, wander,
+    clock, measured, f_in, h_in, raw_in, k_in, d_in, decay_in_s, noise_variance, smear,
+    covariance0, wrench_variance, wrench_decay_s, wander,
 ):  # fmt: skip
     """Log likelihood (without its constant) of a run under another noise model.
 
@@ -43,6 +43,7 @@ def replay_run(
         d_in: (T, 6) filtered wrench.
         decay_in_s: correlation time of the wrench they were made with (s).
         noise_variance: (C,).
+        smear: (T, C) standard deviations that the channels of a sample have together.
         covariance0: (19, 19) of the initial error state.
         wrench_variance: (6,) stationary variance of the wrench.
         wrench_decay_s: its correlation time (s).
@@ -74,7 +75,7 @@ def replay_run(
             moved[N_ERROR - 1] = stray[N_ERROR - 1]
             stray[:] = moved
         log_det = update_covariance(
-            p, h_in[sample], measured[sample], noise_variance, s, w, seen, gain
+            p, h_in[sample], measured[sample], noise_variance, smear[sample], s, w, seen, gain
         )  # fmt: skip
         log_likelihood -= 0.5 * log_det
         for i in range(channels):

@@ -52,6 +52,7 @@ class DecisionPolicy:
         converged: predicted decrease of -2 log likelihood at which a fit has converged.
         same_noise: relative change of a noise model that ends the alternation with it.
         run_variation_gain: of -2 log likelihood by a spread over runs that is allowed for.
+        jitter_gain: of -2 log likelihood by sample times that jitter, which are then allowed for.
         fewest_runs_for_spread: runs that a spread over runs needs.
         fewest_runs_for_interval: runs that an interval over runs needs.
         beyond_usual: spread over runs, in usual ones, that is a finding.
@@ -93,6 +94,9 @@ class DecisionPolicy:
     same_noise: float = _number(0.1, 0.01, 0.5, BY_HAND)
     run_variation_gain: float = _number(
         6.0, 0.0, 30.0, "strong evidence: Kass and Raftery (1995), JASA 90, section 3.2"
+    )
+    jitter_gain: float = _number(
+        10.0, 0.0, 30.0, "very strong evidence: Kass and Raftery (1995), JASA 90, section 3.2"
     )
     fewest_runs_for_spread: int = _number(3, 2, 10, "two degrees of freedom")
     fewest_runs_for_interval: int = _number(3, 2, 10, "two degrees of freedom")

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from fish_env.data import CommandSteps, Dataset, Run
 from fish_env.effects.extended import ExtendedModel
@@ -48,11 +49,13 @@ class Setup:
     rest_s: float = 0.0
     missing: float = 0.0
     uneven: bool = False
+    jitter_sd: float = 0.0
 
     @property
     def noise(self) -> NoiseModel:
         sensor = np.array([SENSOR_SD[name] for name in self.channels])
-        return NoiseModel(sensor, self.force_sd, self.moment_sd, self.correlation_s)
+        known = self.force_sd, self.moment_sd, self.correlation_s
+        return NoiseModel(sensor, *known, jitter_sd=self.jitter_sd)
 
 
 def simulate(setup: Setup) -> Dataset:
@@ -69,6 +72,9 @@ def simulate(setup: Setup) -> Dataset:
     runs = []
     for i in range(setup.runs):
         true = channels_from_states(states[:, :, i].T)
+        if setup.jitter_sd:
+            late = times + setup.jitter_sd * rng.standard_normal(len(times))
+            true = {n: CubicSpline(times, np.unwrap(v))(late) for n, v in true.items()}
         shown = {
             n: true[n] + SENSOR_SD[n] * rng.standard_normal(len(times)) for n in setup.channels
         }

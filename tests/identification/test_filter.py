@@ -9,6 +9,7 @@ from fish_env.data import CommandSteps, Run
 from fish_env.effects import catalogue
 from fish_env.effects.extended import build_model
 from fish_env.identification import SeriesProblem
+from fish_env.identification.jitter import channel_rates
 from fish_env.identification.open_loop import errors
 from fish_env.identification.phases import settle_phases
 from fish_env.inference.estimate import products
@@ -59,6 +60,7 @@ def plain_filter(problem, noise):
     kernels, record = problem.lean_filter.kernels, model.record.copy()
     state, wrench, p = data.state0.copy(), np.zeros(6), data.covariance0.copy()
     total, white = 0.0, []
+    rates = channel_rates(data.clock, data.measured, problem.channels)
 
     def slope(x, u, d):
         par = record.copy()
@@ -106,6 +108,7 @@ def plain_filter(problem, noise):
             continue
         e = data.measured[k] - seen(state, problem.channels)
         s = h_rows @ p @ h_rows.T + np.diag(noise.sensor_sd**2)
+        s += noise.jitter_sd**2 * np.outer(rates[k], rates[k])
         gain = p @ h_rows.T @ np.linalg.inv(s)
         white.append(np.linalg.solve(np.linalg.cholesky(s), e))
         total -= 0.5 * (white[-1] @ white[-1] + np.linalg.slogdet(s)[1])
@@ -115,8 +118,9 @@ def plain_filter(problem, noise):
     return np.array(white), total
 
 
-def test_the_filter_is_the_textbook_one():
-    setup = Setup(runs=1, duration=2.0)
+@pytest.mark.parametrize("jitter_sd", [0.0, 0.004])
+def test_the_filter_is_the_textbook_one(jitter_sd):
+    setup = Setup(runs=1, duration=2.0, jitter_sd=jitter_sd)
     problem = problem_of(setup)
     (result,) = problem.filtered(problem.start, setup.noise)
     white, total = plain_filter(problem, setup.noise)
@@ -200,6 +204,7 @@ def test_a_replayed_noise_model_has_the_filters_likelihood():
     same = problem.lean_filter.replay(filtered, setup.noise, setup.noise)
     assert same == pytest.approx(sum(r.log_likelihood for r in filtered), abs=1e-6)
     other = replace(setup.noise, force_sd=0.006, moment_sd=5e-5, correlation_s=0.5, phase_sd=0.02)
+    other = replace(other, jitter_sd=0.003)
     full = sum(r.log_likelihood for r in problem.filtered(problem.start, other))
     assert problem.lean_filter.replay(filtered, setup.noise, other) == pytest.approx(full, abs=0.5)
 

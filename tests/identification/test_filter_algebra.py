@@ -43,13 +43,17 @@ def test_update_is_that_of_kalman(channels):
     rows = np.zeros((channels, N_ERROR))
     rows[:, :N_MOVING] = rng.standard_normal((channels, N_MOVING))
     measured, noise = np.zeros(channels), rng.uniform(0.1, 1.0, channels)
+    smear = rng.standard_normal(channels)
     lost = channels // 2 if channels > 1 else None
     if lost is not None:
         measured[lost], rows[lost] = np.nan, 0.0
     p = widened(before)
     _, _, s, w, seen, gain = room(channels)
-    log_det = update_covariance(p, rows, measured, noise, s, w, seen, gain)
-    spread = rows @ before @ rows.T + np.diag(np.where(np.isfinite(measured), noise, 1.0))
+    log_det = update_covariance(p, rows, measured, noise, smear, s, w, seen, gain)
+    told = np.isfinite(measured)
+    together = np.where(told, smear, 0.0)
+    spread = rows @ before @ rows.T + np.diag(np.where(told, noise, 1.0))
+    spread += np.outer(together, together)
     kalman = before @ rows.T @ np.linalg.inv(spread)
     np.testing.assert_allclose(gain[:channels, :N_ERROR].T, kalman, rtol=1e-9, atol=1e-11)
     np.testing.assert_allclose(

@@ -12,6 +12,7 @@ import numpy as np
 
 from fish_env.identification.filter_algebra import BASE, PHASE, angle, innovation
 from fish_env.identification.state_blocks import N_ERROR, PHASE_COLUMN, first_column
+from fish_env.model.history import HEARD, RECORD
 
 # --- completed by compose ---
 from fish_env.model.composed import (
@@ -40,6 +41,7 @@ ROTATION, RATES = first_column("rotation"), first_column("rate")
 MOUNT, MARKER, TILT, BENT, IRON = 0, 9, 12, 18, 20  # rows of a lens (see sensing.geometry)
 PERTURB = 1e-5
 DIVERGED = 1e4
+TOLD_PHASE = 1 + HEARD.index("phase")  # its row in a slot of a history
 STEP_S = 0.01
 SETTLING_STEPS = 100
 SETTLING_S = STEP_S * SETTLING_STEPS
@@ -188,12 +190,33 @@ def innovations_of(work, width, measured, codes, gain, bias, lens, e):
 
 
 @kernel
-def turn_tail(work, width, error):
+def turn_told(width, error, history):
+    """Apply the error of the phase to all that a late tail was told and has yet to hear."""
+    slots = (history.shape[0] - 1) // RECORD
+    for slot in range(slots):
+        row = 1 + RECORD * slot + TOLD_PHASE
+        for k in range(width):
+            history[row, k] += error[PHASE_COLUMN, k]
+
+
+@kernel
+def share_told(width, history):
+    """Let all lanes have been told what the first one was."""
+    for row in range(history.shape[0]):
+        for k in range(1, width):
+            history[row, k] = history[row, 0]
+
+
+@kernel
+def turn_tail(work, width, error, late, history):
     """Apply the error of the phase, to the phase and to what follows it.
 
-    A tail that bends or lags has been out of phase all along, so its states are where they would
-    be that much later in the beat. Else the phase would seem to act only once they have followed.
+    A tail that is late, bends or lags has been out of phase all along, so its states are where they
+    would be that much later in the beat. Else the phase would seem to act only once they have
+    followed, and would be corrected twice.
     """
+    if late:
+        turn_told(width, error, history)
     for j in range(TAIL_ROWS.shape[0]):
         row = TAIL_ROWS[j]
         for k in range(width):
@@ -206,8 +229,8 @@ def turn_tail(work, width, error):
 
 
 @kernel
-def move(work, width, error):
-    """Apply error states (19, width) to all lanes."""
+def move(work, width, error, late, history):
+    """Apply error states (19, width) to all lanes, and to what late tails (see history) heard."""
     for j in range(3):
         for k in range(width):
             work[(X0 + j) * width + k] += error[j, k]
@@ -230,7 +253,7 @@ def move(work, width, error):
         for k in range(width):
             work[(X0 + 7 + j) * width + k] += error[6 + j, k]
             work[(WRENCH + j) * width + k] += error[12 + j, k]
-    turn_tail(work, width, error)
+    turn_tail(work, width, error, late, history)
 
 
 @kernel

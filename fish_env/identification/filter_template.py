@@ -37,6 +37,7 @@ from fish_env.model.composed import (
     move,
     observation_rows,
     set_commands,
+    share_told,
     start_effects,
     step_lanes_once,
 )
@@ -60,10 +61,12 @@ def slopes_of_interval(
     for j in range(6):
         for k in range(1, width):
             work[(WRENCH + j) * width + k] = work[(WRENCH + j) * width]
+    if late:
+        share_told(width, history)
     for j in range(N_ERROR):
         for k in range(width):
             error[j, k] = PERTURB if k == j + 1 else 0.0
-    move(work, width, error)
+    move(work, width, error, late, history)
     for i in range(steps):
         start = begin + i * h
         set_commands(work, width, times, values, at, start, h, skew, delay, True)
@@ -187,7 +190,7 @@ def ekf_run(
                 total += k_gain[j, i] * e[j, 0]
                 k_out[sample, i, j] = k_gain[j, i]
             error[i, 0] = total
-        move(work, width, error)
+        move(work, width, error, late, history)
         w_out[sample] = w
         for j in range(N_STATES):
             x_out[sample, j] = work[(X0 + j) * width]
@@ -210,7 +213,9 @@ def push(work, width, basis, sample, column, size, sign, first, count):
 
 
 @kernel
-def take_sample(work, width, measured, codes, gain, bias, lens, k_in, w_in, e, error, white):
+def take_sample(
+    work, width, measured, codes, gain, bias, lens, k_in, w_in, e, error, white, late, history,
+):  # fmt: skip
     """Innovations of all lanes at one sample, whitened into white (C, width); states corrected."""
     channels = codes.shape[0]
     innovations_of(work, width, measured, codes, gain, bias, lens, e)
@@ -228,7 +233,7 @@ def take_sample(work, width, measured, codes, gain, bias, lens, k_in, w_in, e, e
             factor = k_in[i, j]
             for k in range(width):
                 error[i, k] += factor * e[j, k]
-    move(work, width, error)
+    move(work, width, error, late, history)
 
 
 @kernel
@@ -283,7 +288,7 @@ def filter_block(
                 work[n] *= keep
         take_sample(
             work, width, measured[sample], codes, gain, bias, lens, k_in[sample], w_in[sample], e,
-            error, white,
+            error, white, late, history,
         )  # fmt: skip
         for k in range(count):
             for i in range(channels):

@@ -58,8 +58,8 @@ class Setup:
         return NoiseModel(sensor, *known, jitter_sd=self.jitter_sd)
 
 
-def simulate(setup: Setup) -> Dataset:
-    """Runs with commands that step every second."""
+def simulate(setup: Setup, commands: np.ndarray | None = None) -> Dataset:
+    """Runs with commands that step every second, or with the same (n, 5) each second of all."""
     rng = np.random.default_rng(setup.seed)
     times = np.arange(round(setup.duration * setup.rate) + 1) / setup.rate
     if setup.uneven:
@@ -68,6 +68,9 @@ def simulate(setup: Setup) -> Dataset:
     low, high = [-0.4, 0.2, 1.0, 0.0, 0.0], [0.4, 0.5, 2.2, 0.0, 0.0]
     values = rng.uniform(low, high, (setup.runs, len(switch), 5))
     steps = [CommandSteps(times[np.searchsorted(times, switch)], v) for v in values]
+    if commands is not None:
+        values = np.broadcast_to(commands, (setup.runs, len(switch), 5))
+        steps = [CommandSteps(times[np.searchsorted(times, switch)], v) for v in values]
     states = motion(setup, times, steps, rng)
     runs = []
     for i in range(setup.runs):

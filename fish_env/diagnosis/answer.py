@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from statistics import pstdev
 
+import numpy as np
+
+from fish_env.arrays import FloatArray
 from fish_env.data.schema import Dataset
 from fish_env.diagnosis.entries import (
     FORMAT,
@@ -119,17 +122,27 @@ def _floors(diagnosis: Diagnosis) -> list[Plain]:
 
 
 def run_variation_entry(fit: Fit) -> list[Plain]:
-    """What the runs differ in: spread over runs beside the usual one, and each run's value."""
-    problem, entries = fit.problem, []
+    """What the runs differ in, and errors of sensors: spread beside the usual one, and values."""
+    problem, predicted, entries = fit.problem, _predicted(fit), []
     for i, known in enumerate(problem.variations):
         sd = float(fit.noise.spread[i])
         if sd > 0.0:
-            values = problem.variation[:, i].tolist()
             entries.append(
                 {"name": known.name, "unit": known.unit, "sd": sd, "usual_sd": known.usual,
-                 "beyond_usual": sd > POLICY.beyond_usual * known.usual, "values": values}
+                 "shared": known.shared, "values": predicted[:, i].tolist(),
+                 "beyond_usual": sd > POLICY.beyond_usual * known.usual}
             )  # fmt: skip
     return [*_own_beats(fit), *entries]
+
+
+def _predicted(fit: Fit) -> FloatArray:
+    """(R, K) best prediction of what each run differs in, those integrated out too."""
+    values, marginal = fit.problem.variation.copy(), fit.linearised.marginal
+    if marginal is not None:
+        active = np.flatnonzero(fit.noise.spread)
+        residuals = np.concatenate([run.residuals for run in fit.filtered])
+        values[:, active] = marginal.predicted(residuals) * fit.noise.spread[active]
+    return values
 
 
 def _own_beats(fit: Fit) -> list[Plain]:
@@ -139,7 +152,7 @@ def _own_beats(fit: Fit) -> list[Plain]:
         return []
     sd = pstdev(beats)
     return [
-        {"name": "beat", "unit": "1", "sd": sd, "usual_sd": USUAL_BEAT,
+        {"name": "beat", "unit": "1", "sd": sd, "usual_sd": USUAL_BEAT, "shared": False,
          "beyond_usual": sd > POLICY.beyond_usual * USUAL_BEAT, "values": beats}
     ]  # fmt: skip
 

@@ -12,7 +12,6 @@ import numpy as np
 
 from fish_env.identification.filter_algebra import BASE, PHASE, angle, innovation
 from fish_env.identification.state_blocks import N_ERROR, PHASE_COLUMN, first_column
-from fish_env.model.history import HEARD, RECORD
 
 # --- completed by compose ---
 from fish_env.model.composed import (
@@ -31,6 +30,7 @@ from fish_env.model.composed import (
     lane_initialise,
     rk4_step,
 )
+from fish_env.model.history import HEARD, RECORD
 
 # --- end ---
 

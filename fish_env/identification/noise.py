@@ -88,11 +88,13 @@ class DisturbanceRange:
         force: smallest and largest standard deviation (N).
         moment: of the moment (N m).
         correlation: shortest and longest correlation time (s).
+        jitter: of the times of samples, smallest and largest standard deviation (s).
     """
 
     force: tuple[float, float]
     moment: tuple[float, float]
     correlation: tuple[float, float]
+    jitter: tuple[float, float] = JITTER_SD_RANGE
 
     def widened(self, times: float) -> DisturbanceRange:
         """The same with a disturbance so many times as strong allowed."""
@@ -139,6 +141,10 @@ class FilteredRuns(Protocol):
         """The fish, whose size says what a disturbance may be."""
 
     @property
+    def largest_jitter_s(self) -> float:
+        """Largest jitter of the sample times that the channels allow (s)."""
+
+    @property
     def lean_filter(self) -> RunFilter:
         """The quickest filter that knows the runs."""
 
@@ -166,7 +172,9 @@ def fitted_noise(
         noise: the present noise model.
         largest_sensor_sd: as :func:`fit_noise` takes it.
     """
-    plausible, wide = disturbance_range(problem.fish), widest_disturbance(problem.fish)
+    allowed = JITTER_SD_RANGE[0], min(JITTER_SD_RANGE[1], problem.largest_jitter_s)
+    plausible = replace(disturbance_range(problem.fish), jitter=allowed)
+    wide = plausible.widened(POLICY.largest_disturbance)
     found = noise
     for _ in range(3):
         runs, made_with = problem.filtered(point, found, keep_slopes=True), found
@@ -180,7 +188,7 @@ def fitted_noise(
         )
         start = max((found, small), key=replay)
         found = fit_noise(replay, start, plausible, 45, largest_sensor_sd)
-        jittery = jitter_worth_fitting(replay, found)
+        jittery = jitter_worth_fitting(replay, found, plausible)
         if jittery.jitter_sd != found.jitter_sd:
             found = fit_noise(replay, jittery, plausible, 45, largest_sensor_sd)
         if plausible.left_by(found):
@@ -193,18 +201,20 @@ def fitted_noise(
 
 
 def jitter_worth_fitting(
-    log_likelihood: Callable[[NoiseModel], float], noise: NoiseModel
+    log_likelihood: Callable[[NoiseModel], float], noise: NoiseModel, within: DisturbanceRange
 ) -> NoiseModel:
     """The noise model with jitter of the sample times where the data show it, else without.
 
     Args:
         log_likelihood: of a noise model, the parameters of the fish being fixed.
         noise: the present noise model.
+        within: what the jitter may be.
     """
-    without = replace(noise, jitter_sd=0.0)
-    tried = (
-        (noise,) if noise.jitter_sd else tuple(replace(noise, jitter_sd=sd) for sd in JITTER_TRIALS)
-    )
+    without, (least, largest) = replace(noise, jitter_sd=0.0), within.jitter
+    if least >= largest:
+        return without
+    sizes = [noise.jitter_sd] if noise.jitter_sd else JITTER_TRIALS
+    tried = [replace(noise, jitter_sd=min(size, largest)) for size in sizes]
     best = max(tried, key=log_likelihood)
     gain = 2.0 * (log_likelihood(best) - log_likelihood(without))
     return best if gain > POLICY.jitter_gain else without
@@ -233,7 +243,7 @@ def fit_noise(
     if PHASE_SD_RANGE[0] <= start.phase_sd <= PHASE_SD_RANGE[1]:
         names, limits = [*names, "phase_sd"], [*limits, PHASE_SD_RANGE]
     if start.jitter_sd > 0.0:
-        names, limits = [*names, "jitter_sd"], [*limits, JITTER_SD_RANGE]
+        names, limits = [*names, "jitter_sd"], [*limits, within.jitter]
     bounds = np.log(limits)
 
     def model(x: FloatArray, sensor: FloatArray) -> NoiseModel:

@@ -10,6 +10,7 @@ from fish_env.arrays import FloatArray
 from fish_env.data.schema import Dataset
 from fish_env.identification.recorded import recorded
 from fish_env.rigidbody.outliers import Outliers, outliers_of
+from fish_env.rigidbody.sample_times import largest_jitter_s
 
 TELLING = 1e-4
 """Share of the samples of a channel from which outliers are told in words."""
@@ -49,6 +50,11 @@ def largest_noise(dataset: Dataset, channels: tuple[str, ...], least: FloatArray
     """
     found = {one.channel: one.noise_sd for one in outliers_of(recorded(dataset))}
     return np.maximum(least, [found[name] or 0.0 for name in channels])
+
+
+def largest_jitter_of(dataset: Dataset) -> float:
+    """Largest jitter of the sample times that the channels allow (s)."""
+    return largest_jitter_s(recorded(dataset))
 
 
 def sentences(found: tuple[Outliers, ...]) -> list[str]:

@@ -34,7 +34,7 @@ from fish_env.identification.parameters import ALIKE, Baseline, changes_of, neut
 from fish_env.identification.phases import settle_phases
 from fish_env.identification.runs import FINER, RunData, prepare_run
 from fish_env.identification.sensor_errors import slopes_of_runs
-from fish_env.identification.sensors import largest_noise
+from fish_env.identification.sensors import largest_jitter_of, largest_noise
 from fish_env.identification.tail_drive import TailDrive
 from fish_env.identification.variation import EVERY, SENSOR_ERRORS, VARIATIONS
 from fish_env.inference.estimate.fit import Fit
@@ -218,6 +218,11 @@ class SeriesProblem(Problem):
     def largest_sensor_sd(self) -> FloatArray:
         """(C,) largest white noise that a channel may have, whatever the model misses (SI)."""
         return largest_noise(self.dataset, self.channels, self.sensor_sd)
+
+    @cached_property
+    def largest_jitter_s(self) -> float:
+        """Largest jitter of the sample times that the channels allow (s)."""
+        return largest_jitter_of(self.dataset)
 
     @property
     def starts_known(self) -> bool:

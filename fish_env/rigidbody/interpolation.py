@@ -47,9 +47,14 @@ class Interpolator:
     @property
     def gain(self) -> float:
         """Standard deviation of the error over that of white noise in the samples."""
+        return float(np.linalg.norm(self.weights_of_sample))
+
+    @property
+    def weights_of_sample(self) -> FloatArray:
+        """(2 REACH + 1,) weights of a sample and its neighbours in the error."""
         own = self.weights.copy()
         own[0] = 0.5 - self.weights[1:].sum()
-        return float(np.sqrt(1.0 + 2.0 * own @ own))
+        return np.concatenate([-own[::-1], [1.0], -own])
 
 
 def interpolator_of(windows: Sequence[FloatArray]) -> Interpolator | None:

@@ -39,6 +39,28 @@ def test_the_page_has_every_part(full):
         assert part in page, part
 
 
+def test_what_is_beyond_the_usual_is_told(tmp_path):
+    varied = [
+        {"name": "trim_y", "unit": "m", "sd": 4e-4, "usual_sd": 1e-4, "shared": False,
+         "beyond_usual": True, "values": [-3e-4, 5e-4]},
+        {"name": "camera_roll", "unit": "rad", "sd": 0.06, "usual_sd": 0.017, "shared": True,
+         "beyond_usual": True, "values": [0.05, 0.05]},
+        {"name": "buoyancy", "unit": "kg", "sd": 3e-4, "usual_sd": 4e-4, "shared": False,
+         "beyond_usual": False, "values": [-1e-4, 2e-4]},
+    ]  # fmt: skip
+    noise = {"disturbance": {"jitter_sd": 0.0034}}
+    told = answer(run_variation=varied, noise=noise)
+    page = write_report(told, None, tmp_path).read_text()
+    for part in (
+        "Trim y differs between runs by 0.0004 m (one standard deviation), 4 times the usual",
+        "Camera roll is off by about 0.06 rad",
+        "Samples are 3.4 ms early or late",
+        "0.0005",
+    ):
+        assert part in page, part
+    assert "Buoyancy differs" not in page
+
+
 def test_nothing_is_asked_of_a_network_and_nothing_breaks_out(full):
     page, _ = full
     markup = re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)

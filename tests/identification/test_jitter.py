@@ -8,6 +8,7 @@ import pytest
 from fish_env.identification import SeriesProblem, fit
 from fish_env.identification.jitter import channel_rates
 from fish_env.identification.noise import fitted_noise
+from fish_env.identification.sensors import largest_jitter_of
 from tests.identification.synthetic import PATHS, Setup, simulate
 
 
@@ -51,3 +52,15 @@ def test_a_wrong_fish_does_not_pass_for_jitter():
     setup = Setup(runs=4, changes={"tail.lift.c1": 3.4})
     found = fit(SeriesProblem(simulate(setup), paths=PATHS), rounds=3)
     assert found.noise.jitter_sd == 0.0
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("jitter_sd", [0.002, 0.005])
+def test_the_series_themselves_bound_it(seed, jitter_sd):
+    bound = largest_jitter_of(simulate(Setup(seed=seed, runs=4, jitter_sd=jitter_sd)))
+    assert 0.8 * jitter_sd < bound < 2.0 * jitter_sd
+
+
+def test_no_series_is_no_bound():
+    data = simulate(Setup(runs=1, duration=1.0))
+    assert largest_jitter_of(data) == np.inf

@@ -36,6 +36,7 @@ def measurements(answer: Answer, series: ReportSeries | SteadySeries | None, alb
     """Whether the channels agree among themselves, and how noisy each of them is."""
     agreed = (answer.get("consistency") or {}).get("sentences", [])
     sentences = "".join(f"<li>{text(sentence)}</li>" for sentence in agreed)
+    sentences += "".join(f"<li>{text(sentence)}</li>" for sentence in differing(answer))
     rows = [_floor(floor) for floor in answer.get("noise_floor", [])]
     heads = ("channel", "noise in the filter (sd)", "from the data alone (sd)", "95 % interval",
              "unit")  # fmt: skip
@@ -43,8 +44,49 @@ def measurements(answer: Answer, series: ReportSeries | SteadySeries | None, alb
         "The measurements themselves",
         f"<ul>{sentences}</ul>" if sentences else "",
         folded("Noise of each channel", table(heads, rows)),
+        folded("What differs between runs, and errors of sensors", _variation(answer)),
         key="measurements",
     )
+
+
+def differing(answer: Answer) -> list[str]:
+    """What is beyond the usual between runs or in a sensor, and jitter of the sample times."""
+    jitter_s = (answer.get("noise") or {}).get("disturbance", {}).get("jitter_sd", 0.0)
+    found = [_beyond(entry) for entry in answer.get("run_variation", []) if entry["beyond_usual"]]
+    if jitter_s > 0.0:
+        found.append(
+            f"Samples are {1e3 * jitter_s:.1f} ms early or late (one standard deviation), all "
+            "channels alike."
+        )
+    return found
+
+
+def _beyond(entry: Answer) -> str:
+    """One thing that differs, or is off, by more than is usual."""
+    how = "is off by about" if entry["shared"] else "differs between runs by"
+    return (
+        f"{named(entry['name'])} {how} {number(entry['sd'])} {entry['unit']} (one standard "
+        f"deviation), {entry['sd'] / entry['usual_sd']:.0f} times the usual."
+    )
+
+
+def named(variation: str) -> str:
+    """What a run variation is called in a sentence."""
+    words = variation.replace("_", " ")
+    return words[0].upper() + words[1:]
+
+
+def _variation(answer: Answer) -> str:
+    rows = [
+        (
+            text(named(entry["name"])), number(entry["sd"]), number(entry["usual_sd"]),
+            number(min(entry["values"])), number(max(entry["values"])),
+            text("" if entry["unit"] == "1" else entry["unit"]),
+        )
+        for entry in answer.get("run_variation", [])
+    ]  # fmt: skip
+    heads = ("what", "standard deviation", "usual", "least of a run", "largest", "unit")
+    return table(heads, rows)
 
 
 def _floor(floor: Answer) -> tuple[str, ...]:

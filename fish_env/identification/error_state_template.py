@@ -20,6 +20,7 @@ from fish_env.model.composed import (
     N_PARAMETERS,
     N_STATES,
     PAR,
+    TAIL_RATES,
     TAIL_ROWS,
     TIME,
     U_RATE,
@@ -41,6 +42,7 @@ ROTATION, RATES = first_column("rotation"), first_column("rate")
 MOUNT, MARKER, TILT, BENT, IRON = 0, 9, 12, 18, 20  # rows of a lens (see sensing.geometry)
 PERTURB = 1e-5
 DIVERGED = 1e4
+MOST_SWING = 1.2  # swing of a soft tail over the told one, below its resonance
 TOLD_PHASE = 1 + HEARD.index("phase")  # its row in a slot of a history
 STEP_S = 0.01
 SETTLING_STEPS = 100
@@ -213,7 +215,8 @@ def turn_tail(work, width, error, late, history):
 
     A tail that is late, bends or lags has been out of phase all along, so its states are where they
     would be that much later in the beat. Else the phase would seem to act only once they have
-    followed, and would be corrected twice.
+    followed, and would be corrected twice. They move no further with the phase than a beat of the
+    told amplitude does: after a jump of the command they move fast, and not with the phase.
     """
     if late:
         turn_told(width, error, history)
@@ -222,7 +225,9 @@ def turn_tail(work, width, error, late, history):
         for k in range(width):
             turning = work[(DX + PHASE) * width + k]
             if (turning > 0.0) & (error[PHASE_COLUMN, k] != 0.0):
-                per_phase = work[(DX + row) * width + k] / turning
+                most = MOST_SWING * work[(U + 1) * width + k]
+                most *= turning if TAIL_RATES[j] else 1.0
+                per_phase = min(max(work[(DX + row) * width + k] / turning, -most), most)
                 work[(X0 + row) * width + k] += per_phase * error[PHASE_COLUMN, k]
     for k in range(width):
         work[(X0 + PHASE) * width + k] += error[PHASE_COLUMN, k]

@@ -8,10 +8,14 @@ import numpy as np
 
 from fish_env.arrays import FloatArray
 from fish_env.data.schema import Dataset
+from fish_env.identification.noise import white_noise_sd
 from fish_env.identification.recorded import recorded
+from fish_env.inference.policy import POLICY
 from fish_env.rigidbody.outliers import Outliers, outliers_of
 from fish_env.rigidbody.sample_times import largest_jitter_s
 
+FEWEST_CHANNELS = 3
+"""Declared channels of which most can show more noise than declared."""
 TELLING = 1e-4
 """Share of the samples of a channel from which outliers are told in words."""
 
@@ -36,6 +40,41 @@ def without_outliers(dataset: Dataset) -> tuple[Dataset, tuple[Outliers, ...]]:
         for i, run in enumerate(dataset.runs)
     )
     return replace(dataset, runs=runs, notes=(*dataset.notes, *sentences(found))), found
+
+
+def with_noise_shown(dataset: Dataset) -> Dataset:
+    """The dataset with the noise that its samples show where that is more than it declares.
+
+    Noise is often declared as of a robot at rest, and sensors are noisier while it moves. A motion
+    that is not smooth looks like noise too, so most channels have to show it.
+
+    Args:
+        dataset: measured runs.
+    """
+    shown = noise_shown(dataset)
+    times = noise_over_declared(dataset)
+    if times <= POLICY.noisier_than_declared:
+        return dataset
+    larger = {name: max(sd, shown[name]) for name, sd in dataset.noise.items()}
+    said = (
+        f"Samples scatter by about {times:.2g} times the noise that dataset.yaml declares. The "
+        "scatter counts as noise; give the noise of sensors while the fish moves."
+    )
+    return replace(dataset, noise=larger, notes=(*dataset.notes, said))
+
+
+def noise_over_declared(dataset: Dataset) -> float:
+    """Median over channels of the noise that samples show over the declared; 0 of few channels."""
+    if len(dataset.noise) < FEWEST_CHANNELS:
+        return 0.0
+    shown = noise_shown(dataset)
+    return float(np.median([shown[name] / sd for name, sd in dataset.noise.items()]))
+
+
+def noise_shown(dataset: Dataset) -> dict[str, float]:
+    """White noise by declared channel (SI): what quiet stretches and neighbours both allow."""
+    found = {one.channel: one.noise_sd or np.inf for one in outliers_of(recorded(dataset))}
+    return {n: min(white_noise_sd(dataset, n), found.get(n, np.inf)) for n in dataset.noise}
 
 
 def largest_noise(dataset: Dataset, channels: tuple[str, ...], least: FloatArray) -> FloatArray:

@@ -53,6 +53,8 @@ class DecisionPolicy:
         same_noise: relative change of a noise model that ends the alternation with it.
         run_variation_gain: of -2 log likelihood by a spread over runs that is allowed for.
         jitter_gain: of -2 log likelihood by sample times that jitter, which are then allowed for.
+        noisier_than_declared: median over channels of the noise that samples show over the
+            declared, from which the larger counts.
         fewest_runs_for_spread: runs that a spread over runs needs.
         fewest_runs_for_interval: runs that an interval over runs needs.
         beyond_usual: spread over runs, in usual ones, that is a finding.
@@ -98,6 +100,7 @@ class DecisionPolicy:
     jitter_gain: float = _number(
         10.0, 0.0, 30.0, "very strong evidence: Kass and Raftery (1995), JASA 90, section 3.2"
     )
+    noisier_than_declared: float = _number(1.1, 1.0, 2.0, "scripts/calibrate_declared_noise.py")
     fewest_runs_for_spread: int = _number(3, 2, 10, "two degrees of freedom")
     fewest_runs_for_interval: int = _number(3, 2, 10, "two degrees of freedom")
     beyond_usual: float = _number(3.0, 1.0, 10.0, BY_HAND)

@@ -58,6 +58,11 @@ class Composition:
         return [self.state_names.index(name) for name in names]
 
     @property
+    def tail_rates(self) -> list[bool]:
+        """Whether those rows are rates of the tail (rad/s), as their names end, or angles (rad)."""
+        return [self.state_names[row].endswith("rate") for row in self.tail_rows]
+
+    @property
     def delays(self) -> tuple[str, ...]:
         """Parameters by which the tail's command is late (s)."""
         return tuple(f"{e.name}.{e.command_delay}" for e in self.effects if e.command_delay)

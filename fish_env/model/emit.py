@@ -74,6 +74,7 @@ class Emitter:
             f"N_TERMS = {len(self.composition.term_names)}\n"
             f"LATE_TAIL = {bool(self.composition.delays)}\n"
             f"TAIL_ROWS = np.array({self.composition.tail_rows}, np.int64)\n"
+            f"TAIL_RATES = np.array({self.composition.tail_rates}, np.bool_)\n"
         )
         parts = (self.derivative, self.terms, self.initialise, self.command, self.memory)
         return "\n".join([sizes, *(part() for part in parts)])

@@ -32,7 +32,8 @@ def test_samples_that_scatter_more_than_declared_say_how_much():
     said = f"{noise_over_declared(data):.2g} times"
     assert any(said in note for note in shown.notes), shown.notes
     for name, sd in shown.noise.items():
-        assert sd == pytest.approx(data.noise[name] / 0.6, rel=0.35), name
+        true = data.noise[name] / 0.6
+        assert 0.85 * true < sd < 1.8 * true, name  # motion that is not smooth adds to it
 
 
 def test_one_noisy_channel_is_no_case():

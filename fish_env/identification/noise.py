@@ -191,6 +191,10 @@ def fitted_noise(
         jittery = jitter_worth_fitting(replay, found, plausible)
         if jittery.jitter_sd != found.jitter_sd:
             found = fit_noise(replay, jittery, plausible, 45, largest_sensor_sd)
+        if found.jitter_sd and plausible.left_by(found):
+            # Something is missing, and jitter could absorb it.
+            still = replace(found, jitter_sd=0.0)
+            found = fit_noise(replay, still, plausible, 45, largest_sensor_sd)
         if plausible.left_by(found):
             # What is missing shows in whitened residuals only if the noise is as large as it is.
             start = max((found, start), key=replay)

@@ -5,9 +5,6 @@ the heading, a camera looks down at an angle and into water, devices are late by
 a second. Each is linear in one number as long as it is small, with regressors that follow from the
 filtered motion. So no fish has to swim again to see what it does: the filter's own slopes carry a
 change of the measurements through to its innovations.
-
-An even, steady current is such an error too: seen from the water, the fish swims as in still water,
-and the sensors of place drift. It begins with another speed, which the filter finds by itself.
 """
 
 from __future__ import annotations
@@ -76,11 +73,6 @@ def sensor_slopes(clock: FloatArray, filtered: Filtered, channels: Sequence[str]
     for turn, label in ((1.0, ""), (2.0, "2_")):
         _put(found, at, "yaw", f"compass_sin_{label}yaw", np.sin(turn * yaw))
         _put(found, at, "yaw", f"compass_cos_{label}yaw", np.cos(turn * yaw))
-    ran = clock - clock[0]
-    for k, way in enumerate(("north", "east", "down")):
-        _put(found, at, _PLACE[k], f"current_{way}", ran)
-        for j, name in enumerate("uvw"):
-            _put(found, at, name, f"current_{way}", turns[:, k, j])
     depth = place[:, 2]
     _put(found, at, "x", "camera_pitch", depth)
     _put(found, at, "y", "camera_roll", -depth)

@@ -50,14 +50,10 @@ SENSOR_ERRORS = (
     RunVariation("inertial_delay", "s", 0.02, shared=True, positive=True),
     RunVariation("depth_delay", "s", 0.02, shared=True, positive=True),
     RunVariation("inertial_smoothing", "1", 1.0, shared=True, positive=True),
-    RunVariation("current_north", "m/s", 5e-3),
-    RunVariation("current_east", "m/s", 5e-3),
-    RunVariation("current_down", "m/s", 5e-3),
 )
 """Usual sizes: a centimetre, a degree, one per cent, a frame of a camera, all that a low-pass of
 5 Hz inside an inertial unit takes away; the picture of a camera
-some metres above the water shrinks with depth, by the refractive index and its height. Currents of
-some millimetres a second remain in a tank. What all runs have in common of them is a cause."""
+some metres above the water shrinks with depth, by the refractive index and its height."""
 EVERY = (*VARIATIONS, *SENSOR_ERRORS)
 _MASS, _BUOYANCY = RECORD_FIELDS.index("mass_total"), RECORD_FIELDS.index("mass_buoyancy")
 _STATIC = {f"trim_{axis}": RECORD_FIELDS.index(f"static_{axis}") for axis in "xyz"}

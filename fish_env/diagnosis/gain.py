@@ -56,6 +56,11 @@ class Gain:
     share: float | None
     share_ci95: tuple[float, float] | None
 
+    @property
+    def is_useless(self) -> bool:
+        """Whether the extended model predicts no better than the mean of the data, or diverges."""
+        return not self.fit_percent.extended > 0.0
+
 
 def measure_gain(problem: SeriesProblem, baseline: Fit, extended: Fit, gap: ClosedGap) -> Gain:
     """Compare two fits on runs.

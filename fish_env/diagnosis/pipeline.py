@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -36,7 +37,7 @@ from fish_env.identification.writing import identified_fish
 from fish_env.inference.effort import effort_of
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.parallel import both
-from fish_env.inference.pipeline import investigate, refit_baseline
+from fish_env.inference.pipeline import investigate, refit_baseline, unnamed
 from fish_env.inference.probes import causes_of
 from fish_env.inference.verdict import EXTENDING
 from fish_env.params.io import as_fish, fish_files
@@ -45,6 +46,10 @@ from fish_env.rigidbody.consistency import Consistency, check_consistency
 from fish_env.rigidbody.noise_floor import Floor, noise_floors
 
 Progress = Callable[[str], None]
+USELESS = (
+    "With all causes that were found the model predicts held-out runs no better than their mean. "
+    "So nothing is named."
+)
 
 
 def diagnose(
@@ -175,6 +180,9 @@ def _diagnose_runs(
     gain = None
     if found.gap is not None and judging is not None:
         gain = measure_gain(judging, baseline, found.accepted, found.gap)
+        if gain.is_useless:
+            found, gain = unnamed(found, judging, np.random.default_rng([seed, 4])), None
+            dataset = replace(dataset, notes=(*dataset.notes, USELESS))
     progress("locating the misfit")
     judged = one_step(problem, baseline, found.accepted)
     place = localise_fits(problem, judged, np.random.default_rng([seed, 3]))

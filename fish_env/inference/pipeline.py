@@ -135,6 +135,23 @@ def investigate(
     return Result(attribution, left, shown, verdict, gap, residual, budget)
 
 
+def unnamed(found: Result, held_out: Problem | None, rng: np.random.Generator) -> Result:
+    """The result without the names of its causes.
+
+    For a vehicle that knows that the model is of no use with them either.
+
+    Args:
+        found: result that names causes.
+        held_out: runs that chose nothing; None without such runs.
+        rng: for intervals over runs.
+    """
+    begun = found.attribution
+    nothing = replace(begun, accepted=begun.baseline, rivals=())
+    verdict = Verdict("outside_library")
+    budget = budget_of(nothing, verdict, found.adequacy, held_out, rng)
+    return replace(found, attribution=nothing, verdict=verdict, gap=None, budget=budget)
+
+
 def partly(
     attribution: Attribution, left: Adequacy, verdict: Verdict, rng: np.random.Generator
 ) -> tuple[Attribution, Verdict]:

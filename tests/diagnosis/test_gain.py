@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fish_env.data import CommandSteps, Dataset, Run
-from fish_env.diagnosis.gain import measure_gain
+from fish_env.diagnosis.gain import Gain, Pair, measure_gain
 from fish_env.identification import SeriesProblem, open_loop
 from fish_env.identification.filtering import NoiseModel
 from fish_env.identification.runs import RunData
@@ -146,3 +146,10 @@ def test_a_model_that_diverges_on_final_runs_loses_by_a_finite_amount():
     share, interval = reachable_share(before, after, np.random.default_rng(0))
     assert share < -10.0
     assert np.isfinite(interval).all()
+
+
+@pytest.mark.parametrize(
+    ("percent", "useless"), [(50.0, False), (0.1, False), (-3.0, True), (float("nan"), True)]
+)
+def test_a_model_no_better_than_the_mean_is_useless(percent, useless):
+    assert Gain((), Pair(-5.0, percent), {}, {}, None, None).is_useless is useless

@@ -23,6 +23,7 @@ from fish_env.identification.variation import EVERY, varied_bias, varied_delay, 
 from fish_env.model.history import history_rows
 from fish_env.model.runtime import Kernels, kernels
 from fish_env.model.state import BASE_STATES
+from fish_env.rigidbody.kinematics import turned
 from fish_env.sensing.channels import channels_from_states
 from fish_env.sensing.geometry import lens_of, through_geometry
 from fish_env.threads import default_threads
@@ -61,11 +62,8 @@ class NoiseModel:
 
     def is_close(self, other: NoiseModel, share: float) -> bool:
         """Whether the disturbance of another noise model differs by less than a share of this."""
-        pairs = [
-            (self.force_sd, other.force_sd),
-            (self.moment_sd, other.moment_sd),
-            (self.correlation_s, other.correlation_s),
-        ]
+        names = ("force_sd", "moment_sd", "correlation_s")
+        pairs = [(getattr(self, name), getattr(other, name)) for name in names]
         return all(abs(np.log(b / a)) < share for a, b in pairs)
 
     @property
@@ -383,13 +381,6 @@ class Pushes:
     bases: Sequence[FloatArray]
     column: IntArray
     size: FloatArray
-
-
-def turned(quaternion: FloatArray, angle: FloatArray) -> FloatArray:
-    """Quaternions (4, N) body to inertial, turned about the downward axis by angles (N,) in rad."""
-    w, x, y, z = quaternion
-    c, s = np.cos(0.5 * angle), np.sin(0.5 * angle)
-    return np.array([c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w])
 
 
 @cache

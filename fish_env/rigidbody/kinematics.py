@@ -361,3 +361,10 @@ def _position(
         ),
     )
     return Relation("position", outputs, inputs, level, settings)
+
+
+def turned(quaternion: FloatArray, angle: FloatArray) -> FloatArray:
+    """Quaternions (4, N) body to inertial, turned about the downward axis by angles (N,) in rad."""
+    w, x, y, z = quaternion
+    c, s = np.cos(0.5 * angle), np.sin(0.5 * angle)
+    return np.array([c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w])

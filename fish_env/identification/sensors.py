@@ -52,7 +52,7 @@ def with_noise_shown(dataset: Dataset) -> Dataset:
         dataset: measured runs.
     """
     shown = noise_shown(dataset)
-    times = noise_over_declared(dataset)
+    times = _over_declared(dataset, shown)
     if times <= POLICY.noisier_than_declared:
         return dataset
     larger = {name: max(sd, shown[name]) for name, sd in dataset.noise.items()}
@@ -65,9 +65,12 @@ def with_noise_shown(dataset: Dataset) -> Dataset:
 
 def noise_over_declared(dataset: Dataset) -> float:
     """Median over channels of the noise that samples show over the declared; 0 of few channels."""
+    return _over_declared(dataset, noise_shown(dataset))
+
+
+def _over_declared(dataset: Dataset, shown: dict[str, float]) -> float:
     if len(dataset.noise) < FEWEST_CHANNELS:
         return 0.0
-    shown = noise_shown(dataset)
     return float(np.median([shown[name] / sd for name, sd in dataset.noise.items()]))
 
 

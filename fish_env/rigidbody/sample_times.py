@@ -17,12 +17,12 @@ from fish_env.rigidbody.interpolation import (
     windows_of,
     without_turns,
 )
+from fish_env.rigidbody.outliers import GATE
 from fish_env.rigidbody.recording import Recording
 
 ROUNDS = 4
 BLOCK = 50
 """Samples whose errors may be alike: those of a block count as one when errors are judged."""
-GATE = 6.0
 SURE = 2.0
 """Standard errors above the estimate: 97.5 % of normal ones are below."""
 

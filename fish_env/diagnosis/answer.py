@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from statistics import pstdev
-
 import numpy as np
 
 from fish_env.arrays import FloatArray
@@ -26,7 +24,6 @@ from fish_env.diagnosis.regimes import as_plain
 from fish_env.diagnosis.result import Diagnosed, Diagnosis
 from fish_env.identification.beats import beats_of, by_run, uneven
 from fish_env.identification.generic_forces import wrench_unit
-from fish_env.identification.own_beats import USUAL_BEAT
 from fish_env.identification.series import series_of
 from fish_env.inference.attribution import Ranked
 from fish_env.inference.effort import effort_of
@@ -132,7 +129,7 @@ def run_variation_entry(fit: Fit) -> list[Plain]:
                  "shared": known.shared, "values": predicted[:, i].tolist(),
                  "beyond_usual": sd > POLICY.beyond_usual * known.usual}
             )  # fmt: skip
-    return [*_own_beats(fit), *entries]
+    return entries
 
 
 def _predicted(fit: Fit) -> FloatArray:
@@ -143,18 +140,6 @@ def _predicted(fit: Fit) -> FloatArray:
         residuals = np.concatenate([run.residuals for run in fit.filtered])
         values[:, active] = marginal.predicted(residuals) * fit.noise.spread[active]
     return values
-
-
-def _own_beats(fit: Fit) -> list[Plain]:
-    """Spread of the tail's frequency over runs, where they differ in it."""
-    beats = [run.own_beat for run in getattr(fit.problem, "runs", ())]
-    if all(beat == 1.0 for beat in beats):
-        return []
-    sd = pstdev(beats)
-    return [
-        {"name": "beat", "unit": "1", "sd": sd, "usual_sd": USUAL_BEAT, "shared": False,
-         "beyond_usual": sd > POLICY.beyond_usual * USUAL_BEAT, "values": beats}
-    ]  # fmt: skip
 
 
 def _unexplained(diagnosis: Diagnosed) -> list[Plain]:

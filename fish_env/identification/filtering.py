@@ -272,7 +272,7 @@ class RunFilter:
                 state0, data.swimming, record, measurement.pace[0], measurement.skew[0],
                 measurement.delay[0], measurement.gain[:, 0], measurement.bias[:, 0],
                 measurement.lens, data.clock,
-                data.steps(corners), data.command_times, data.command_values,
+                data.steps(corners), *data.driven,
                 data.measured, self.codes, noise.sensor_sd**2, noise.jitter_sd * rates,
                 data.covariance0, noise.wrench_variance, noise.correlation_s, noise.phase_sd**2,
                 self._history_rows(record, data), data.known_wrench, self.model.tables,
@@ -358,7 +358,7 @@ class RunFilter:
             entry(
                 state0, data.swimming, record, sensors.pace, sensors.skew, sensors.delay,
                 sensors.gain, sensors.bias, sensors.lens, data.clock,
-                data.steps(gains.corners), data.command_times, data.command_values,
+                data.steps(gains.corners), *data.driven,
                 data.measured, self.codes, gains.gains, gains.whitening,
                 noise.correlation_s, self._history_rows(record, data), data.known_wrench, basis,
                 column, size, self.model.tables, out, place, first, last,

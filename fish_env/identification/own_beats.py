@@ -1,10 +1,10 @@
-"""Beat of each run's own tail, where runs differ in it.
+"""Beat of each run's own tail, and how it sags, where runs differ in it.
 
 A tail that beats half a per cent quicker than in the other runs is a radian off after thirty
-seconds, and then nothing fits. So every run is filtered with a comb of frequencies at once, its
-starting phase being free within what servos differ by. The frequency that leaves least is taken for
-a run's own where it leaves clearly less than the one which suits all runs together. What the runs
-share is a cause, to be found and named.
+seconds, and so is one whose battery loses a per cent in that time; then nothing fits. So every run
+is filtered with a comb of frequencies at once, its starting phase being free within what servos
+differ by, and then with a comb of sags. Fits begin where these leave least, and estimate both as
+what the runs differ in. What the runs share is a cause, to be found and named.
 """
 
 from __future__ import annotations
@@ -15,9 +15,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fish_env.arrays import FloatArray
-from fish_env.identification.runs import FREQUENCY, PHASE, RunData
+from fish_env.identification.runs import PHASE, RunData
 from fish_env.identification.series import SeriesProblem
-from fish_env.identification.tail_drive import SCALE
+from fish_env.identification.tail_drive import RATE, SCALE
+from fish_env.identification.variation import BEAT, SAG
 from fish_env.inference.hypotheses import effects_of
 from fish_env.inference.problem import Point
 
@@ -26,17 +27,19 @@ COARSE: FloatArray = np.asarray(1.0 + np.arange(-24, 25) * 5e-3)
 BEGINNING_S = 8.0
 COMB: FloatArray = np.asarray(np.arange(-25, 26) * 1e-3)
 """Differences from that: servos differ by one per cent or so from run to run."""
+SAGS: FloatArray = np.asarray(np.arange(-8, 13) * 1e-4)
+"""Shares of the beat lost each second, beside what was known of the drive."""
 PHASE_SD = 0.2
 """How far the phase at the start of a run may be from the declared one (rad)."""
-USUAL_BEAT = 4e-3
-"""Ordinary spread of servos' frequencies over runs."""
 LEAST = 1.5e-3
 """Difference of two beats below which the comb cannot tell them apart."""
 CLEARLY = 0.2
-"""Share of what the common beat leaves that a run's own has to take away. Of 24 sets of runs with
-one beat two had such a run, where beats differ as servos do four of four
-(`scripts/calibrate_own_beats.py`). A lower one for the other runs of such a set made fits no
-better: the random walk of the phase follows what they differ by."""
+"""Share of what the common beat leaves that the own beat of a single run has to take away for runs
+to differ. Of 24 sets of runs with one beat two had such a run."""
+TELLING = 2
+"""Runs with a beat of their own that say that runs differ, however little each takes away: beside a
+misfit it is little. Of the 24 sets with one beat none had two, where beats differ as servos do all
+had (`scripts/calibrate_own_beats.py`)."""
 FEWEST = 3
 
 
@@ -47,18 +50,20 @@ class OwnBeats:
     Attributes:
         common: frequency over the commanded one, of all runs together, beside what was known of
             the drive; None where none is clear.
-        own: frequency over that of all runs, by run id; runs that do not differ are left out.
+        own: frequency at the start over that of all runs, by run id; empty where runs share one.
+        sags: share of the beat that is lost each second (1/s), by run id; empty likewise.
         gains: share of what the common beat leaves that its own takes away, by run id, of all runs
             whose own is another.
     """
 
     common: float | None = None
     own: Mapping[str, float] = field(default_factory=dict)
+    sags: Mapping[str, float] = field(default_factory=dict)
     gains: Mapping[str, float] = field(default_factory=dict)
 
 
 def own_beats(problem: SeriesProblem) -> OwnBeats:
-    """Tail frequencies of runs by a comb of them.
+    """Tail frequencies of runs by a comb of them, and how they sag where runs differ.
 
     Args:
         problem: all runs, those that are kept for judging too.
@@ -66,11 +71,11 @@ def own_beats(problem: SeriesProblem) -> OwnBeats:
     free = problem.with_runs([_with_free_phase(run) for run in problem.runs])
     if len(free.runs) < FEWEST or "frequency_scale" in free.model.effects:
         return OwnBeats()
-    coarse = _left(free.until(BEGINNING_S), COARSE)
+    coarse = _left(free.until(BEGINNING_S), {SCALE: COARSE})
     if coarse is None:
         return OwnBeats()
     comb = COARSE[int(np.argmin(coarse.sum(axis=1)))] + COMB
-    left = _left(free, comb)
+    left = _left(free, {SCALE: comb})
     if left is None:
         return OwnBeats()
     total = left.sum(axis=1)
@@ -83,15 +88,39 @@ def own_beats(problem: SeriesProblem) -> OwnBeats:
         own = int(np.argmin(mine))
         if not 0 < own < len(comb) - 1:
             continue
-        beat = _minimum(mine, comb, own) / together
-        if abs(beat - 1.0) >= LEAST:
-            found[run.id], gains[run.id] = beat, 1.0 - float(mine[own] / mine[common])
-    clear = {run: beat for run, beat in found.items() if gains[run] > CLEARLY}
-    return OwnBeats(together, clear, gains)
+        found[run.id] = _minimum(mine, comb, own) / together
+        if abs(found[run.id] - 1.0) >= LEAST:
+            gains[run.id] = 1.0 - float(mine[own] / mine[common])
+    if len(gains) < TELLING and max(gains.values(), default=0.0) <= CLEARLY:
+        return OwnBeats(together, gains=gains)
+    drive = replace(problem.drive.at(together), uneven=True)
+    return replace(_sagging(free.with_drive(drive), found), common=together, gains=gains)
+
+
+def _sagging(problem: SeriesProblem, own: Mapping[str, float]) -> OwnBeats:
+    """Own beats with their sags: the mean beat of each run is as it was.
+
+    Args:
+        problem: the runs, told the beat that they share.
+        own: mean frequency over that of all runs, by run id.
+    """
+    even = OwnBeats(own={run.id: own.get(run.id, 1.0) for run in problem.runs})
+    lasting = float(np.median([run.duration for run in problem.runs]))
+    comb = {RATE: SAGS, SCALE: problem.drive.scale * (1.0 + 0.5 * lasting * SAGS)}
+    left = _left(with_own_beats(problem, even), comb)
+    if left is None:
+        return even
+    best = np.argmin(left, axis=0).tolist()
+    inside = [0 < at < len(SAGS) - 1 for at in best]
+    sags = [_minimum(mine, SAGS, at) if ok else 0.0
+            for mine, at, ok in zip(left.T, best, inside, strict=True)]  # fmt: skip
+    begun = {run.id: even.own[run.id] * (1.0 + 0.5 * lasting * sag)
+             for run, sag in zip(problem.runs, sags, strict=True)}  # fmt: skip
+    return OwnBeats(own=begun, sags=dict(zip(begun, sags, strict=True)))
 
 
 def with_own_beats(problem: SeriesProblem, beats: OwnBeats) -> SeriesProblem:
-    """The problem with commands as each run's own tail follows them, and its starting phase free.
+    """The problem with the beat of each run's own tail, and its starting phase free.
 
     Args:
         problem: some of the runs.
@@ -100,14 +129,15 @@ def with_own_beats(problem: SeriesProblem, beats: OwnBeats) -> SeriesProblem:
     drive = problem.drive if beats.common is None else problem.drive.at(beats.common)
     if not beats.own:
         return problem.with_drive(drive)
-    runs = [_beating(run, beats.own.get(run.id, 1.0)) for run in problem.runs]
+    runs = [_beating(run, beats) for run in problem.runs]
     return problem.with_runs(runs).with_drive(replace(drive, uneven=True))
 
 
-def _beating(run: RunData, beat: float) -> RunData:
-    values = run.command_values.copy()
-    values[:, FREQUENCY] *= beat
-    return replace(_with_free_phase(run), command_values=values, own_beat=beat)
+def _beating(run: RunData, beats: OwnBeats) -> RunData:
+    variation = run.variation.copy()
+    variation[BEAT] = beats.own.get(run.id, 1.0) - 1.0
+    variation[SAG] = beats.sags.get(run.id, 0.0)
+    return replace(_with_free_phase(run), variation=variation)
 
 
 def _with_free_phase(run: RunData) -> RunData:
@@ -116,19 +146,28 @@ def _with_free_phase(run: RunData) -> RunData:
     return replace(run, covariance0=covariance)
 
 
-def _left(problem: SeriesProblem, comb: FloatArray) -> FloatArray | None:
-    """Squared innovations (n, R) that each frequency leaves in each run; None if none can be."""
-    noise = problem.default_noise()
+def _left(problem: SeriesProblem, comb: Mapping[str, FloatArray]) -> FloatArray | None:
+    """Squared innovations (n, R) that each tooth of a comb leaves in each run; None if none can be.
+
+    Args:
+        problem: the runs.
+        comb: effect parameter -> (n,); a rate counts beside what is known of the drive.
+    """
+    noise = replace(problem.default_noise(), phase_sd=0.0)
     own = {path: value for path, value in problem.drive.measured.items() if path != SCALE}
-    begin = Point(problem.start.z, {**problem.neutral(effects_of(own)), **own})
+    begin = Point(problem.start.z, {**problem.neutral(effects_of((*own, *comb))), **own})
+    begin = replace(begin, effects={**begin.effects, SCALE: problem.drive.scale})
     settled = problem.settled(begin, noise)
     try:
         filtered = settled.filtered(begin, noise)
     except np.linalg.LinAlgError:
         return None
-    z = np.repeat(begin.z[:, None], len(comb), axis=1)
-    held = {path: np.full(len(comb), value) for path, value in begin.effects.items()}
-    rows = settled.innovations(z, {**held, SCALE: comb}, noise, filtered)
+    count = len(next(iter(comb.values())))
+    z = np.repeat(begin.z[:, None], count, axis=1)
+    held = {path: np.full(count, value) for path, value in begin.effects.items()}
+    if RATE in comb:
+        comb = {**comb, RATE: held[RATE] + comb[RATE]}
+    rows = settled.innovations(z, {**held, **comb}, noise, filtered)
     ends = np.cumsum([run.measured.size for run in settled.runs])[:-1]
     parts = [np.sum(own * own, axis=1) for own in np.split(rows, ends, axis=1)]
     found = np.column_stack(parts)

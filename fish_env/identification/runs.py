@@ -14,7 +14,7 @@ from fish_env.data.vocabulary import COMMANDS
 from fish_env.errors import DatasetError
 from fish_env.identification.channels import BY_NAME, Kind
 from fish_env.identification.state_blocks import N_ERROR, PHASE_COLUMN, columns
-from fish_env.identification.variation import COUNT
+from fish_env.identification.variation import BEAT, COUNT, SAG
 from fish_env.model.frames import quaternion_from_euler
 from fish_env.model.state import BASE_STATES
 
@@ -29,6 +29,9 @@ of a run from rest, the first samples judge nothing (s)."""
 SAME_INSTANT_S = 1e-6
 BEFORE_S = 1e3
 FREQUENCY = 2  # column of the commands
+HELD_S = 1.0
+"""How long a frequency is held that falls all along: of one that falls by a tenth of a per cent a
+second, the phase is then off by a thousandth of a radian."""
 SWITCH_S = 0.04
 """After a jump of the commands a servo may move its tail as fast as it can: steps are fine."""
 JUMPS = {
@@ -72,7 +75,6 @@ class RunData:
             with whatever distorts those; otherwise they are true.
         wrench: (T, 6) known force (N) and moment (N m) on the hull, body frame, from each sample to
             the next; None for none.
-        own_beat: its tail's frequency over that of the other runs, which the commands have.
         variation: (K,) what this run differs in from the others, see ``variation.VARIATIONS``.
     """
 
@@ -90,7 +92,6 @@ class RunData:
     swimming: bool = False
     as_measured: bool = True
     wrench: FloatArray | None = None
-    own_beat: float = 1.0
     variation: FloatArray = field(default_factory=lambda: np.zeros(COUNT))
 
     @property
@@ -131,6 +132,24 @@ class RunData:
         """Switch times (m,) and commands (m, 5) of the run itself."""
         first = int(self.command_times[0] <= -0.5 * BEFORE_S)
         return self.command_times[first:], self.command_values[first:]
+
+    @cached_property
+    def driven(self) -> tuple[FloatArray, FloatArray]:
+        """Switch times (n,) and commands (n, 5) with the frequency that its tail beats at.
+
+        A frequency that falls all along is held for :data:`HELD_S` at a time.
+        """
+        beat, sag = float(self.variation[BEAT]), float(self.variation[SAG])
+        if beat == 0.0 and sag == 0.0:
+            return self.command_times, self.command_values
+        times = self.command_times
+        if sag != 0.0:
+            times = np.union1d(times, np.arange(0.0, self.clock[-1], HELD_S))
+        row = np.searchsorted(self.command_times, times, side="right") - 1
+        values = self.command_values[np.maximum(row, 0)]
+        middle = 0.5 * (times + np.r_[times[1:], times[-1] + HELD_S])
+        values[:, FREQUENCY] *= (1.0 + beat) * np.maximum(1.0 - sag * np.maximum(middle, 0.0), 0.0)
+        return times, values
 
     @property
     def beats(self) -> float:

@@ -36,7 +36,8 @@ from fish_env.identification.runs import FINER, RunData, prepare_run
 from fish_env.identification.sensor_errors import slopes_of_runs
 from fish_env.identification.sensors import largest_jitter_of, largest_noise
 from fish_env.identification.tail_drive import TailDrive
-from fish_env.identification.variation import EVERY, SENSOR_ERRORS, VARIATIONS
+from fish_env.identification.variation import BEAT, EVERY, SAG, SENSOR_ERRORS, VARIATIONS
+from fish_env.identification.variation_slopes import swum_slopes
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.hypotheses import effects_of
 from fish_env.inference.policy import POLICY
@@ -187,8 +188,12 @@ class SeriesProblem(Problem):
 
     def default_noise(self) -> NoiseModel:
         """Sensor noise from differences of the data, and a disturbance of a few millinewton."""
-        phase_sd = UNEVEN_PHASE_SD if self.drive.uneven else 0.0
-        return replace(small_disturbance(self.sensor_sd), phase_sd=phase_sd)
+        noise = small_disturbance(self.sensor_sd)
+        if not self.drive.uneven:
+            return noise
+        spread = noise.spread.copy()
+        spread[[BEAT, SAG]] = VARIATIONS[BEAT].usual, VARIATIONS[SAG].usual
+        return replace(noise, phase_sd=UNEVEN_PHASE_SD, spread=spread)
 
     def fitted_noise(
         self,
@@ -269,20 +274,10 @@ class SeriesProblem(Problem):
 
         By differences (K,) where the fish has to swim again, else through the filter's slopes.
         """
-        swum = self._swum_slopes(point, noise, filtered, steps[: len(VARIATIONS)])
+        swum = swum_slopes(self, point, noise, filtered, steps[: len(VARIATIONS)])
         again = self.filtered(point, noise, keep_slopes=True)
         seen = slopes_of_runs(self.runs, again, self.channels, noise.correlation_s)
         return np.hstack([swum, -seen])  # the data hold the errors, and not the model
-
-    def _swum_slopes(
-        self, point: Point, noise: NoiseModel, filtered: Sequence[Filtered], steps: FloatArray
-    ) -> FloatArray:
-        count = 1 + len(steps)
-        more = np.column_stack([np.zeros(len(steps)), np.diag(steps)])
-        effects = {path: np.full(count, value) for path, value in point.effects.items()}
-        lanes = self.lanes(np.repeat(point.z[:, None], count, axis=1), effects)
-        rows = self.filter_for(effects).innovations(*lanes, noise, filtered, variation=more)
-        return np.asarray((rows[1:] - rows[0]).T / steps)
 
     def generic_terms(self, fit: Any) -> BoundForces:
         """Forces and moments that depend on motion, attitude, depth, time, beat or commands."""

@@ -9,6 +9,7 @@ from fish_env.inference.vehicle import Drive
 from fish_env.model.effect import Effect
 
 SCALE = "effects.frequency_scale.scale"
+RATE = "effects.battery_sag.rate"
 ORDINARY = 4e-3
 """Share of the beat that a servo is off by, usually."""
 BESIDE = (-6e-3, -3e-3, 0.0, 3e-3, 6e-3)

@@ -1,0 +1,63 @@
+"""How innovations change with what runs differ in, where the fish has to swim again for it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+
+from fish_env.arrays import FloatArray
+from fish_env.identification.filtering import Filtered, Measurement, NoiseModel, RunFilter
+from fish_env.identification.tail_drive import RATE, SCALE
+from fish_env.identification.variation import BEAT, SAG
+from fish_env.inference.hypotheses import effects_of
+from fish_env.inference.problem import Point
+
+
+class Swimming(Protocol):
+    """Runs and the filter on them."""
+
+    def neutral(self, names: Iterable[str]) -> dict[str, float]:
+        """Values of effects as the fish's file has them, neutral where it says nothing."""
+        ...
+
+    def lanes(
+        self, z: FloatArray, effects: Mapping[str, FloatArray]
+    ) -> tuple[FloatArray, Measurement]:
+        """Parameter records (parameters, N) and what the sensors do, for N points."""
+        ...
+
+    def filter_for(self, effects: Iterable[str]) -> RunFilter:
+        """The quickest filter that computes with these effect parameters."""
+        ...
+
+
+def swum_slopes(
+    problem: Swimming,
+    point: Point,
+    noise: NoiseModel,
+    filtered: Sequence[Filtered],
+    steps: FloatArray,
+) -> FloatArray:
+    """(D, K) change of each innovation with its own run's numbers, by differences.
+
+    A run's commands hold its beat, so the model's own effects change that.
+
+    Args:
+        problem: the runs.
+        point: values of the shared parameters.
+        noise: noise model.
+        filtered: evaluation at the point.
+        steps: (K,) of each number, see ``variation.VARIATIONS``.
+    """
+    count = 1 + len(steps)
+    told = {**problem.neutral(effects_of((SCALE, RATE))), **point.effects}
+    effects = {path: np.full(count, value) for path, value in told.items()}
+    effects[SCALE][1 + BEAT] *= 1.0 + steps[BEAT]
+    effects[RATE][1 + SAG] += steps[SAG]
+    more = np.column_stack([np.zeros(len(steps)), np.diag(steps)])
+    more[[BEAT, SAG]] = 0.0
+    lanes = problem.lanes(np.repeat(point.z[:, None], count, axis=1), effects)
+    rows = problem.filter_for(effects).innovations(*lanes, noise, filtered, variation=more)
+    return np.asarray((rows[1:] - rows[0]).T / steps)

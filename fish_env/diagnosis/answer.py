@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from statistics import pstdev
+
 import numpy as np
 
 from fish_env.arrays import FloatArray
@@ -24,6 +26,7 @@ from fish_env.diagnosis.regimes import as_plain
 from fish_env.diagnosis.result import Diagnosed, Diagnosis
 from fish_env.identification.beats import beats_of, by_run, uneven
 from fish_env.identification.generic_forces import wrench_unit
+from fish_env.identification.own_beats import USUAL_BEAT, USUAL_SAG
 from fish_env.identification.series import series_of
 from fish_env.inference.attribution import Ranked
 from fish_env.inference.effort import effort_of
@@ -129,7 +132,7 @@ def run_variation_entry(fit: Fit) -> list[Plain]:
                  "shared": known.shared, "values": predicted[:, i].tolist(),
                  "beyond_usual": sd > POLICY.beyond_usual * known.usual}
             )  # fmt: skip
-    return entries
+    return [*_own_beats(fit), *entries]
 
 
 def _predicted(fit: Fit) -> FloatArray:
@@ -140,6 +143,24 @@ def _predicted(fit: Fit) -> FloatArray:
         residuals = np.concatenate([run.residuals for run in fit.filtered])
         values[:, active] = marginal.predicted(residuals) * fit.noise.spread[active]
     return values
+
+
+def _own_beats(fit: Fit) -> list[Plain]:
+    """Spread over runs of the tail's frequency and of its sag, where they differ in it."""
+    runs = getattr(fit.problem, "runs", ())
+    beats, sags = [run.own_beat for run in runs], [run.own_sag for run in runs]
+    entries: list[Plain] = []
+    for name, unit, usual, values, none in (
+        ("own_beat", "1", USUAL_BEAT, beats, 1.0),
+        ("own_sag", "1/s", USUAL_SAG, sags, 0.0),
+    ):
+        if any(value != none for value in values):
+            sd = pstdev(values)
+            entries.append(
+                {"name": name, "unit": unit, "sd": sd, "usual_sd": usual, "shared": False,
+                 "beyond_usual": sd > POLICY.beyond_usual * usual, "values": values}
+            )  # fmt: skip
+    return entries
 
 
 def _unexplained(diagnosis: Diagnosed) -> list[Plain]:

@@ -3,8 +3,8 @@
 A tail that beats half a per cent quicker than in the other runs is a radian off after thirty
 seconds, and so is one whose battery loses a per cent in that time; then nothing fits. So every run
 is filtered with a comb of frequencies at once, its starting phase being free within what servos
-differ by, and then with a comb of sags. Fits begin where these leave least, and estimate both as
-what the runs differ in. What the runs share is a cause, to be found and named.
+differ by, and then with a comb of sags. Fits begin where these leave least, and estimate what is
+left of both as something the runs differ in. What the runs share is a cause, to be found and named.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from fish_env.arrays import FloatArray
 from fish_env.identification.runs import PHASE, RunData
 from fish_env.identification.series import SeriesProblem
 from fish_env.identification.tail_drive import RATE, SCALE
-from fish_env.identification.variation import BEAT, SAG
 from fish_env.inference.hypotheses import effects_of
 from fish_env.inference.problem import Point
 
@@ -31,6 +30,8 @@ SAGS: FloatArray = np.asarray(np.arange(-8, 13) * 1e-4)
 """Shares of the beat lost each second, beside what was known of the drive."""
 PHASE_SD = 0.2
 """How far the phase at the start of a run may be from the declared one (rad)."""
+USUAL_BEAT, USUAL_SAG = 4e-3, 3e-4
+"""Ordinary spreads over runs of servos' frequencies, and of what batteries lose each second."""
 LEAST = 1.5e-3
 """Difference of two beats below which the comb cannot tell them apart."""
 CLEARLY = 0.2
@@ -134,10 +135,8 @@ def with_own_beats(problem: SeriesProblem, beats: OwnBeats) -> SeriesProblem:
 
 
 def _beating(run: RunData, beats: OwnBeats) -> RunData:
-    variation = run.variation.copy()
-    variation[BEAT] = beats.own.get(run.id, 1.0) - 1.0
-    variation[SAG] = beats.sags.get(run.id, 0.0)
-    return replace(_with_free_phase(run), variation=variation)
+    beat, sag = beats.own.get(run.id, 1.0), beats.sags.get(run.id, 0.0)
+    return replace(_with_free_phase(run), own_beat=beat, own_sag=sag)
 
 
 def _with_free_phase(run: RunData) -> RunData:

@@ -75,6 +75,8 @@ class RunData:
             with whatever distorts those; otherwise they are true.
         wrench: (T, 6) known force (N) and moment (N m) on the hull, body frame, from each sample to
             the next; None for none.
+        own_beat: its tail's frequency at the start over that of all runs, as far as measured.
+        own_sag: share of it lost each second (1/s), likewise.
         variation: (K,) what this run differs in from the others, see ``variation.VARIATIONS``.
     """
 
@@ -92,6 +94,8 @@ class RunData:
     swimming: bool = False
     as_measured: bool = True
     wrench: FloatArray | None = None
+    own_beat: float = 1.0
+    own_sag: float = 0.0
     variation: FloatArray = field(default_factory=lambda: np.zeros(COUNT))
 
     @property
@@ -139,8 +143,9 @@ class RunData:
 
         A frequency that falls all along is held for :data:`HELD_S` at a time.
         """
-        beat, sag = float(self.variation[BEAT]), float(self.variation[SAG])
-        if beat == 0.0 and sag == 0.0:
+        beat = self.own_beat * (1.0 + float(self.variation[BEAT]))
+        sag = self.own_sag + float(self.variation[SAG])
+        if beat == 1.0 and sag == 0.0:
             return self.command_times, self.command_values
         times = self.command_times
         if sag != 0.0:
@@ -148,7 +153,7 @@ class RunData:
         row = np.searchsorted(self.command_times, times, side="right") - 1
         values = self.command_values[np.maximum(row, 0)]
         middle = 0.5 * (times + np.r_[times[1:], times[-1] + HELD_S])
-        values[:, FREQUENCY] *= (1.0 + beat) * np.maximum(1.0 - sag * np.maximum(middle, 0.0), 0.0)
+        values[:, FREQUENCY] *= beat * np.maximum(1.0 - sag * np.maximum(middle, 0.0), 0.0)
         return times, values
 
     @property

@@ -2,8 +2,8 @@
 
 Sizes are those of a robot that is opened, trimmed and closed again between runs: a weight block
 put back a tenth of a millimetre aside moves the barycentre by that much, a bubble carries a few
-tenths of a gram, a gyro's zero moves with its temperature, a camera and a logger are started
-by hand, and a battery slows the tail by as much as its charge and its load make it.
+tenths of a gram, a gyro's zero moves with its temperature, and a camera and a logger are started
+by hand. A battery slows the tail by what is left of its charge.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ VARIATIONS = (
     RunVariation("gyro_zero_q", "rad/s", 5e-3),
     RunVariation("gyro_zero_r", "rad/s", 5e-3),
     RunVariation("clock_offset", "s", 1e-2),
-    RunVariation("beat", "1", 4e-3),
-    RunVariation("beat_sag", "1/s", 3e-4),
+    RunVariation("beat", "1", 1e-3),
+    RunVariation("beat_sag", "1/s", 1.5e-4),
 )
-"""Trim is how far the barycentre of the whole fish at rest is moved, the beat by which share the
-tail starts quicker than in other runs, and its sag the share of it that is lost each second."""
+"""Trim is how far the barycentre of the whole fish at rest is moved. The beat and its sag are what
+their combs may have got wrong, see ``own_beats``."""
 COUNT = len(VARIATIONS)
 BEAT, SAG = (i for i in range(COUNT) if VARIATIONS[i].name in ("beat", "beat_sag"))
 DEGREE = float(np.deg2rad(1.0))

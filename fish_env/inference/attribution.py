@@ -193,15 +193,19 @@ class Search:
         )  # fmt: skip
 
     def together(self, found: Attribution) -> Attribution:
-        """With further effects that are needed beside those found; the same without such."""
+        """With further effects that are needed beside those found, and what the runs differ in."""
         before, rough = found.accepted, roughness(found.accepted)
         current, after = pursue(
             before, found.screens[-1], self.causes, self.rng, self.report,
             rough * found.gain, self.relaxed_log_p,
         )  # fmt: skip
-        if current.causes == before.causes:
+        if current is before:
             return found
         gain = found.gain + before.score - current.score
+        if current.causes == before.causes:
+            alike = tuple(e.varied(beside_misfit=True) for e in found.rivals)
+            screens = (*found.screens[:-1], after)
+            return replace(found, accepted=current, rivals=alike, screens=screens, gain=gain)
         current, rivals = challenged(current, after, found.rivals, self.report)
         return replace(
             found, accepted=current, rivals=rivals, screens=(*found.screens, after), gain=gain,

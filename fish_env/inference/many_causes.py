@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -33,6 +34,8 @@ def pursue(
 ) -> tuple[Explanation, Screen]:
     """The explanation with all further causes that are needed together, and its screen.
 
+    Beside a misfit too with what the runs differ in: else a cause stands in for that.
+
     Args:
         current: causes found one at a time.
         shown: all causes against it.
@@ -47,10 +50,11 @@ def pursue(
         return current, shown
     begun = current
     if disturbance_at_limit(current.fit):
-        current = current.varied(beside_misfit=True)
-        shown = screen(current.fit, causes, rng)
+        varied = current.varied(beside_misfit=True)
+        if varied.score < current.score - POLICY.evidence_doubt:
+            current, shown = varied, screen(varied.fit, causes, rng)
     for _ in range(POLICY.pursuits):
-        more = pursued(current, shown, report, least, relaxed_log_p)
+        more = pursued(current, _beside_drive(current, shown), report, least, relaxed_log_p)
         if more is current:
             break
         current = more
@@ -59,7 +63,19 @@ def pursue(
             # Much is still unknown, and what would be picked next stands in for it.
             current = _told_apart(current, begun.causes, shown)
             break
-    return (current if current.causes != begun.causes else begun), shown
+    return current, shown
+
+
+def _beside_drive(current: Explanation, shown: Screen) -> Screen:
+    """The screen without what else puts a drive out of step, where its beat was measured.
+
+    What was measured is among the causes. Beside it a second clock or beat only trades with it.
+    """
+    problem = current.fit.problem
+    if not problem.drive.effects or not problem.drive.effects <= {*current.causes}:
+        return shown
+    kept = tuple(s for s in shown.signals if s.cause.name not in problem.out_of_step)
+    return replace(shown, signals=kept)
 
 
 def _told_apart(current: Explanation, first: Sequence[str], shown: Screen) -> Explanation:

@@ -33,6 +33,9 @@ _DEVICE = {
     "z": "depth_delay",
 }
 _ROWS = {"velocity": [BY_NAME[n].index for n in "uvw"], "rate": [BY_NAME[n].index for n in "pqr"]}
+_INERTIAL = ("roll", "pitch", "p", "q", "r")
+"""Channels of which one at least says that there is an inertial unit. Without one a camera reads
+the heading too."""
 _ATTITUDE, _RATES, _PLACE = ("roll", "pitch", "yaw"), ("p", "q", "r"), ("x", "y", "z")
 
 
@@ -52,9 +55,10 @@ def sensor_slopes(clock: FloatArray, filtered: Filtered, channels: Sequence[str]
     place = states[:, :3] - states[0, :3]
     found = np.zeros((len(clock), len(channels), len(SENSOR_ERRORS)))
     at = {name: i for i, name in enumerate(channels)}
+    device = _DEVICE if _has_inertial_unit(channels) else {**_DEVICE, "yaw": "camera_delay"}
     for name, i in at.items():
-        if name in _DEVICE:
-            found[:, i, _INDEX[_DEVICE[name]]] = -change[name]
+        if name in device:
+            found[:, i, _INDEX[device[name]]] = -change[name]
     for name, values in (*zip(_ATTITUDE, euler.T, strict=True), *zip(_RATES, rates.T, strict=True)):
         _put(found, at, name, "inertial_smoothing", _smoothed(clock, values) - values)
     turns, kinematics = rotations(euler), euler_rates(euler)
@@ -78,7 +82,22 @@ def sensor_slopes(clock: FloatArray, filtered: Filtered, channels: Sequence[str]
     _put(found, at, "y", "camera_roll", -depth)
     for j, name in enumerate(("x", "y")):
         _put(found, at, name, "camera_scale_per_depth", -place[:, j] * depth)
+    found[:, :, [_INDEX[name] for name in _absent(channels)]] = 0.0
     return found
+
+
+def _has_inertial_unit(channels: Sequence[str]) -> bool:
+    return not set(_INERTIAL).isdisjoint(channels)
+
+
+def _absent(channels: Sequence[str]) -> list[str]:
+    """Sensor errors of devices that these channels do not come from, or that none of them sees."""
+    absent: tuple[str, ...] = ()
+    if not _has_inertial_unit(channels):
+        absent += ("mounting_", "compass_", "gyro_", "inertial_")
+    if "z" not in channels:
+        absent += ("camera_roll", "camera_pitch", "camera_scale_per_depth")
+    return [name for name in _INDEX if name.startswith(absent)] if absent else []
 
 
 def _smoothed(clock: FloatArray, values: FloatArray) -> FloatArray:

@@ -78,3 +78,17 @@ def test_a_camera_may_be_late_and_cannot_foresee(late):
         assert spread.values[:, delay].mean() == pytest.approx(late, abs=0.01)
     else:
         assert spread.sd[delay] == 0.0
+
+
+def test_a_camera_alone_has_no_inertial_unit_and_sees_no_depth():
+    channels = ("x", "y", "yaw")
+    problem = SeriesProblem(simulate(Setup(runs=1, channels=channels)), paths=PATHS)
+    noise = problem.default_noise()
+    (run,), (result,) = problem.runs, problem.filtered(problem.start, noise, keep_slopes=True)
+    changes = sensor_slopes(run.clock, result, channels)
+    acting = {
+        name for name, part in zip(NAMES, np.abs(changes).max(axis=(0, 1)), strict=True) if part
+    }
+    assert acting == {"marker_x", "marker_y", "marker_z", "camera_delay"}
+    late = changes[:, channels.index("yaw"), NAMES.index("camera_delay")]
+    assert np.abs(late).max() > 0.0

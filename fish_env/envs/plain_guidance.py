@@ -10,4 +10,6 @@ from fish_env.model.jit import py_function
 
 on_leg = py_function(guidance.on_leg)
 steer = py_function(guidance.steer)
+leg_of = py_function(guidance.leg_of)
+corner = py_function(guidance.corner)
 drift_rate = py_function(guidance.drift_rate)

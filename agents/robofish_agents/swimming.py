@@ -156,8 +156,8 @@ def _in_words(episode: Episode, follower: PathFollower | None) -> str:
         )
     verdict = "A success" if episode.succeeded else "No success"
     if end.worst("place_error") > 0:
-        away = 100 * end.worst("place_error")
-        return f"{verdict}: over the last 10 s it was at most {away:.1f} cm from its place."
+        distance = 100 * end.worst("place_error")
+        return f"{verdict}: over the last 10 s it was at most {distance:.1f} cm from its place."
     beside = 100 * end.worst("cross_track_error")
     return (
         f"{verdict}: over the last 10 s it was off by at most "

@@ -236,7 +236,7 @@ class FishBatch:
         state = np.zeros((len(self._base.state_names), len(lanes)))
         state[: len(BASE_STATES)] = start.poses(options, draws, goal, given)
         changes = start.parameters(options, draws, given)
-        start.put_flow(options, goal, changes)
+        start.put_flow(options, goal, changes, given)
         record = start.records(options, changes, len(lanes))
         low, high = options.config.low, options.config.high
         inputs = np.repeat(np.clip(0.0, low, high)[:, None], len(lanes), axis=1)

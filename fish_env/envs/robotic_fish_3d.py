@@ -149,8 +149,9 @@ class RoboticFish3DEnv(Watched, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.
     (m), ``euler`` (roll, pitch, yaw, rad), ``velocity_body`` (m/s), ``angular_velocity_body``
     (rad/s), ``tail_phase`` (rad); goal by ``depth`` (m), ``heading`` (rad), ``cruise_speed`` (m/s)
     or any field of :data:`fish_env.envs.layout.GOAL`; parameters by path, as in the fish's file.
-    A path may be given by ``waypoints`` (n, 3): north, east, depth (m), 2 to 32 of them; a place or
-    the start of a path by ``north`` and ``east`` (m).
+    A path may be given by ``waypoints`` (n, 3): north, east, depth (m), 2 to 32 of them, or by
+    ``path_radius`` (m, negative to port) with ``path_pitch`` (m deeper in a turn), ``path_swing``
+    and ``path_length`` (m); a place or the start of a path by ``north`` and ``east`` (m).
 
     ## Versions
 

@@ -37,6 +37,7 @@ GOAL_KEYS = {
 ROWS = (*GOAL, *WAYPOINTS)
 GUIDED = GOAL[GOAL.index("kind") :]
 """Fields of a goal that signals do not have."""
+SMALLEST_RADIUS = 0.05
 FLOW = ("effects.current.north", "effects.current.east")
 OPTION_KEYS = ("state", "goal", "parameters")
 
@@ -68,7 +69,7 @@ def goals(options: EnvOptions, draws: FloatArray, given: Mapping[str, Any]) -> F
 
     A goal may name depth (m), heading (rad) and cruise_speed (m/s), north and east (m) of a place
     or of the start of a path, waypoints, or any field of layout.GOAL. A constant given for depth
-    or heading replaces the whole drawn signal.
+    or heading replaces the whole drawn signal, waypoints or path_radius the whole drawn path.
     """
     fields = options.goals(options.config, draws[:GOAL_DRAWS])
     count = draws.shape[1]
@@ -79,6 +80,8 @@ def goals(options: EnvOptions, draws: FloatArray, given: Mapping[str, Any]) -> F
     waypoints = wanted.pop("waypoints", None)
     if waypoints is not None:
         _put_waypoints(options, rows, waypoints)
+    elif options.task == "path" and "path_radius" in wanted:
+        _put_circle(rows, wanted["path_radius"])
     for key, value in wanted.items():
         if GOAL_KEYS.get(key, key) not in GOAL or not is_number(value):
             raise ConfigError(
@@ -131,6 +134,22 @@ def _put_waypoints(options: EnvOptions, rows: FloatArray, given: Any) -> None:
         rows[GOAL.index(name)] = value
 
 
+def _put_circle(rows: FloatArray, radius: Any) -> None:
+    """Replace the drawn path by one turn of a level circle, which other fields may change."""
+    if not is_number(radius) or abs(radius) < SMALLEST_RADIUS:
+        raise ConfigError(
+            f"goal 'path_radius' = {radius!r}: at least {SMALLEST_RADIUS} m, negative to port"
+        )
+    values = {
+        "kind": float(GoalKind.CIRCLE),
+        "path_pitch": 0.0,
+        "path_swing": 0.0,
+        "path_length": 2.0 * np.pi * abs(radius),
+    }
+    for name, value in values.items():
+        rows[GOAL.index(name)] = value
+
+
 def _check_goal(options: EnvOptions, wanted: Mapping[str, float]) -> None:
     config = options.config
     if options.task in SIGNAL_TASKS:
@@ -138,7 +157,7 @@ def _check_goal(options: EnvOptions, wanted: Mapping[str, float]) -> None:
         if foreign:
             raise ConfigError(f"goal {foreign}: of the tasks path and station, not {options.task}")
     elif "kind" in wanted:
-        raise ConfigError("goal 'kind' follows from the task; give waypoints, or path_radius")
+        raise ConfigError("goal 'kind' follows from the task; give waypoints or path_radius")
     depth, speed = wanted.get("depth", config.top), wanted.get("cruise_speed", 0.0)
     if not config.top <= depth <= config.bottom:
         raise ConfigError(
@@ -211,19 +230,26 @@ def parameters(
     return {**drawn, **fixed}
 
 
-def put_flow(options: EnvOptions, goal: FloatArray, changes: Mapping[str, FloatArray]) -> None:
+def put_flow(
+    options: EnvOptions,
+    goal: FloatArray,
+    changes: Mapping[str, FloatArray],
+    given: Mapping[str, Any],
+) -> None:
     """Write the steady current (m/s) of each fish into its goal: a place is kept against it.
 
     Args:
         options: the environment; its effect ``current`` holds where nothing is changed.
         goal: (rows, N), changed.
         changes: parameter path -> (N,), see :func:`parameters`.
+        given: reset options; a flow that the goal names stays.
     """
     if options.task != "station":
         return
     steady = options.model.effects.get("current", {})
     for path, field in zip(FLOW, ("flow_north", "flow_east"), strict=True):
-        goal[GOAL.index(field)] = changes.get(path, steady.get(path.rsplit(".", 1)[1], 0.0))
+        if field not in given.get("goal", {}):
+            goal[GOAL.index(field)] = changes.get(path, steady.get(path.rsplit(".", 1)[1], 0.0))
 
 
 def records(options: EnvOptions, changes: Mapping[str, FloatArray], count: int) -> FloatArray:

@@ -7,7 +7,7 @@ import pytest
 
 from fish_env.envs import guidance
 from fish_env.envs.config import load_env_config
-from fish_env.envs.layout import GOAL, MOST_WAYPOINTS, GoalKind
+from fish_env.envs.layout import MOST_WAYPOINTS, GoalKind
 from fish_env.envs.robotic_fish_3d import RoboticFish3DEnv
 from fish_env.envs.tasks import GOAL_DRAWS
 from fish_env.envs.tasks.path import WALL_MARGIN, path_goal
@@ -77,11 +77,10 @@ def test_the_rate_of_the_heading_is_that_of_the_heading():
     """Moving for a moment at the velocity it has changes the goal by rate times time."""
     step, yaw = 1e-3, 0.3
     for radius in (0.7, -0.7):
-        goal = {"depth": 0.5, "heading": 0.0, "path_radius": radius, "path_swing": 0.0}
-        config = {"goal": {"path": {"share": {"waypoints": 0.0}}}}
+        goal = {"depth": 0.5, "heading": 0.0, "path_radius": radius}
         found = []
         for k in (0, 1):
-            env = RoboticFish3DEnv(task="path", config=config)
+            env = RoboticFish3DEnv(task="path")
             place = [0.2 + k * step * 0.1 * np.cos(yaw), 0.1 + k * step * 0.1 * np.sin(yaw), 0.5]
             state = {"position": place, "euler": [0, 0, yaw], "velocity_body": [0.1, 0, 0]}
             obs, info = env.reset(seed=0, options={"state": state, "goal": goal})
@@ -92,14 +91,11 @@ def test_the_rate_of_the_heading_is_that_of_the_heading():
 def circle(radius, **goal):
     """Cross-track errors, goal depths, headings and progress around a circle, by the angle."""
     env = RoboticFish3DEnv(task="path")
-    given = {"waypoints": NORTH, "heading": 0.4, "depth": 0.4} | goal
+    length = 4 * np.pi * abs(radius)
+    given = {"heading": 0.4, "depth": 0.4, "path_radius": radius, "path_length": length} | goal
     angles, rows = np.linspace(0, 5 * np.pi, 61), []
     env.reset(seed=0, options={"goal": given})
-    batch, rows_of = env._batch, env._batch._rows
-    goals = batch._data[rows_of.ROW_GOAL : rows_of.ROW_GOAL + len(GOAL), 0]
-    goals[GOAL.index("kind")] = float(GoalKind.CIRCLE)
-    goals[GOAL.index("path_radius")] = radius
-    goals[GOAL.index("path_length")] = 4 * np.pi * abs(radius)
+    batch = env._batch
     still = np.array([0, -1, -1, 0, 0], np.float32)
     for angle in angles:
         course = 0.4 + np.sign(radius) * angle
@@ -200,6 +196,7 @@ def test_waypoints_are_drawn_inside_the_walls():
         ({"waypoints": [[0, 0, 0.4], [1, np.nan, 0.6]]}, "finite"),
         ({"waypoints": [[0, 0, 0.4], [1, 0, 1.6]]}, "may swim from 0.05"),
         ({"kind": 3}, "follows from the task"),
+        ({"path_radius": 0.0}, "at least 0.05 m"),
     ],
 )
 def test_what_is_no_path_is_refused(goal, message):
@@ -279,6 +276,14 @@ def test_the_place_error_is_the_distance():
     _, info = env.reset(seed=0, options={"state": state, "goal": goal})
     assert info["place_error"] == pytest.approx(np.sqrt(0.4**2 + 0.3**2 + 0.12**2))
     assert info["goal_depth"] == 0.62
+
+
+def test_a_flow_that_the_goal_names_is_believed():
+    goal = {"north": 0.0, "east": 0.0, "depth": 0.5, "flow_north": 0.05}
+    state = {"position": [0.0, 0.0, 0.5], "euler": [0.0, 0.0, 0.0]}
+    env = RoboticFish3DEnv(task="station")
+    _, info = env.reset(seed=0, options={"goal": goal, "state": state})
+    assert np.cos(info["goal_heading"]) == pytest.approx(-1.0)
 
 
 def test_guidance_to_a_place_knows_each_fishs_current():

@@ -54,7 +54,7 @@ def ship(folder: Path, task: str | None) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("folders", nargs="+", type=Path)
-    parser.add_argument("--task", choices=("hold", "track"), default=None)
+    parser.add_argument("--task", choices=("hold", "track", "station"), default=None)
     options = parser.parse_args()
     for folder in track(options.folders, "measuring"):
         ship(folder, options.task)

@@ -14,7 +14,7 @@ from robofish_agents.policies.history import History
 
 Float32Array = npt.NDArray[np.float32]
 SHIPPED = Path(__file__).resolve().parents[1] / "pretrained"
-STANDS_FOR = {"path": "track", "station": "track"}
+STANDS_FOR = {"path": "track"}
 """Task -> the task whose policies are run on it unchanged: the observations are the same."""
 
 
@@ -57,7 +57,7 @@ class PretrainedPolicy:
 def shipped(task: str) -> list[Path]:
     """Files of the policies that come with the package for a task, one for each training seed.
 
-    On paths and at places the policies of ``track`` swim.
+    On paths the policies of ``track`` swim.
 
     Raises:
         ConfigError: there are none.

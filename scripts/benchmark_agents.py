@@ -20,7 +20,6 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from fish_env.envs.tasks import TASKS
 from robofish_agents.evaluation.leaderboard import SHIPPED
 from robofish_agents.evaluation.results import Result, evaluate, read_results, write_results
 from robofish_agents.evaluation.suites import Suite, load_suite, suite_names
@@ -36,11 +35,15 @@ SOURCES = {
     "pretrained": (f"{OWN}/pretrained/*/*.npz",),
 }
 """What an agent's numbers depend on: files, folders, patterns."""
+GUIDANCE = ("fish_env/envs/guidance.py", "fish_env/envs/guides.py", "fish_env/envs/tasks/*.py")
+"""What those of paths and places depend on as well."""
 
 
 def fingerprint(agent: str, suite: str) -> str:
     """Changes with anything that the numbers depend on, but the environment."""
     places = (*SOURCES[agent], f"configs/benchmarks/{suite}.yaml", f"{OWN}/evaluation/metrics.py")
+    if "/" in suite:
+        places += (f"{OWN}/evaluation/goal_metrics.py", *GUIDANCE)
     digest = hashlib.sha256()
     for place in places:
         pattern = f"{place}/**/*" if (ROOT / place).is_dir() else place
@@ -60,13 +63,14 @@ def fingerprints(agents: Sequence[str]) -> dict[str, dict[str, str]]:
 def measured(agents: Sequence[str], work: Path, console: Console) -> Iterator[Result]:
     """All combinations, those that are new being measured now."""
     for suite in map(load_suite, suite_names()):
-        for task in TASKS:
+        for task in suite.tasks:
             for agent in agents:
                 yield kept(agent, suite, task, work, console)
 
 
 def kept(agent: str, suite: Suite, task: str, work: Path, console: Console) -> Result:
-    file = work / f"{agent}-{suite.name}-{task}-{fingerprint(agent, suite.name)}.json"
+    name = suite.name.replace("/", "-")
+    file = work / f"{agent}-{name}-{task}-{fingerprint(agent, suite.name)}.json"
     if not file.is_file():
         begun = time.monotonic()
         result = evaluate(agent, load_agents(agent, task), suite, task)

@@ -17,7 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from fish_env.arrays import FloatArray
-from fish_env.envs.tasks import TASKS
+from fish_env.envs.tasks import SIGNAL_TASKS
 from robofish_agents.evaluation.metrics import LATE_S, METRICS, success_rate
 from robofish_agents.evaluation.record import Record, swim_suite
 from robofish_agents.evaluation.suites import RESERVED_SEEDS, Suite, load_suite, suite_names
@@ -62,8 +62,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     add = parser.add_argument
     add("agents", nargs="+", help="pid, mppi, pretrained, or the path of a policy or of a folder")
-    add("--task", choices=tuple(TASKS), default="track")
-    add("--suite", choices=suite_names(), default="hard")
+    add("--task", choices=tuple(SIGNAL_TASKS), default="track")
+    add("--suite", choices=suite_names(*SIGNAL_TASKS), default="hard")
     add("--episodes", type=int, default=2000)
     add("--first", type=int, default=FIRST_SEED, help="seed of the first episode")
     options = parser.parse_args(arguments)

@@ -15,7 +15,7 @@ from typing import Any
 
 from rich.console import Console
 
-from fish_env.envs.tasks import TASKS
+from fish_env.envs.tasks import SIGNAL_TASKS
 from robofish_agents.deployment import export_c, export_onnx, with_int8_weights
 from robofish_agents.evaluation.results import evaluate
 from robofish_agents.evaluation.suites import load_suite
@@ -120,10 +120,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options, console = parser.parse_args(arguments), Console()
     with tempfile.TemporaryDirectory() as folder:
         rows = []
-        for task in TASKS:
+        for task in SIGNAL_TASKS:
             rows += measured(task, options.steps, Path(folder))
             console.print(page(rows, [], options.steps * FISH), markup=False)
-    swims = [row for task in TASKS for row in swum(task)]
+    swims = [row for task in SIGNAL_TASKS for row in swum(task)]
     text = page(rows, swims, options.steps * FISH)
     about = {"machine": machine(), "steps": options.steps, "fish": FISH, "rows": rows}
     about |= {"swims": swims, "versions": versions(("numpy", "onnx", "onnxruntime"))}

@@ -31,7 +31,7 @@ SCORES = ("success_rate", "depth_rmse_m", "heading_rmse_rad", "mean_power_w", "e
 def scores(policy: PolicyFile, task: str) -> dict[str, dict[str, Any]]:
     """Suite -> its version and the mean of each of SCORES."""
     rows: dict[str, dict[str, Any]] = {}
-    for name in suite_names():
+    for name in suite_names(task):
         suite = load_suite(name)
         suite.check(task)
         record = swim_suite(suite, task, PretrainedPolicy(policy))
@@ -54,7 +54,7 @@ def ship(folder: Path, task: str | None) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("folders", nargs="+", type=Path)
-    parser.add_argument("--task", choices=("hold", "track"), default=None)
+    parser.add_argument("--task", choices=("hold", "track", "station"), default=None)
     options = parser.parse_args()
     for folder in track(options.folders, "measuring"):
         ship(folder, options.task)

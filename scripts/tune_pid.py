@@ -21,7 +21,7 @@ from rich.progress import Progress
 from scipy.optimize import differential_evolution
 
 from fish_env.arrays import FloatArray
-from fish_env.envs.tasks import TASKS
+from fish_env.envs.tasks import SIGNAL_TASKS
 from robofish_agents.controllers.pid import GAIN_NAMES, PIDController, PIDGains, load_gains
 from robofish_agents.evaluation.suites import RESERVED_SEEDS, Suite, load_suite
 
@@ -85,7 +85,7 @@ def trials(candidates: int, episodes: int, seed: int) -> dict[str, Trial]:
     return {
         f"{name} {task}": Trial(load_suite(name), task, candidates, episodes, seed)
         for name in SUITES
-        for task in TASKS
+        for task in SIGNAL_TASKS
     }
 
 

@@ -29,9 +29,12 @@ def evaluate(
         str, typer.Option(help="pid, mppi, pretrained, or a policy file or folder of them.")
     ],
     suite: Annotated[
-        str, typer.Option(help="calm, current, noisy, hard, a file, or all of the four.")
+        str,
+        typer.Option(help="calm, current, noisy, hard, path/..., station/..., a file, or all."),
     ] = ALL,
-    task: Annotated[str, typer.Option(help="hold, track, or both.")] = "both",
+    task: Annotated[
+        str, typer.Option(help="hold, track, path, station, both (hold and track), or all.")
+    ] = ALL,
     episodes: Annotated[
         int | None, typer.Option(min=1, help="Only the first so many episodes.")
     ] = None,
@@ -41,8 +44,9 @@ def evaluate(
     """Measure an agent on frozen sets of episodes, with 95 % intervals.
 
     `calm` is still water and exact sensors, `current` a steady flow, `noisy` has noise and delays,
-    `hard` all of it on another fish in each episode. A folder of policies counts as one agent
-    trained with several seeds.
+    `hard` all of it on another fish in each episode. `path/helix`, `path/waypoints`, `path/figure`
+    and `path/current` are paths, `station/current` and `station/waves` places to keep. A folder of
+    policies counts as one agent trained with several seeds.
 
     **Example:** `robofish evaluate --agent pid --suite calm --json pid.json`
     """
@@ -55,11 +59,17 @@ def evaluate(
     from robofish_agents.registry import agent_files, load_agents
 
     console = console_for(json)
-    names = suite_names() if suite == ALL else [suite]
+    tasks = task_names(task)
+    names = suite_names(*tasks) if suite == ALL else [suite]
     read = [file for name in names for file in suite_files(name)]
     check_outputs([json], [*read, *agent_files(agent)])
     suites = [load_suite(name, trust_effects) for name in names]
-    chosen = [(one, each, load_agents(agent, each)) for one in suites for each in task_names(task)]
+    chosen = [
+        (one, each, load_agents(agent, each))
+        for one in suites
+        for each in tasks
+        if each in one.tasks or task != ALL
+    ]
     results = []
     with Progress(console=console, transient=True) as progress:
         total = sum(one.episode_steps * len(loaded) for one, _, loaded in chosen)
@@ -78,14 +88,16 @@ def task_names(task: str) -> list[str]:
     """The tasks that an option names.
 
     Raises:
-        ConfigError: neither a task nor "both".
+        ConfigError: neither a task nor "both" nor "all".
     """
-    from fish_env.envs.tasks import TASKS
+    from fish_env.envs.tasks import SIGNAL_TASKS, TASKS
 
-    if task == "both":
+    if task == ALL:
         return list(TASKS)
+    if task == "both":
+        return list(SIGNAL_TASKS)
     if task not in TASKS:
-        raise ConfigError(f"task '{task}': one of {', '.join(TASKS)}, or both")
+        raise ConfigError(f"task '{task}': one of {', '.join(TASKS)}, both, or all")
     return [task]
 
 

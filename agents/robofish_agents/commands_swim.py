@@ -17,9 +17,9 @@ def register(app: typer.Typer) -> None:
 
 def swim(
     agent: Annotated[str, typer.Option(help="pid, mppi, pretrained, or a policy file.")] = "pid",
-    task: Annotated[str, typer.Option(help="hold or track.")] = "track",
+    task: Annotated[str, typer.Option(help="hold, track, path or station.")] = "track",
     suite: Annotated[
-        str, typer.Option(help="In what water: calm, current, noisy, hard, or a file.")
+        str, typer.Option(help="In what water: calm, current, path/helix, ..., or a file.")
     ] = "calm",
     seed: Annotated[int, typer.Option(min=0, help="Of the episode.")] = 4,
     path: Annotated[

@@ -155,8 +155,13 @@ def _in_words(episode: Episode, follower: PathFollower | None) -> str:
             f"{100 * np.sqrt(np.mean(away**2)):.1f} cm (RMS) beside them."
         )
     verdict = "A success" if episode.succeeded else "No success"
+    if end.worst("place_error") > 0:
+        distance = 100 * end.worst("place_error")
+        return f"{verdict}: over the last 10 s it was at most {distance:.1f} cm from its place."
+    beside = 100 * end.worst("cross_track_error")
     return (
         f"{verdict}: over the last 10 s it was off by at most "
+        f"{f'{beside:.1f} cm beside its path, ' if beside > 0 else ''}"
         f"{100 * end.worst('depth_error'):.1f} cm, "
         f"{np.degrees(end.worst('heading_error')):.1f} degrees over a tail beat and "
         f"{100 * end.worst('speed_error') / end.worst('goal_speed'):.0f} % of the speed."
@@ -194,7 +199,9 @@ def _files(
 ) -> list[Path]:
     config = fish.options.config
     title = f"{ENV_ID}, {wish.agent}, suite {wish.suite}, seed {wish.seed}"
-    files = [draw_path(episode, config, title, wish.out, "path", waypoints)]
+    path = fish.scene().path
+    legs = waypoints if waypoints is not None else (path if len(path) else None)
+    files = [draw_path(episode, config, title, wish.out, "path", legs)]
     if waypoints is None:
         files.append(draw_tracking(episode, config, title, wish.out, "tracking"))
     files.append(draw_actuators(episode, config, wish.out, "actuators"))

@@ -12,7 +12,15 @@ import numpy.typing as npt
 
 from fish_env.arrays import FloatArray, IntArray
 from fish_env.envs import start
-from fish_env.envs.layout import GOAL, MAX_BEAT_S, OBSERVATION, OUTPUTS, SENSORS, Failure
+from fish_env.envs.layout import (
+    GOAL,
+    MAX_BEAT_S,
+    OBSERVATION,
+    OUTPUTS,
+    SENSORS,
+    WAYPOINTS,
+    Failure,
+)
 from fish_env.envs.options import EnvOptions
 from fish_env.errors import ConfigError
 from fish_env.model.compose import cache_folder
@@ -101,6 +109,7 @@ class FishBatch:
         self.threads = threads or default_threads()
         config = options.config
         rows = _step_kernels(options).module.DATA_ROWS
+        rows += len(WAYPOINTS) if options.task == "path" else 0
         self._data = np.zeros((rows, count))
         self._actions = np.zeros((count, 5), np.float32)
         self._substeps = config.substeps
@@ -114,7 +123,7 @@ class FishBatch:
         self._ring = np.zeros((slots, traced, count))
         self._ring_at = 0
         self._history = np.zeros((0, count))
-        self._setup = config.setup()
+        self._setup = config.setup(options.task)
         self._slew = config.slew
         self._noise = np.zeros((0 if options.noise_sd is None else len(SENSORS), count))
         self._noise_blocks = np.zeros((count, NOISE_BLOCK, len(self._noise)))
@@ -227,6 +236,7 @@ class FishBatch:
         state = np.zeros((len(self._base.state_names), len(lanes)))
         state[: len(BASE_STATES)] = start.poses(options, draws, goal, given)
         changes = start.parameters(options, draws, given)
+        start.put_flow(options, goal, changes, given)
         record = start.records(options, changes, len(lanes))
         low, high = options.config.low, options.config.high
         inputs = np.repeat(np.clip(0.0, low, high)[:, None], len(lanes), axis=1)
@@ -239,7 +249,8 @@ class FishBatch:
         data[rows.ROW_SLEW : rows.ROW_PAR, lanes] = self._slew[:, None]
         data[rows.ROW_PAR : rows.ROW_TIME, lanes] = record
         data[rows.ROW_TIME, lanes] = 0.0
-        data[rows.ROW_GOAL : rows.ROW_GOAL + len(GOAL), lanes] = goal
+        data[rows.ROW_GOAL : rows.ROW_GOAL + len(GOAL), lanes] = goal[: len(GOAL)]
+        data[rows.ROW_POINTS :, lanes] = goal[len(GOAL) :][: len(data) - rows.ROW_POINTS]
         data[rows.ROW_FAILED, lanes] = np.inf
         data[rows.ROW_ACTION : rows.ROW_WITHIN, lanes] = action
         data[rows.ROW_WITHIN, lanes] = 0.0

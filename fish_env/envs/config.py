@@ -20,6 +20,14 @@ from fish_env.params.io import config_root
 from fish_env.reading import Unreadable, is_number, located, printable, read_yaml, short, shown
 
 DEFAULT_NAME = "robotic-fish-3d.yaml"
+OWN_WEIGHTS = {
+    "depth": Setup.WEIGHT_DEPTH,
+    "heading": Setup.WEIGHT_HEADING,
+    "speed": Setup.WEIGHT_SPEED,
+    "place": Setup.WEIGHT_PLACE,
+    "margin": Setup.MARGIN_PLACE,
+}
+"""What the settings say under ``reward.<task>``, and where the compiled step finds it."""
 
 
 @dataclass(frozen=True)
@@ -61,8 +69,12 @@ class EnvConfig:
         """The same settings with every physics step divided into so many."""
         return replace(self, dt=self.dt / parts, substeps=self.substeps * parts)
 
-    def setup(self) -> FloatArray:
-        """The numbers that the compiled step shares between all fish (see layout.Setup)."""
+    def setup(self, task: str = "hold") -> FloatArray:
+        """The numbers that the compiled step shares between all fish (see layout.Setup).
+
+        Args:
+            task: its own weights of goals hold, where the settings have some.
+        """
         tree, array = self.tree, empty_setup()
         weights, margins, success = (
             tree["reward"]["weights"],
@@ -76,12 +88,23 @@ class EnvConfig:
         array[Setup.TOP], array[Setup.BOTTOM] = self.top, self.bottom
         array[Setup.NORTH_MIN : Setup.EAST_MAX + 1] = walls
         array[Setup.TUMBLE_COSINE] = np.cos(tree["tumble_angle"])
-        names = ("depth", "heading", "speed", "power", "action")
+        names: tuple[str, ...] = ("depth", "heading", "speed", "power", "action")
         array[Setup.WEIGHT_DEPTH : Setup.WEIGHT_ACTION + 1] = [weights[n] for n in names]
         array[Setup.MARGIN_DEPTH : Setup.MARGIN_SPEED + 1] = [margins[n] for n in names[:3]]
         array[Setup.POWER_SCALE] = tree["reward"]["power_scale"]
         limits = ("depth", "heading", "speed", "speed_floor", "time")
         array[Setup.TOLERANCE_DEPTH : Setup.SUCCESS_TIME + 1] = [success[n] for n in limits]
+        array[Setup.TOLERANCE_CROSS_TRACK] = success["cross_track"]
+        array[Setup.TOLERANCE_PLACE] = success["place"]
+        guidance, station = tree["goal"]["path"]["guidance"], tree["goal"]["station"]
+        names = ("lookahead", "integral", "corner")
+        array[Setup.LOOKAHEAD : Setup.CORNER + 1] = [guidance[name] for name in names]
+        names = ("gain", "circle", "calm")
+        array[Setup.STATION_GAIN : Setup.STATION_CALM + 1] = [station[name] for name in names]
+        array[Setup.MARGIN_PLACE] = 1.0
+        own = tree["reward"].get(task, {})
+        for name in own:
+            array[OWN_WEIGHTS[name]] = own[name]
         return array
 
 

@@ -110,6 +110,10 @@ def reward(tree: Tree) -> Rule:
     yield min(margins) > 0, "reward: margins and power_scale must be positive"
     weights = tree["reward"]["weights"].values()
     yield min(weights) >= 0, "reward.weights: zero or positive; costs are subtracted"
+    for task in ("path", "station"):
+        own = tree["reward"][task]
+        yield min(own.values()) >= 0, f"reward.{task}: zero or positive"
+        yield own["margin"] > 0, f"reward.{task}.margin: positive"
     yield min(tree["success"].values()) >= 0, "success: zero or positive"
     yield 0 < tree["tumble_angle"] < np.pi, "tumble_angle: between 0 and pi"
 
@@ -130,4 +134,39 @@ def track(tree: Tree) -> Rule:
     yield tree["goal"]["track"]["sine"]["period"][0] > 0, "goal.track.sine.period: positive"
 
 
-RULES: tuple[Callable[[Tree], Rule], ...] = (rates, actuators, tank, reward, start, track)
+def path(tree: Tree) -> Rule:
+    """Shapes and guidance of the task "path"."""
+    settings = tree["goal"]["path"]
+    share = settings["share"].values()
+    yield min(share) >= 0 < sum(share), "goal.path.share: zero or positive, and not all zero"
+    for shape in ("helix", "waypoints", "figure"):
+        for key, (low, high) in settings[shape].items():
+            yield 0 <= low <= high, f"goal.path.{shape}.{key}: a range [low, high] from 0 up"
+    for shape, key in (("helix", "radius"), ("helix", "turns"), ("figure", "radius")):
+        yield settings[shape][key][0] > 0, f"goal.path.{shape}.{key}: positive"
+    yield settings["waypoints"]["leg"][0] > 0, "goal.path.waypoints.leg: positive"
+    guidance = settings["guidance"]
+    yield guidance["lookahead"] > 0, "goal.path.guidance.lookahead: positive (m)"
+    yield min(guidance.values()) >= 0, "goal.path.guidance: zero or positive"
+
+
+def station(tree: Tree) -> Rule:
+    """Places and guidance of the task "station"."""
+    settings = tree["goal"]["station"]
+    low, high = settings["distance"]
+    yield 0 <= low <= high, "goal.station.distance: a range [low, high] from 0 up"
+    yield settings["gain"] > 0, "goal.station.gain: positive (1/s)"
+    yield settings["circle"] > 0, "goal.station.circle: positive (m)"
+    yield settings["calm"] >= 0, "goal.station.calm: zero or positive (m/s)"
+
+
+RULES: tuple[Callable[[Tree], Rule], ...] = (
+    rates,
+    actuators,
+    tank,
+    reward,
+    start,
+    track,
+    path,
+    station,
+)

@@ -30,7 +30,53 @@ GOAL = (
     *(f"depth_{name}" for name in REFERENCE),
     *(f"heading_{name}" for name in REFERENCE),
     "cruise_speed",
+    "kind",
+    "place_north",
+    "place_east",
+    "path_radius",
+    "path_pitch",
+    "path_swing",
+    "path_length",
+    "path_points",
+    "flow_north",
+    "flow_east",
 )
+"""Of each fish, SI and radians.
+
+``kind`` is a :class:`GoalKind`. A path begins at (place_north, place_east, depth_base) with the
+course heading_base. On a circle, ``path_radius`` is positive where it turns to starboard,
+``path_pitch`` is the depth gained in a turn, and ``path_swing`` the amplitude by which the depth
+swings twice in a turn. ``flow`` is the mean current that guidance to a place knows of.
+"""
+
+MOST_WAYPOINTS = 32
+"""Of one path, its start among them."""
+
+WAYPOINTS = tuple(
+    f"waypoint_{number}_{axis}"
+    for number in range(1, MOST_WAYPOINTS)
+    for axis in ("north", "east", "depth")
+)
+"""Waypoints after the start of a path, from that start (m): rows of their own, of paths alone."""
+
+GUIDE = (
+    "depth",
+    "depth_rate",
+    "heading",
+    "heading_rate",
+    "speed",
+    "cross_track",
+    "progress",
+    "place_error",
+    "along",
+    "leg",
+    "leg_start",
+    "drift",
+    "velocity_north",
+    "velocity_east",
+    "side",
+)
+"""The goal as it is now (SI, rad), then what guidance remembers from step to step."""
 
 OUTPUTS = (
     "reward_depth",
@@ -55,6 +101,10 @@ OUTPUTS = (
     "is_success",
     "failure",
     "time_s",
+    "reward_place",
+    "cross_track_error",
+    "path_progress",
+    "place_error",
 )
 """Keys of ``info``, all SI and radians; see the class docstring of the environment."""
 
@@ -102,6 +152,19 @@ SENSORS = ("depth", "depth_rate", "roll", "pitch", "heading", "u", "v", "w", "p"
 """Sensors that carry noise, in the order of the noise array."""
 
 
+class GoalKind(IntEnum):
+    """What the goal of an episode is made of."""
+
+    SIGNALS = 0
+    """Depth and heading are signals over time."""
+    CIRCLE = 1
+    """A path around a circle, down, up or both: a helix or a figure of eight."""
+    LEGS = 2
+    """A path along straight legs between waypoints, with arcs where they meet."""
+    PLACE = 3
+    """A place to stay at."""
+
+
 class Failure(IntEnum):
     """Why an episode terminated (``info["failure"]``)."""
 
@@ -140,6 +203,16 @@ class Setup(IntEnum):
     TOLERANCE_SPEED = 29
     TOLERANCE_SPEED_FLOOR = 30
     SUCCESS_TIME = 31
+    WEIGHT_PLACE = 32
+    MARGIN_PLACE = 33
+    TOLERANCE_CROSS_TRACK = 34
+    TOLERANCE_PLACE = 35
+    LOOKAHEAD = 36
+    INTEGRAL = 37
+    CORNER = 38
+    STATION_GAIN = 39
+    STATION_CIRCLE = 40
+    STATION_CALM = 41
 
 
 SETUP_SIZE = len(Setup) + 8

@@ -270,8 +270,8 @@ def package_version() -> str:
 
 def _identity(options: EnvOptions) -> dict[str, Any]:
     """What must be the same for the same bits."""
-    model, config = options.model, options.config
-    numbers = (model.record, model.tables, config.setup(), config.slew, config.low, config.high)
+    model, config, setup = options.model, options.config, options.config.setup(options.task)
+    numbers = (model.record, model.tables, setup, config.slew, config.low, config.high)
     sums = hashlib.sha256("|".join(effect.name for effect in model.declared).encode())
     for array in numbers:
         sums.update(np.ascontiguousarray(array).tobytes())

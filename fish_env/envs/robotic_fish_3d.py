@@ -38,7 +38,7 @@ def observation_space() -> Box[np.float32]:
 
 
 class RoboticFish3DEnv(Watched, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
-    """A 29 cm robotic fish that holds or tracks depth and heading while it cruises.
+    """A 29 cm robotic fish that holds or tracks depth and heading, follows paths or keeps a place.
 
     One servo swings a rigid tail; inside, a weight block slides fore and aft and swings sideways.
     Inertial frame: x north, y east, z down (depth). Body frame: x forward, y starboard, z down.
@@ -87,6 +87,22 @@ class RoboticFish3DEnv(Watched, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.
     most 1.5 s); the instantaneous one stands beside it. Before an episode's start the fish counts
     as having kept its first heading and speed.
 
+    ## Tasks
+
+    Every task shows its goal as depth, heading and speed, so an agent of one runs on all.
+
+    * ``hold``: constant depth and heading. ``track``: signals that step, ramp or oscillate.
+    * ``path``: a helix, legs between waypoints, or a figure of eight seen from the side: a circle
+      on which the depth swings twice a turn, because a fish that pitches through a loop tumbles.
+      Line-of-sight guidance turns path and position into depth, heading and their rates. Its
+      integral takes out a current, of which it knows nothing.
+    * ``station``: a place to stay at. The fish cannot stop, because it coasts for a metre. In a
+      current of at least 2 cm/s it heads against the flow and swims as fast as the flow. In slower
+      water it swims around the place on a circle of 0.4 m, near its smallest. Guidance knows the
+      effect ``current`` and no waves.
+
+    Guidance knows the true position of the fish, as a camera above the tank would measure it.
+
     ## Reward
 
     With tolerance(e, m) = 1 / (1 + (e/m)^2): ``0.4 tolerance(depth error, 0.10 m)
@@ -94,10 +110,15 @@ class RoboticFish3DEnv(Watched, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.
     - 0.05 P/(P + 0.1 W) - 0.05 mean((change of action)^2)/4``; P is the mean mechanical power of
     the tail servo over the step. At most 1 a step; each term is in ``info``.
 
+    The tasks ``path`` and ``station`` add a term for the place and have other weights
+    (``reward.path``, ``reward.station`` in the settings): tolerance(cross-track error, 10 cm) and
+    tolerance(place error, 30 cm).
+
     ## Start
 
     Depth within 0.2 m and heading within 90 degrees of the goal, up to 0.1 m/s, a little tilted,
-    at a random tail phase, at (0, 0); actuators at zero.
+    at a random tail phase, at (0, 0); actuators at zero. Paths begin at (0, 0); a place to keep is
+    up to 1 m away, and the heading is within 90 degrees of the bearing to it.
 
     ## End
 
@@ -112,7 +133,15 @@ class RoboticFish3DEnv(Watched, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.
     ``heading`` (rad, over the last beat), ``speed`` (m/s), ``goal_depth``, ``goal_heading``,
     ``goal_speed``, ``power`` (W), ``within_tolerance_s``: for how long depth, heading and speed
     have been within 5 cm, 5 degrees and 20 %, ``is_success``: 1 once that is 10 s, ``failure``,
-    ``time_s``. ``reset`` also reports each randomised parameter as ``parameter/<path>``.
+    ``time_s``.
+
+    Of a path: ``cross_track_error`` (m, to starboard of the path, seen from above) and
+    ``path_progress`` (0 to 1, the share of it that lies behind). Of a place: ``place_error`` (m,
+    distance in three dimensions). They are 0 in other tasks. On a path ``within_tolerance_s``
+    counts depth within 5 cm, cross-track error within 5 cm and speed within 20 %. At a place it
+    counts a place error within 45 cm, 1.5 body lengths, because a circling fish is 40 cm away.
+
+    ``reset`` also reports each randomised parameter as ``parameter/<path>``.
 
     ## Reset options
 
@@ -120,13 +149,18 @@ class RoboticFish3DEnv(Watched, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.
     (m), ``euler`` (roll, pitch, yaw, rad), ``velocity_body`` (m/s), ``angular_velocity_body``
     (rad/s), ``tail_phase`` (rad); goal by ``depth`` (m), ``heading`` (rad), ``cruise_speed`` (m/s)
     or any field of :data:`fish_env.envs.layout.GOAL`; parameters by path, as in the fish's file.
+    A path may be given by ``waypoints`` (n, 3): north, east, depth (m), 2 to 32 of them, or by
+    ``path_radius`` (m, negative to port) with ``path_pitch`` (m deeper in a turn), ``path_swing``
+    and ``path_length`` (m); a place or the start of a path by ``north`` and ``east`` (m).
 
     ## Versions
 
-    * v0: first version.
+    * v0: first version. The tasks ``path`` and ``station`` came later; ``hold`` and ``track`` are
+      the same to the last bit.
 
     Args:
-        task: ``"hold"`` (constant references) or ``"track"`` (steps, ramps, sines).
+        task: ``"hold"`` (constant references), ``"track"`` (steps, ramps, sines), ``"path"``
+            (helix, waypoints, figure of eight) or ``"station"`` (keep a place).
         fish: name of a shipped fish, path of a parameter file (extended models included), or
             parameters. What a file says of measurements (sensor delays, biases) belongs to the
             recordings it was fitted to and does not act here.

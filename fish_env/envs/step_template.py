@@ -13,7 +13,16 @@ import math
 
 import numpy as np
 
-from fish_env.envs.layout import GOAL, MAX_BEAT_S, OBSERVATION_LIMIT, OUTPUTS, Setup
+from fish_env.envs.guides import set_goal
+from fish_env.envs.layout import (
+    GOAL,
+    GUIDE,
+    MAX_BEAT_S,
+    OBSERVATION_LIMIT,
+    OUTPUTS,
+    GoalKind,
+    Setup,
+)
 from fish_env.envs.rewards import saturating, tolerance
 from fish_env.model.state import INTEGRAL_ROW
 from fish_env.model.trigonometry import sincos
@@ -43,8 +52,11 @@ ROW_REWARD = ROW_WITHIN + 1
 ROW_OUTPUT = ROW_REWARD + 1
 ROW_CHANGE = ROW_OUTPUT + len(OUTPUTS)
 ROW_ENERGY = ROW_CHANGE + 1
-DATA_ROWS = ROW_ENERGY + 1
-SPEED_INDEX = ROW_GOAL + len(GOAL) - 1
+ROW_GUIDE = ROW_ENERGY + 1
+ROW_POINTS = ROW_GUIDE + len(GUIDE)
+DATA_ROWS = ROW_POINTS
+KIND = ROW_GOAL + GOAL.index("kind")
+PLACE = float(GoalKind.PLACE)
 
 DT = int(Setup.DT)
 CENTRE = int(Setup.CENTRE)
@@ -58,23 +70,27 @@ MARGINS = int(Setup.MARGIN_DEPTH)
 POWER_SCALE = int(Setup.POWER_SCALE)
 TOLERANCES = int(Setup.TOLERANCE_DEPTH)
 SUCCESS_TIME = int(Setup.SUCCESS_TIME)
+WEIGHT_PLACE = int(Setup.WEIGHT_PLACE)
+MARGIN_PLACE = int(Setup.MARGIN_PLACE)
+TOLERANCE_CROSS_TRACK = int(Setup.TOLERANCE_CROSS_TRACK)
+TOLERANCE_PLACE = int(Setup.TOLERANCE_PLACE)
 
 
 @kernel
-def reference(data, row, lane, time):
-    """Value and rate of a reference signal at a time (see layout.REFERENCE)."""
-    base = data[row, lane]
-    step = data[row + 1, lane] if time >= data[row + 2, lane] else 0.0
-    rate = data[row + 3, lane]
-    start = data[row + 4, lane]
-    end = data[row + 5, lane]
-    ramped = min(max(time - start, 0.0), max(end - start, 0.0))
-    omega = 6.283185307179586 * data[row + 7, lane]
-    sine, cosine = sincos(omega * time + data[row + 8, lane])
-    amplitude = data[row + 6, lane]
-    ramping = (time >= start) & (time < end)
-    value = base + step + rate * ramped + amplitude * sine
-    return value, (rate if ramping else 0.0) + amplitude * omega * cosine
+def within(data, lane, depth_error, heading_error, speed_error, setup):
+    """Whether the errors that count for the kind of goal are within their tolerances."""
+    goal_speed = data[ROW_GUIDE + 4, lane]
+    allowed = max(setup[TOLERANCES + 2] * goal_speed, setup[TOLERANCES + 3])
+    level = abs(depth_error) <= setup[TOLERANCES]
+    paced = abs(speed_error) <= allowed
+    kind = data[KIND, lane]
+    if kind == 0.0:
+        inside = level & (abs(heading_error) <= setup[TOLERANCES + 1]) & paced
+    elif kind == PLACE:
+        inside = data[ROW_GUIDE + 7, lane] <= setup[TOLERANCE_PLACE]
+    else:
+        inside = level & (abs(data[ROW_GUIDE + 5, lane]) <= setup[TOLERANCE_CROSS_TRACK]) & paced
+    return inside
 
 
 @kernel
@@ -139,9 +155,9 @@ def failure_of(data, lane, z_cosine, setup):
 def judge(data, lane, ring, newest, offset, energy_before, change, period, setup):
     """Errors, reward terms, tolerance clock and failure of the true state after a step."""
     time = data[ROW_TIME, lane]
-    goal_depth, _ = reference(data, ROW_GOAL, lane, time)
-    goal_heading, _ = reference(data, ROW_GOAL + 9, lane, time)
-    goal_speed = data[SPEED_INDEX, lane]
+    goal_depth = data[ROW_GUIDE, lane]
+    goal_heading = data[ROW_GUIDE + 2, lane]
+    goal_speed = data[ROW_GUIDE + 4, lane]
     qw, qx, qy, qz = data[3, lane], data[4, lane], data[5, lane], data[6, lane]
     heading = math.atan2(2.0 * (qx * qy + qw * qz), 1.0 - 2.0 * (qy * qy + qz * qz))
     cosine, sine, surge = beat_means(data, lane, ring, newest, 0, offset, setup[DT])
@@ -156,13 +172,7 @@ def judge(data, lane, ring, newest, offset, energy_before, change, period, setup
     z_cosine = 1.0 - 2.0 * (qx * qx + qy * qy)
     failure = failure_of(data, lane, z_cosine, setup)
 
-    allowed = max(setup[TOLERANCES + 2] * goal_speed, setup[TOLERANCES + 3])
-    inside = (
-        (abs(depth_error) <= setup[TOLERANCES])
-        & (abs(heading_error) <= setup[TOLERANCES + 1])
-        & (abs(speed_error) <= allowed)
-        & (failure == 0.0)
-    )
+    inside = within(data, lane, depth_error, heading_error, speed_error, setup) & (failure == 0.0)
     data[ROW_WITHIN, lane] = data[ROW_WITHIN, lane] + period if inside else 0.0
     out = ROW_OUTPUT
     data[out, lane] = setup[WEIGHTS] * tolerance(depth_error, setup[MARGINS])
@@ -188,7 +198,13 @@ def judge(data, lane, ring, newest, offset, energy_before, change, period, setup
     data[out + 19, lane] = 1.0 if held else 0.0
     data[out + 20, lane] = failure
     data[out + 21, lane] = time
-    terms = data[out, lane] + data[out + 1, lane] + data[out + 2, lane]
+    cross_track, place_error = data[ROW_GUIDE + 5, lane], data[ROW_GUIDE + 7, lane]
+    away = place_error if data[KIND, lane] == PLACE else cross_track
+    data[out + 22, lane] = setup[WEIGHT_PLACE] * tolerance(away, setup[MARGIN_PLACE])
+    data[out + 23, lane] = cross_track
+    data[out + 24, lane] = data[ROW_GUIDE + 6, lane]
+    data[out + 25, lane] = place_error
+    terms = data[out, lane] + data[out + 1, lane] + data[out + 2, lane] + data[out + 22, lane]
     data[ROW_REWARD, lane] = terms - data[out + 3, lane] - data[out + 4, lane]
 
 
@@ -198,10 +214,9 @@ def observe(data, lane, ring, newest, back, trace_row, noise, obs, setup):
     offset = INTEGRAL_ROW - trace_row
     slot = (newest - back) % ring.shape[0]
     pose = ring[slot] if back > 0 else data
-    time = data[ROW_TIME, lane]
-    goal_depth, goal_depth_rate = reference(data, ROW_GOAL, lane, time)
-    goal_heading, goal_heading_rate = reference(data, ROW_GOAL + 9, lane, time)
-    goal_speed = data[SPEED_INDEX, lane]
+    goal_depth, goal_depth_rate = data[ROW_GUIDE, lane], data[ROW_GUIDE + 1, lane]
+    goal_heading, goal_heading_rate = data[ROW_GUIDE + 2, lane], data[ROW_GUIDE + 3, lane]
+    goal_speed = data[ROW_GUIDE + 4, lane]
     noisy = noise.shape[0] > 0
 
     qw, qx, qy, qz = pose[3, lane], pose[4, lane], pose[5, lane], pose[6, lane]
@@ -307,6 +322,7 @@ def step_block(
         data[ROW_TIME, lane] = math.floor(data[ROW_TIME, lane] / period + 1.5) * period
         offset = INTEGRAL_ROW - trace_row
         change, energy_before = data[ROW_CHANGE, lane], data[ROW_ENERGY, lane]
+        set_goal(data, lane, ROW_GOAL, ROW_TIME, ROW_GUIDE, ROW_POINTS, period, setup, False)
         judge(data, lane, ring, newest, offset, energy_before, change, period, setup)
         observe(data, lane, ring, newest, back, trace_row, noise, obs, setup)
     return bad
@@ -320,7 +336,7 @@ def step_lanes(
     """One control step of fish first..last, in place.
 
     Args:
-        data: (DATA_ROWS, N), everything about each fish.
+        data: (DATA_ROWS or more, N), everything about each fish; waypoints may follow.
         actions: (N, 5) float32 in [-1, 1]; clipped, NaN counts as 0 and is reported.
         queue: (Q, 5, N) past targets of the actuators; slot ``queue_at`` is written now.
         queue_at: slot of this step's targets.
@@ -376,6 +392,7 @@ def observe_batch(data, lanes, ring, newest, back, trace_row, noise, obs, setup)
     """Judge and observe some fish without moving them: what a reset returns."""
     for i in range(lanes.shape[0]):
         lane = lanes[i]
+        set_goal(data, lane, ROW_GOAL, ROW_TIME, ROW_GUIDE, ROW_POINTS, 0.0, setup, True)
         judge(data, lane, ring, newest, INTEGRAL_ROW - trace_row, data[17, lane], 0.0, 1.0, setup)
         data[ROW_WITHIN, lane] = 0.0
         data[ROW_OUTPUT + 18, lane] = 0.0

@@ -12,6 +12,7 @@ from fish_env.arrays import FloatArray
 from fish_env.envs.batch import FishBatch
 from fish_env.envs.layout import OUTPUTS
 from fish_env.envs.options import EnvOptions
+from fish_env.envs.outline import outline
 from fish_env.errors import ConfigError
 from fish_env.model.emit import OUTPUTS as TERM_OUTPUTS
 from fish_env.model.state import BASE_STATES
@@ -63,6 +64,7 @@ def scene_of(batch: FishBatch, lane: int, wake: FloatArray, label: str) -> Scene
         wake,
         Goal(info["goal_depth"], info["goal_heading"], info["goal_speed"]),
         label,
+        outline(batch, lane),
     )
 
 

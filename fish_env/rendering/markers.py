@@ -72,6 +72,15 @@ def draw_plumb_line(canvas: Canvas, scene: Scene, goal: Goal) -> None:
     canvas.lines(points[0:-1:2], points[1::2], colours, np.full(count // 2, 0.003))
 
 
+def draw_path(canvas: Canvas, scene: Scene) -> None:
+    """Dashes along the path that the fish is to swim."""
+    first, last = scene.path[0:-1:2], scene.path[1::2]
+    if len(last):
+        first = first[: len(last)]
+        colours = np.tile([*GOAL, 0.8], (len(last), 1))
+        canvas.lines(first, last, colours, np.full(len(last), 0.004))
+
+
 def wake_points(scene: Scene, clear: float) -> FloatArray:
     """(n, 3) the way the fish came (m), but for what is nearer to its middle than ``clear``."""
     past = scene.wake[-LONGEST:]

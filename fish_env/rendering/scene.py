@@ -83,6 +83,7 @@ class Scene:
         actuators: (5,) positions in the order of :data:`fish_env.model.state.INPUTS`.
         wake: (n, 3) past positions, the oldest first (m).
         goal: where the fish is to be, or None.
+        path: (n, 3) the path that it is to swim, or a ring around its place (m).
         label: a few words shown in the corner.
     """
 
@@ -96,6 +97,7 @@ class Scene:
     wake: FloatArray = field(default_factory=lambda: NO_WAKE)
     goal: Goal | None = None
     label: str = ""
+    path: FloatArray = field(default_factory=lambda: NO_WAKE)
 
     @cached_property
     def euler(self) -> FloatArray:

@@ -88,6 +88,7 @@ class View:
         markers.draw_shadow(canvas, swimmer.outline(), tank)
         surroundings.draw_walls(canvas, tank)
         surroundings.draw_specks(canvas, scene.position, tank)
+        markers.draw_path(canvas, scene)
         if scene.goal is None:
             swimmer.draw()
             return

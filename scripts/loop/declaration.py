@@ -9,7 +9,7 @@ from typing import Any
 
 import yaml
 
-from fish_env.envs.tasks import TASKS
+from fish_env.envs.tasks import SIGNAL_TASKS
 from fish_env.errors import ConfigError
 from fish_env.params.io import merged
 from robofish_agents.evaluation.metrics import METRICS
@@ -76,7 +76,7 @@ def load_declaration(file: Path = DECLARED) -> Declaration:
     if set(tree) != wanted:
         raise ConfigError(f"{file}: wrong or missing keys: {sorted(set(tree) ^ wanted)}")
     _check(file, "tier", [tree["tier"]], PLANS)
-    _check(file, "tasks", tree["tasks"], TASKS)
+    _check(file, "tasks", tree["tasks"], SIGNAL_TASKS)
     _check(file, "metrics", tree["metrics"], METRICS)
     return Declaration(
         tree["printed"],

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from fish_env import cli
 from fish_env.envs.registration import ENV_ID
-from fish_env.envs.tasks import TASKS
+from fish_env.envs.tasks import SIGNAL_TASKS, TASKS
 from fish_env.errors import ConfigError
 from robofish_agents.controllers import PIDController
 from robofish_agents.episode import swim
@@ -25,10 +25,21 @@ EPISODES = 3
 CALM = load_suite("calm")
 
 
-@pytest.mark.parametrize("task", TASKS)
-@pytest.mark.parametrize("name", suite_names())
+EPISODES_OF = [(name, task) for name in suite_names() for task in load_suite(name).tasks]
+
+
+@pytest.mark.parametrize(("name", "task"), EPISODES_OF)
 def test_a_suite_begins_as_it_was_frozen(name, task):
     load_suite(name).check(task)
+
+
+def test_every_task_has_suites_and_a_suite_says_which_tasks_it_has():
+    for task in TASKS:
+        assert suite_names(task)
+    assert suite_names("hold") == suite_names("track") == ["calm", "current", "noisy", "hard"]
+    assert load_suite("path/helix").tasks == ["path"]
+    with pytest.raises(ConfigError, match="suite path/helix is of task path, not hold"):
+        load_suite("path/helix").check("hold")
 
 
 def test_a_suite_that_begins_otherwise_is_refused():
@@ -48,7 +59,8 @@ def test_the_suites_have_seeds_of_their_own():
     [
         ({"water": "salt"}, "unknown: \\['water'\\]"),
         ({"episodes": 0}, "'episodes' must be a whole number"),
-        ({"fingerprint": {"hold": 1.0}}, "'fingerprint' one with a number for each"),
+        ({"fingerprint": {"swim": 1.0}}, "'fingerprint' one with a number for each"),
+        ({"fingerprint": {}}, "'fingerprint' one with a number for each"),
     ],
 )
 def test_a_suite_with_a_mistake_is_refused(tmp_path, change, message):
@@ -125,7 +137,18 @@ def test_the_command_prints_and_writes(tmp_path):
     result = CliRunner().invoke(cli.app, [*arguments, "--json", str(file)])
     assert result.exit_code == 0, result.output
     assert "pid, task hold: 2 episodes each" in result.output
-    assert [r.task for r in read_results(file)] == list(TASKS)
+    assert [r.task for r in read_results(file)] == list(SIGNAL_TASKS)
+
+
+def test_the_command_measures_paths_and_places(tmp_path):
+    file = tmp_path / "pid.json"
+    for suite, own in (("path/helix", "cross_track_rmse_m"), ("station/current", "place_rmse_m")):
+        arguments = ["evaluate", "--agent", "pid", "--suite", suite, "--episodes", "2"]
+        result = CliRunner().invoke(cli.app, [*arguments, "--json", str(file)])
+        assert result.exit_code == 0, result.output
+        (back,) = read_results(file)
+        assert (back.task, back.suite) == (suite.split("/")[0], suite)
+        assert 0 < back.metrics[own].mean < 0.5
 
 
 def test_an_unknown_agent_says_which_there_are(tmp_path):

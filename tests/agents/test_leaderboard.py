@@ -7,7 +7,6 @@ from typer.testing import CliRunner
 
 from fish_env import cli
 from fish_env.envs.registration import ENV_ID
-from fish_env.envs.tasks import TASKS
 from fish_env.errors import ConfigError
 from robofish_agents.evaluation.intervals import Interval
 from robofish_agents.evaluation.labels import LABELS
@@ -54,6 +53,24 @@ def test_one_metric_comes_with_its_intervals():
         by_metric(RESULTS, "luck")
 
 
+def test_paths_and_places_have_tables_of_their_own():
+    own = {
+        "path": ("path/helix", ("cross_track_rmse_m", "depth_rmse_m")),
+        "station": ("station/waves", ("place_rmse_m", "place_late_rmse_m")),
+    }
+    rows = list(RESULTS)
+    for task, (suite, names) in own.items():
+        half = Interval(0.5, 0.4, 0.6)
+        metrics = dict.fromkeys(("success_rate", "mean_power_w", "episode_return", *names), half)
+        rows.append(Result("pid", suite, 1, task, "any", 1, 4, metrics))
+    first, path, station = overview(rows).split("\n\n")
+    assert first == overview(RESULTS)
+    assert path.splitlines()[-1] == "| path | pid | 50 %, 50.0 cm, 50.0 cm, 500 mW |"
+    assert station.splitlines()[0] == "| task | agent | station/waves |"
+    assert by_metric(rows, "place_rmse_m").splitlines()[-1].startswith("| station | pid | 50.0")
+    assert "path" not in by_metric(rows, "place_rmse_m")
+
+
 def test_the_command_prints_the_table_of_the_readme_and_what_is_added(tmp_path):
     mine = tmp_path / "mine.json"
     write_results(mine, [result("mine", "calm", "hold", 0.5)])
@@ -66,11 +83,12 @@ def test_the_command_prints_the_table_of_the_readme_and_what_is_added(tmp_path):
 
 def test_the_shipped_results_are_of_the_suites_as_they_are():
     results = read_results(SHIPPED)
-    of_now = {name: load_suite(name).version for name in suite_names()}
+    suites = {name: load_suite(name) for name in suite_names()}
+    of_now = {name: suite.version for name, suite in suites.items()}
     assert all(r.suite_version == of_now[r.suite] and r.episodes == 100 for r in results)
     for agent in {r.agent for r in results}:
         measured = {(r.suite, r.task) for r in results if r.agent == agent}
-        assert measured == {(suite, task) for suite in of_now for task in TASKS}
+        assert measured == {(name, task) for name, suite in suites.items() for task in suite.tasks}
 
 
 def test_the_shipped_results_are_of_the_agents_as_they_are():

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from robofish_agents.evaluation.goal_metrics import GOAL_METRICS, measure_task
 from robofish_agents.evaluation.intervals import bootstrap, rate
 from robofish_agents.evaluation.labels import LABELS
 from robofish_agents.evaluation.metrics import METRICS, STEP_METRICS, measure
@@ -84,7 +85,24 @@ def test_a_moving_goal_has_no_step_response():
 
 
 def test_every_metric_has_a_label():
-    assert set(LABELS) == set(METRICS) | set(STEP_METRICS)
+    own = {name for metrics in GOAL_METRICS.values() for name in metrics}
+    assert set(LABELS) == set(METRICS) | set(STEP_METRICS) | own
+
+
+def test_paths_and_places_are_measured_by_root_mean_squares():
+    """Over the whole episode, and over its last 10 s; progress is that at the end."""
+    swum = record(np.zeros(STEPS), 0.1, path_progress=0.7)
+    late = (TIME > 30.0 + 1e-9)[:, None]
+    for key in ("cross_track_error", "place_error"):
+        swum.info[key] = np.where(late, -0.1, 0.3)
+    path, station = (measure_task(swum, task) for task in ("path", "station"))
+    whole = np.sqrt(0.75 * 0.3**2 + 0.25 * 0.1**2)
+    assert path["cross_track_rmse_m"][0] == pytest.approx(whole)
+    assert path["cross_track_late_rmse_m"][0] == pytest.approx(0.1)
+    assert path["path_progress"][0] == 0.7
+    assert station["place_rmse_m"][0] == pytest.approx(whole)
+    assert station["place_late_rmse_m"][0] == pytest.approx(0.1)
+    assert set(path) - set(METRICS) == set(GOAL_METRICS["path"])
 
 
 def test_the_interval_covers_the_mean_as_often_as_it_says():

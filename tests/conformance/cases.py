@@ -26,8 +26,15 @@ RICH: dict[str, Any] = {
 }
 """Every option at once."""
 
-OPTIONS: dict[str, dict[str, Any]] = {"hold": {"task": "hold"}, "track": {"task": "track"}}
-ALL_OPTIONS = {**OPTIONS, "everything": RICH}
+OPTIONS: dict[str, dict[str, Any]] = {
+    task: {"task": task} for task in ("hold", "track", "path", "station")
+}
+ALL_OPTIONS = {
+    **OPTIONS,
+    "everything": RICH,
+    "everything-path": RICH | {"task": "path"},
+    "everything-station": RICH | {"task": "station"},
+}
 
 IDEAL = {
     "actuators": {

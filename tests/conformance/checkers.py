@@ -237,7 +237,10 @@ def check_reward(make: Make) -> None:
     )
     for action, reward, info in zip(actions, rewards, infos[1:], strict=True):
         action = np.clip(action.astype(float), -1, 1)
-        weights, margins = tree["weights"], tree["margins"]
+        weights, margins = tree["weights"] | tree.get(env.options.task, {}), tree["margins"]
+        away = info["place_error"] or info["cross_track_error"]
+        place = weights.get("place", 0.0) / (1 + (away / weights.get("margin", 1.0)) ** 2)
+        assert np.isclose(info["reward_place"], place, atol=1e-12), "place"
         for name in ("depth", "heading", "speed"):
             shape = 1 / (1 + (info[f"{name}_error"] / margins[name]) ** 2)
             assert np.isclose(info[f"reward_{name}"], weights[name] * shape, atol=1e-12), name
@@ -245,7 +248,7 @@ def check_reward(make: Make) -> None:
         assert np.isclose(info["cost_power"], weights["power"] * share, atol=1e-12), "power"
         change = np.mean((action - last) ** 2) / 4
         assert np.isclose(info["cost_action"], weights["action"] * change, atol=1e-12), "action"
-        gains = sum(info[f"reward_{name}"] for name in ("depth", "heading", "speed"))
+        gains = sum(info[f"reward_{name}"] for name in ("depth", "heading", "speed", "place"))
         total = gains - info["cost_power"] - info["cost_action"]
         assert abs(reward - total) < 1e-15, "the reward is not the sum of its terms"
         assert -0.1 <= reward <= 1.0

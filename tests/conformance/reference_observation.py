@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fish_env.envs.layout import GOAL, MAX_BEAT_S, OBSERVATION
+from fish_env.envs.layout import MAX_BEAT_S, OBSERVATION, REFERENCE
 from fish_env.envs.robotic_fish_3d import RoboticFish3DEnv
 
 INTEGRALS = ("heading_cosine_integral", "heading_sine_integral", "surge_integral")
@@ -31,7 +31,7 @@ def wrapped(angle: float) -> float:
 
 def reference(goal: dict[str, float], channel: str, time: float) -> tuple[float, float]:
     """Value and rate of a goal signal; ``goal`` as in reset options."""
-    g = {name: goal.get(f"{channel}_{name}", 0.0) for name in (n.split("_", 1)[1] for n in GOAL)}
+    g = {name: goal.get(f"{channel}_{name}", 0.0) for name in REFERENCE}
     since = np.clip(time, g["ramp_start"], g["ramp_end"]) - g["ramp_start"]
     omega = 2 * np.pi * g["sine_frequency"]
     angle = omega * time + g["sine_phase"]

@@ -81,7 +81,9 @@ def test_starts_are_what_the_docstring_says(task):
     env = RoboticFish3DVectorEnv(2000, task=task)
     _, infos = env.reset(seed=0)
     assert 0.15 < np.abs(infos["depth_error"]).max() <= 0.2 + 1e-9
-    assert 1.5 < np.abs(infos["heading_error"]).max() <= np.pi / 2 + 1e-9
+    base = env.batch._data[env.batch._rows.ROW_GOAL + GOAL.index("heading_base")]
+    off = np.abs(np.angle(np.exp(1j * (base - infos["heading"]))))
+    assert 1.5 < off.max() <= np.pi / 2 + 1e-9
     assert 0.0 <= infos["speed"].min() < 0.01 < 0.09 < infos["speed"].max() <= 0.1
     assert np.all(infos["north"] == 0)
     assert np.all(infos["east"] == 0)

@@ -1,10 +1,7 @@
-"""Line-of-sight guidance: follow a path by pointing the nose at a spot ahead on it.
+"""Line-of-sight guidance outside the environment: follow a list of waypoints, however long.
 
-With a lookahead distance D, a fish at cross-track error e of a straight leg with course c steers
-for c - atan(e / D) (Fossen, Handbook of Marine Craft and Motion Control, section 12.3), and a
-depth below the path climbs likewise. The slow part of e, which a current makes, is taken out by an
-integral of bounded rate (Borhaug, Pavlov and Pettersen, "Integral LOS Control for Path Following of
-Underactuated Marine Surface Vessels in the Presence of Constant Ocean Currents", CDC 2008).
+The geometry is that of :mod:`fish_env.envs.guidance`, which guides the fish of the task ``path``.
+Here legs meet in corners without arcs, as for a robot that is told its position.
 """
 
 from __future__ import annotations
@@ -16,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fish_env.arrays import FloatArray
+from fish_env.envs.plain_guidance import drift_rate, on_leg, steer
 from fish_env.errors import ConfigError
 
 
@@ -94,10 +92,9 @@ class LineOfSight:
         start, end = self.points[self.leg : self.leg + 2]
         length = self._lengths[self.leg]
         course = np.arctan2(end[1] - start[1], end[0] - start[0])
-        error = across + self._drift
-        rate = self.integral * self.lookahead * across / (self.lookahead**2 + error**2)
+        rate = drift_rate(across, self._drift, self.lookahead, self.integral)
         self._drift += rate * period_s
-        heading = course - np.arctan((across + self._drift) / self.lookahead)
+        heading = steer(course, across, self._drift, self.lookahead)
         slope = (end[2] - start[2]) / length
         inside = 0.0 <= along <= length
         return Guided(
@@ -114,4 +111,5 @@ class LineOfSight:
         start, end = self.points[self.leg : self.leg + 2, :2]
         ahead = (end - start) / self._lengths[self.leg]
         offset = place[:2] - start
-        return float(ahead @ offset), float(ahead[0] * offset[1] - ahead[1] * offset[0])
+        along, across = on_leg(*offset, *ahead)
+        return float(along), float(across)

@@ -25,6 +25,11 @@ LABELS: dict[str, tuple[str, float]] = {
     "heading_rise_s": ("heading rise (s)", 1.0),
     "heading_settling_s": ("heading settling (s)", 1.0),
     "heading_overshoot": ("heading overshoot (%)", 100.0),
+    "cross_track_rmse_m": ("cross-track RMSE (cm)", 100.0),
+    "cross_track_late_rmse_m": ("cross-track, last 10 s (cm)", 100.0),
+    "path_progress": ("share of the path swum (%)", 100.0),
+    "place_rmse_m": ("place RMSE (cm)", 100.0),
+    "place_late_rmse_m": ("place, last 10 s (cm)", 100.0),
 }
 """Of every metric. An action change of 100 % is from one end of the range to the other."""
 

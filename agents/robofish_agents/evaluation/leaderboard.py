@@ -5,22 +5,46 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from fish_env.envs.tasks import SIGNAL_TASKS
 from fish_env.errors import ConfigError
+from robofish_agents.evaluation.goal_metrics import GOAL_METRICS
 from robofish_agents.evaluation.labels import LABELS, mean_and_range
 from robofish_agents.evaluation.results import Result
 from robofish_agents.evaluation.suites import suite_names
 
 SHIPPED = Path(__file__).with_name("leaderboard.json")
 """Results of the agents that come with the package, written by scripts/benchmark_agents.py."""
-SHOWN = ("success_rate", "depth_rmse_m", "heading_rmse_rad", "mean_power_w")
-UNITS = ("%", "cm", "°", "mW")
-"""Metrics in each cell of the overview, with the units of their labels."""
+FAMILIES: tuple[tuple[str, ...], ...] = (SIGNAL_TASKS, ("path",), ("station",))
+"""Tasks that share suites, and so a table."""
+OF_SIGNALS = {
+    "success_rate": "%",
+    "depth_rmse_m": "cm",
+    "heading_rmse_rad": "°",
+    "mean_power_w": "mW",
+}
+SHOWN = {
+    **dict.fromkeys(SIGNAL_TASKS, OF_SIGNALS),
+    "path": {
+        "success_rate": "%",
+        "cross_track_rmse_m": "cm",
+        "depth_rmse_m": "cm",
+        "mean_power_w": "mW",
+    },
+    "station": {
+        "success_rate": "%",
+        "place_rmse_m": "cm",
+        "place_late_rmse_m": "cm",
+        "mean_power_w": "mW",
+    },
+}
+"""Task -> metrics in each cell of the overview, with the units of their labels."""
+OWN_METRICS = {name for metrics in GOAL_METRICS.values() for name in metrics}
 MISSING = "not measured"
 
 
 def overview(results: Sequence[Result]) -> str:
-    """Success, depth and heading RMSE and power on every suite, as Markdown."""
-    return _table(results, _overview_cell)
+    """What SHOWN names, on every suite, as Markdown: a table for each family of tasks."""
+    return _tables(results, _overview_cell)
 
 
 def by_metric(results: Sequence[Result], metric: str) -> str:
@@ -31,12 +55,15 @@ def by_metric(results: Sequence[Result], metric: str) -> str:
     """
     if metric not in LABELS:
         raise ConfigError(f"metric '{metric}': one of {', '.join(LABELS)}")
-    return _table(results, lambda result: _metric_cell(result, metric))
+    wanted = [r for r in results if r.task in SIGNAL_TASKS or metric in r.metrics]
+    if metric in OWN_METRICS:
+        wanted = [r for r in results if metric in r.metrics]
+    return _tables(wanted, lambda result: _metric_cell(result, metric))
 
 
 def _overview_cell(result: Result) -> str:
     parts = []
-    for metric, unit in zip(SHOWN, UNITS, strict=True):
+    for metric, unit in SHOWN[result.task].items():
         mean, _ = mean_and_range(metric, result.metrics[metric])
         short = mean.removesuffix(".0") if metric == "success_rate" else mean
         parts.append(f"{short}{'' if unit == '°' else ' '}{unit}")
@@ -46,6 +73,11 @@ def _overview_cell(result: Result) -> str:
 def _metric_cell(result: Result, metric: str) -> str:
     mean, spread = mean_and_range(metric, result.metrics.get(metric))
     return f"{mean} ({spread})" if spread else mean
+
+
+def _tables(results: Sequence[Result], cell: Callable[[Result], str]) -> str:
+    families = [[r for r in results if r.task in family] for family in FAMILIES]
+    return "\n\n".join(_table(family, cell) for family in families if family)
 
 
 def _table(results: Sequence[Result], cell: Callable[[Result], str]) -> str:

@@ -20,6 +20,9 @@ KEPT = (
     "power",
     "is_success",
     "failure",
+    "cross_track_error",
+    "path_progress",
+    "place_error",
 )
 """Entries of ``info`` that the metrics use."""
 EARTH_GRAVITY = 9.81
@@ -70,7 +73,7 @@ def swim_suite(
 
     Args:
         suite: which episodes.
-        task: ``hold`` or ``track``.
+        task: one of the suite's.
         agent: what acts.
         count: how many of the episodes; default: all.
         threads: threads of the environment; default: all cores of this process.

@@ -15,8 +15,8 @@ from fish_env.errors import ConfigError
 from fish_env.files import write_text
 from fish_env.reading import Unreadable, read_json
 from fish_env.version import versioned
+from robofish_agents.evaluation.goal_metrics import measure_task
 from robofish_agents.evaluation.intervals import Interval, bootstrap, rate
-from robofish_agents.evaluation.metrics import measure
 from robofish_agents.evaluation.record import swim_suite
 from robofish_agents.evaluation.suites import Suite
 from robofish_agents.registry import Agent
@@ -33,7 +33,7 @@ class Result:
         agent: name, as given to `robofish evaluate`.
         suite: name.
         suite_version: version of the suite.
-        task: ``hold`` or ``track``.
+        task: ``hold``, ``track``, ``path`` or ``station``.
         environment: id of the environment.
         seeds: training seeds that the means are over; 1 for what was not trained.
         episodes: how many, for each seed.
@@ -65,7 +65,7 @@ def evaluate(
         name: what to call it.
         agents: one, or one for each training seed.
         suite: which episodes.
-        task: ``hold`` or ``track``.
+        task: one of the suite's.
         count: only the first so many episodes; default: all.
         threads: threads of the environment.
         report: called after each control step.
@@ -75,7 +75,8 @@ def evaluate(
     """
     suite.check(task)
     measured = [
-        measure(swim_suite(suite, task, agent, count, threads, report), task) for agent in agents
+        measure_task(swim_suite(suite, task, agent, count, threads, report), task)
+        for agent in agents
     ]
     metrics = {
         key: _interval(key, np.stack([values[key] for values in measured])) for key in measured[0]

@@ -16,6 +16,19 @@ from fish_env.reading import Unreadable, is_number, located, read_yaml, shown
 MOST = {"version": 10**9, "seed": 10**12, "episodes": 100_000, "episode_steps": 100_000}
 RESERVED_SEEDS = range(1_000_000, 2_000_000)
 """Seeds of episodes that belong to the suites: nothing is trained, tuned or selected on them."""
+ORDER = (
+    "calm",
+    "current",
+    "noisy",
+    "hard",
+    "path/helix",
+    "path/waypoints",
+    "path/figure",
+    "path/current",
+    "station/current",
+    "station/waves",
+)
+"""From easy to hard, for each kind of goal."""
 FINGERPRINT_TOLERANCE = 1e-3
 TRUST = "trust_effects"
 """Option of the environment that only a caller may give."""
@@ -23,7 +36,7 @@ TRUST = "trust_effects"
 
 @dataclass(frozen=True)
 class Suite:
-    """A frozen set of episodes, the same for both tasks.
+    """A frozen set of episodes, of one task or of several with the same starts.
 
     Attributes:
         name: short name.
@@ -45,6 +58,11 @@ class Suite:
     environment: Mapping[str, Any]
     fingerprint: Mapping[str, float]
 
+    @property
+    def tasks(self) -> list[str]:
+        """The tasks that it has episodes of."""
+        return [task for task in TASKS if task in self.fingerprint]
+
     def make(
         self, task: str, count: int | None = None, threads: int | None = None
     ) -> RoboticFish3DVectorEnv:
@@ -61,8 +79,11 @@ class Suite:
         """Refuse to measure on episodes that are no longer those of the file.
 
         Raises:
-            ConfigError: the environment now starts other episodes.
+            ConfigError: the environment now starts other episodes, or the suite has none of the
+                task.
         """
+        if task not in self.fingerprint:
+            raise ConfigError(f"suite {self.name} is of task {', '.join(self.tasks)}, not {task}")
         now = self.fingerprint_of(task)
         if abs(now - self.fingerprint[task]) > FINGERPRINT_TOLERANCE:
             raise ConfigError(
@@ -77,11 +98,19 @@ class Suite:
         return float(abs(observations.astype(float)).sum())
 
 
-def suite_names() -> list[str]:
-    """The suites that come with the package, from easy to hard as far as the names are known."""
-    order = ("calm", "current", "noisy", "hard")
-    found = {path.stem for path in (config_root() / "benchmarks").glob("*.yaml")}
-    return [name for name in order if name in found] + sorted(found - set(order))
+def suite_names(*tasks: str) -> list[str]:
+    """The suites that come with the package, in their order.
+
+    Args:
+        tasks: only those that have episodes of one of these; none: all.
+    """
+    folder = config_root() / "benchmarks"
+    paths = (path.relative_to(folder).with_suffix("") for path in folder.rglob("*.yaml"))
+    found = {path.as_posix() for path in paths}
+    names = [name for name in ORDER if name in found] + sorted(found - set(ORDER))
+    if not tasks:
+        return names
+    return [name for name in names if set(load_suite(name).tasks) & set(tasks)]
 
 
 def load_suite(name_or_path: str | Path, trust_effects: bool = False) -> Suite:
@@ -158,13 +187,13 @@ def _checked(tree: Any, path: Path) -> Suite:
         if not isinstance(tree[key], str) or not tree[key].isprintable():
             raise ConfigError(f"{path}: '{key}' must be a text on one line")
     prints = tree["fingerprint"]
-    whole = isinstance(prints, dict) and set(prints) == set(TASKS)
+    whole = isinstance(prints, dict) and bool(prints) and set(prints) <= set(TASKS)
     if not isinstance(tree["environment"], dict) or not (
         whole and all(map(is_number, prints.values()))
     ):
         raise ConfigError(
             f"{path}: 'environment' must be a mapping of options, 'fingerprint' one with a number "
-            f"for each of {', '.join(TASKS)}"
+            f"for each of its tasks, of {', '.join(TASKS)}"
         )
     if TRUST in tree["environment"]:
         raise ConfigError(

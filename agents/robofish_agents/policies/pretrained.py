@@ -14,6 +14,8 @@ from robofish_agents.policies.history import History
 
 Float32Array = npt.NDArray[np.float32]
 SHIPPED = Path(__file__).resolve().parents[1] / "pretrained"
+STANDS_FOR = {"path": "track"}
+"""Task -> the task whose policies are run on it unchanged: the observations are the same."""
 
 
 class PretrainedPolicy:
@@ -55,10 +57,12 @@ class PretrainedPolicy:
 def shipped(task: str) -> list[Path]:
     """Files of the policies that come with the package for a task, one for each training seed.
 
+    On paths the policies of ``track`` swim.
+
     Raises:
         ConfigError: there are none.
     """
-    files = sorted((SHIPPED / task).glob("*.npz"))
+    files = sorted((SHIPPED / STANDS_FOR.get(task, task)).glob("*.npz"))
     if not files:
         tasks = sorted({file.parent.name for file in SHIPPED.glob("*/*.npz")})
         raise ConfigError(f"no policy is shipped for task '{task}'; there are: {', '.join(tasks)}")

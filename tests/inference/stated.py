@@ -143,9 +143,11 @@ def coefficients(paths: Sequence[str]) -> Coefficients:
     return Coefficients(paths, np.zeros(count), np.eye(count), (-ends, ends))
 
 
-def effect(name: str, reach: float = 1.0, **declared: Any) -> DeclaredEffect:
+def effect(
+    name: str, reach: float = 1.0, lower: float = -np.inf, **declared: Any
+) -> DeclaredEffect:
     """An effect with one size, off at zero, that may plausibly reach so far either way."""
-    size = EffectParameter(SIZE, "-", 0.0, plausible=(-reach, reach))
+    size = EffectParameter(SIZE, "-", 0.0, lower, plausible=(max(lower, -reach), reach))
     return DeclaredEffect(name, (size,), **declared)
 
 

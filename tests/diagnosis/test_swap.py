@@ -37,7 +37,7 @@ def pairs(*names):
 
 @pytest.mark.parametrize(
     ("acting", "size", "fitted"),
-    [(LAG, 8.0, 1), (SOFT, 1.5, 1), (SOFT, 8.0, 0)],  # a sketch that is far behind is not fitted
+    [(LAG, 8.0, 1), (LAG, 2.0, 1), (SOFT, 1.5, 1), (SOFT, 8.0, 0)],  # far behind: not fitted
 )
 def test_a_better_look_alike_takes_the_place(acting, size, fitted):
     own = fit(swimming(acting, size), (SOFT, CURRENT), refit_noise=False)

@@ -76,10 +76,8 @@ class Driven(Stated):
 
 @pytest.mark.parametrize("in_step", [False, True])
 def test_what_puts_a_beat_out_of_step_is_tried_whatever_the_screen_makes_of_it(in_step):
-    targets = {
-        **dict.fromkeys(STRONG, [20.0] * 4),
-        **dict.fromkeys((*DRIFTING, "tether"), [0.5] * 4),
-    }
+    sizes = {**dict.fromkeys(STRONG, 20.0), **dict.fromkeys(DRIFTING, 0.5), "tether": 0.8}
+    targets = {name: np.full(4, size) for name, size in sizes.items()}
     problem = Driven(apart(targets), [effect(name) for name in targets], limit=1.0)
     problem.drive = Drive(known=in_step)
     said = []

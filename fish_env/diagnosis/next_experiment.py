@@ -60,7 +60,19 @@ def propose(
     if not rivals:
         return None
     points = list(rivals.values())
-    found = [(separation(fit, points, m), m) for m in MENU]
+    return best_of(verdict, tuple(rivals), [(separation(fit, points, m), m) for m in MENU])
+
+
+def best_of(
+    verdict: Verdict, rivals: Sequence[str], found: Sequence[tuple[FloatArray, Manoeuvre]]
+) -> Proposal | None:
+    """The manoeuvre that separates best; None where none shows what the runs could not.
+
+    Args:
+        verdict: the verdict.
+        rivals: what the present explanation is to be told from.
+        found: squared distance of each rival (rivals,), and the manoeuvre.
+    """
     best, manoeuvre = max(found, key=lambda pair: float(np.mean(np.log1p(pair[0]))))
     apart = dict(zip(rivals, best.tolist(), strict=True))
     if verdict.name != "ambiguous":  # of rivals the best manoeuvre is wanted, however good it is

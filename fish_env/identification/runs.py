@@ -117,13 +117,14 @@ class RunData:
         """Of the steps for motion with corners (s)."""
         return float(np.min(np.diff(self.clock) / self.corner_substeps[1:]))
 
-    def in_long_steps(self, fastest: float = np.inf) -> RunData:
+    def in_long_steps(self, fastest: float = np.inf, long: float = LONG_STEP_S) -> RunData:
         """The same run, simulated no finer than a comparison needs.
 
         Args:
             fastest: time constant that the fish has anyhow (s).
+            long: longest step (s).
         """
-        long = min(LONG_STEP_S, fastest)
+        long = min(long, fastest)
         longest = np.where(self.fresh, long / FINER, long)
         return replace(self, substeps=np.minimum(self.substeps, _steps(self.clock, longest)))
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 
 from fish_env.inference.estimate.bounds import LinearBounds
+from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.free import Linearised
 from fish_env.inference.probes import Cause
+from fish_env.inference.problem import Point
+from tests.inference.stated import Stated, fit_of
 
 BLOCKS, PER_BLOCK, COEFFICIENTS = 60, 20, 4
+PATHS = tuple(f"c{i}" for i in range(COEFFICIENTS))
 
 
 class LinearProblem:
@@ -25,6 +27,7 @@ class LinearProblem:
             0.1 * (rng.standard_normal((self.size, settings)) + shared + self.slopes[:, [0]])
             for _ in range(signals)
         ]
+        self.stated = Stated(lambda z, effects: (self.slopes @ z)[None], paths=PATHS)
         self.causes = [Cause(f"cause_{i}", (({"a": 1.0},),)) for i in range(signals)]
 
     def fit(
@@ -33,7 +36,7 @@ class LinearProblem:
         added: np.ndarray | float = 0.0,
         memory: float = 0.0,
         reach: float = np.inf,
-    ):
+    ) -> Fit:
         """A refitted baseline on new data, with a signal and coloured residuals if wanted.
 
         No coefficient goes further than ``reach``.
@@ -51,21 +54,5 @@ class LinearProblem:
         linearised = Linearised(
             data + self.slopes @ z, self.slopes, np.zeros(self.size, np.int64), times
         )
-        paths = tuple(f"c{i}" for i in range(COEFFICIENTS))
-        return SimpleNamespace(
-            linearised=linearised,
-            problem=SimpleNamespace(baseline=Sized(paths)),
-            released=(),
-            active=bounds.active(hessian, gradient + hessian @ z, z),
-            point=SimpleNamespace(z=z),
-        )
-
-
-class Sized:
-    """What is read of a baseline: its paths, and how many there are."""
-
-    def __init__(self, paths: tuple[str, ...]) -> None:
-        self.paths = paths
-
-    def __len__(self) -> int:
-        return len(self.paths)
+        active = bounds.active(hessian, gradient + hessian @ z, z)
+        return fit_of(self.stated, point=Point(z, {}), linearised=linearised, active=active)

@@ -1,7 +1,6 @@
 """The test of what is left, on residuals that answer linearly to a wrench."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,11 +9,13 @@ from fish_env.effects import catalogue
 from fish_env.identification.filtering import NoiseModel
 from fish_env.identification.generic_forces import generic_forces, regressors
 from fish_env.identification.noise import disturbance_range
+from fish_env.identification.open_loop import without_feedback
+from fish_env.identification.runs import RunData
 from fish_env.inference.adequacy import Adequacy, Misfit, adequacy, implausible_estimates
 from fish_env.inference.estimate.free import Linearised
-from fish_env.inference.problem import Problem
+from fish_env.inference.problem import Point, Problem
 from fish_env.params import load_fish
-from tests.diagnosis.linear import Sized
+from tests.inference.stated import Stated, coefficients, fit_of
 
 SAMPLES = 400
 UNIT = np.repeat([1e-3, 1e-5], 3)
@@ -29,18 +30,20 @@ def swimming(rng):
     states[:, 3] = 1.0
     states[:, 3:7] /= np.linalg.norm(states[:, 3:7], axis=1)[:, None]
     states[:, 13] = 8.0 * clock
-    run = SimpleNamespace(
-        clock=clock, command_times=np.arange(0.0, 16.0, 1.5),
-        command_values=rng.uniform(0.1, 0.6, (11, 5)), id="r01",
+    run = RunData(
+        id="r01", condition=None, clock=clock, substeps=np.ones(SAMPLES, np.int64),
+        fresh=np.zeros(SAMPLES, bool), command_times=np.arange(0.0, 16.0, 1.5),
+        command_values=rng.uniform(0.1, 0.6, (11, 5)), measured=np.zeros((SAMPLES, 6)),
+        state0=states[0, :18], covariance0=np.eye(19), phase_known=True,
     )  # fmt: skip
-    return run, SimpleNamespace(states=states)
+    return run, replace(without_feedback(run), states=states)
 
 
 class Answering(Problem):
     """A problem in which each direction of a generic force moves one of six channels."""
 
     def __init__(self, run, filtered):
-        self.baseline, self.known = Sized(()), {}
+        self.baseline, self.known = coefficients(()), {}
         self.forces = generic_forces([run], [filtered])
 
     def disturbance_at_limit(self, noise):
@@ -82,14 +85,7 @@ def fit_with(missing, seed=0, noise=QUIET):
     lin = Linearised(flat, np.zeros((len(flat), 0)), np.zeros(len(flat), np.int64),
                      np.repeat(run.clock, 6))  # fmt: skip
     problem = Answering(run, filtered)
-    own = SimpleNamespace(
-        problem=problem, comparing=problem, filtered=[filtered], linearised=lin, released=(),
-        effects=(), noise=noise,
-        active=np.zeros((0, 0)),
-        point=SimpleNamespace(z=np.zeros(0), effects={}),
-    )  # fmt: skip
-    own.extrapolated = own
-    return own
+    return fit_of(problem, noise=noise, linearised=lin, filtered=[filtered])
 
 
 def test_noise_alone_reaches_the_floor():
@@ -151,15 +147,15 @@ def test_all_else_stays_as_it_is(left, gain):
     assert left.judged(gain) is left
 
 
-def named(effects=(), released=(), z=0.0, interval=(0.0, 0.0), at_bounds=()):
-    """What is read of a fit that names causes."""
-    problem = SimpleNamespace(known=catalogue(), baseline=Sized(("tail.area", "mass.total")))
-    value = sum(interval) / 2
-    paths = {f"effects.{e}.{p.name}": value for e in effects for p in catalogue()[e].parameters}
-    return SimpleNamespace(
-        problem=problem, effects=effects, released=released, at_bounds=at_bounds,
-        point=SimpleNamespace(z=np.array([z, 0.0]), effects=paths), interval=lambda path: interval,
-    )  # fmt: skip
+def named(
+    effects=(), released=(), z=0.0, interval=(0.0, 0.0), at_bounds=(),
+    paths=("tail.area", "mass.total"),
+):  # fmt: skip
+    """A fit with all parameters of its effects in an interval, and a coefficient z off."""
+    problem = Stated(lambda z, effects: np.zeros((1, 1)), catalogue().values(), paths)
+    values = dict.fromkeys(problem.neutral(effects), sum(interval) / 2)
+    point, intervals = Point(np.array([z, 0.0]), values), dict.fromkeys(values, interval)
+    return fit_of(problem, effects, released, point, at_bounds=at_bounds, profiles=intervals)
 
 
 def test_a_coefficient_far_outside_its_prior_is_no_explanation():
@@ -167,8 +163,7 @@ def test_a_coefficient_far_outside_its_prior_is_no_explanation():
     (said,) = implausible_estimates(named(released=("tail.area",), z=-57.0))
     assert "tail.area" in said
     assert implausible_estimates(named(released=("mass.total",), z=-57.0)) == ()
-    trimmed = named(released=("mass.buoyancy",), z=19.0)
-    trimmed.problem.baseline = Sized(("mass.buoyancy", "mass.total"))
+    trimmed = named(released=("mass.buoyancy",), z=19.0, paths=("mass.buoyancy", "mass.total"))
     assert implausible_estimates(trimmed) == ()  # a buoyancy_offset may be as large
 
 

@@ -1,7 +1,6 @@
 """Published sizes on a problem with known signals that bend, saturate, hide or never fade."""
 
 from collections.abc import Callable
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,6 +17,7 @@ from fish_env.inference.probes import Cause, effect_values
 from fish_env.inference.projection import Projector
 from fish_env.inference.screening import Screen
 from fish_env.model.effect import Effect, EffectParameter
+from tests.inference.stated import Stated, fit_of, signal_of
 
 SIZE, THRESHOLD, STEP = 600, -7.5, 0.01
 RNG = np.random.default_rng(4)
@@ -26,46 +26,13 @@ ALONG, ACROSS = 3.0 * RNG.standard_normal((2, SIZE))
 PATH = "effects.extra.size"
 
 
-class Baseline:
-    """Two coefficients whose prior is standard normal."""
-
-    paths = ("a", "b")
-    mean, sd, factor = np.zeros(2), np.ones(2), np.eye(2)
-    bounds = (np.full(2, -np.inf), np.full(2, np.inf))
-
-    def __len__(self) -> int:
-        return 2
-
-    def values(self, z: np.ndarray) -> np.ndarray:
-        return z
-
-
-class Bending:
-    """Residuals that an effect and the coefficients change as a function says."""
-
-    coefficient_step = 0.05
-
-    def __init__(self, change: Callable, fastest: Callable | None = None) -> None:
-        self.change, self.baseline = change, Baseline()
-        parameter = EffectParameter("size", "-", 0.0, 0.0, 1e3)
-        effect = Effect("extra", "hydrodynamics", "", "", "", (parameter,), time_scale=fastest)
-        self.known = {"extra": effect}
-        clock = STEP * np.arange(10.0)
-        self.runs = [SimpleNamespace(clock=clock, substeps=np.ones(10, np.int64))]
-        self.longest_step = STEP
-
-    def neutral(self, names) -> dict[str, float]:
-        return {PATH: 0.0}
-
-    def refines_steps(self, effects) -> bool:
-        return False
-
-    def freedoms(self, names) -> tuple:
-        return ()
-
-    def changes(self, z, lanes, noise, filtered) -> np.ndarray:
-        rows = np.array([self.change(*pair) for pair in zip(z.T, lanes[PATH], strict=True)])
-        return rows[1:] - rows[0]
+def stated(change: Callable, fastest: Callable | None = None) -> Stated:
+    """Residuals that an effect and two coefficients change as a function says."""
+    parameter = EffectParameter("size", "-", 0.0, 0.0, 1e3)
+    effect = Effect("extra", "hydrodynamics", "", "", "", (parameter,), time_scale=fastest)
+    return Stated(
+        lambda z, effects: change(z, effects[PATH])[None], [effect], ("a", "b"), step=STEP
+    )  # fmt: skip
 
 
 def followed(z):
@@ -74,20 +41,11 @@ def followed(z):
 
 def prepared(change: Callable, probe: float = 1.0, fastest: Callable | None = None):
     """Fit, screen, and the one setting, whose signal comes from a probe."""
-    problem = Bending(change, fastest)
+    problem = stated(change, fastest)
     residuals = change(np.zeros(2), 0.0)
     slopes = np.stack([change(step, 0.0) - residuals for step in 1e-4 * np.eye(2)], 1) / 1e-4
     lines = Linearised(residuals, slopes, np.zeros(SIZE, np.int64), np.linspace(0.0, 90.0, SIZE))
-    fit = SimpleNamespace(
-        problem=problem,
-        comparing=problem,
-        linearised=lines,
-        released=(),
-        active=np.zeros((0, 2)),
-        point=SimpleNamespace(z=np.zeros(2), effects={}),
-        noise=None,
-        filtered=None,
-    )
+    fit = fit_of(problem, linearised=lines)
     cause = Cause("extra", (({"size": probe},),))
     column = (change(np.zeros(2), probe) - residuals)[:, None]
     signal = Projector(fit).signal(cause, 0, column)
@@ -213,7 +171,7 @@ def test_no_size_is_published_that_the_simulation_is_too_coarse_for():
 
 def test_settings_keep_the_shape_of_their_probe_and_turn_round_at_infinity():
     cause = Cause("limit", (({"rate": 8.0, "shape": 3.0},),))
-    signal = SimpleNamespace(cause=cause, probe=0)
+    signal = signal_of(cause, 0.0)
     setting = Setting(signal, 0, "rate", np.inf)
     assert setting.probe(4.0) == {"rate": 4.0, "shape": 3.0}
     assert setting.size(0.25) == 16.0

@@ -1,26 +1,21 @@
 """Simulations that diverge end an attempt, not the diagnosis."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
-from fish_env.inference import elimination, search
+from fish_env.inference import elimination
+from fish_env.inference.estimate.fit import fit
 from fish_env.inference.explanation import Explanation, reached
+from fish_env.inference.hypotheses import effects_of
 from fish_env.inference.search import refits, without
+from tests.inference.stated import Stated, White, apart, cause_of, effect, signal_of
+
+SIZES = {"a": 60.0, "b": 50.0, "c": 40.0}
+"""Of causes, by which they explain what is there; sketches of each are as good in that order."""
 
 
-def diverge(*arguments, **options):
+def diverge():
     raise np.linalg.LinAlgError("the simulation diverges at the start of the fit")
-
-
-def fake(name="fit"):
-    problem = SimpleNamespace(baseline=(), known={})
-    problem.subset = lambda count: problem
-    return SimpleNamespace(
-        problem=problem, effects=("a", "b"), released=(), noise=None, name=name, objective=0.0,
-        point=SimpleNamespace(z=np.zeros(0), effects={"effects.a.x": 1.0, "effects.b.x": 1.0}),
-    )  # fmt: skip
 
 
 def test_only_divergence_ends_a_fit_quietly():
@@ -29,58 +24,51 @@ def test_only_divergence_ends_a_fit_quietly():
         reached(lambda: 1 // 0)
 
 
-def test_a_cause_without_which_the_simulation_diverges_is_not_dropped(monkeypatch):
-    monkeypatch.setattr(search, "fit", diverge)
-    monkeypatch.setattr(elimination, "may_not_act", lambda fit, name: False)
-    monkeypatch.setattr(elimination, "surely_acts", lambda fit, name: False)
-    both = Explanation(("a", "b"), fake())
+@pytest.mark.parametrize("size", [1.0, 5.0])  # it may do nothing, or is needed
+def test_a_cause_without_which_the_simulation_diverges_is_not_dropped(size):
+    def alone(effects, noise):
+        return effects_of(effects) != {"a", "b"}
+
+    problem = Stated(apart({"a": [size], "b": [size]}), [effect("a"), effect("b")], diverging=alone)
+    both = Explanation(("a", "b"), fit(problem, ("a", "b"), refit_noise=False))
     assert without(both, ("a",)) is None
     assert elimination.backward_elimination(both) is both
 
 
-def contest(monkeypatch, results, shown="abc"):
-    """Three sketches, best first, and what becomes of each when it is fitted in full."""
-    sketches = [(name, SimpleNamespace(objective=i, name=name)) for i, name in enumerate("abc")]
-    monkeypatch.setattr(search, "CoarseFitter", lambda base: SimpleNamespace(base=1000.0))
-    monkeypatch.setattr(search, "starts", lambda *arguments: [])
-    by_name = dict(sketches)
-    monkeypatch.setattr(
-        search, "_coarse_fits", lambda s, base, signal, *rest: [(signal, by_name[signal])]
-    )
-    monkeypatch.setattr(search, "in_full", lambda problem, s, noise: results[s.name])
-    monkeypatch.setattr(
-        search,
-        "_at_noise",
-        lambda problem, at, noise, *spent: results.get(getattr(at, "name", None)),
-    )
-    monkeypatch.setattr(search, "_best_first", lambda tried, leader: (tried, None))
-    monkeypatch.setattr(
-        search, "_finalists", lambda found, *rest: sorted(found, key=lambda f: f[1].objective)
-    )
-    named = [Signal(name) for name in shown]
-    like = {shown[0]: [Signal(name) for name in "abc" if name not in shown]}.__getitem__
-    return refits(Explanation((), fake("base")), named, lambda step: None, like=like)
+def contest(diverging, shown="abc", steady=0.0):
+    """Three causes, some of which diverge in runs that no sketch uses.
+
+    Without any the simulation diverges where the noise is below what is steady.
+    """
+    wanted = {name: np.full(7, size) for name, size in SIZES.items()}
+    for name in diverging:
+        wanted[name][3] = np.nan
+    known = {name: effect(name) for name in SIZES}
+    problem = Stated(
+        apart(wanted), known.values(), learns=True,
+        diverging=lambda effects, noise: not effects and noise.sd < steady,
+    )  # fmt: skip
+    present = Explanation((), fit(problem, noise=White(50.0), rounds=1))
+    signals = {name: signal_of(cause_of(known[name]), SIZES[name] ** 2) for name in SIZES}
+    like = {shown[0]: [signals[name] for name in SIZES if name not in shown]}.__getitem__
+    chosen = [signals[name] for name in shown]
+    return present, *refits(present, chosen, lambda step: None, like=like)
 
 
-class Signal(str):
-    """A cause by its name."""
-
-    @property
-    def cause(self):
-        return SimpleNamespace(name=str(self))
-
-
-def test_the_best_of_those_that_do_not_diverge_leads(monkeypatch):
-    tried, base = contest(monkeypatch, {"a": None, "b": fake("b"), "c": None})
+@pytest.mark.parametrize("steady", [0.0, 35.0])
+def test_the_best_of_those_that_do_not_diverge_leads(steady):
+    present, tried, base = contest("ac", steady=steady)
     assert [e.causes for e in tried] == [("b",)]
-    assert base.fit.name == "base"  # it diverged as well, and keeps the disturbance that suits it
+    assert tried[0].fit.noise.sd < 35.0 < present.fit.noise.sd
+    # A baseline that diverges as well keeps the disturbance that suits it.
+    assert base.fit.noise == (present if steady else tried[0]).fit.noise
 
 
-def test_no_cause_is_found_where_all_diverge(monkeypatch):
-    assert contest(monkeypatch, dict.fromkeys("abc")) == ([], None)
+def test_no_cause_is_found_where_all_diverge():
+    assert contest("abc")[1:] == ([], None)
 
 
-def test_what_looks_like_the_best_is_tried_too(monkeypatch):
+def test_what_looks_like_the_best_is_tried_too():
     """A strong effect is screened far from where it is, and one that looks like it may hide it."""
-    tried, _ = contest(monkeypatch, {"a": fake("a"), "b": fake("b"), "c": fake("c")}, shown="bc")
+    _, tried, _ = contest("", shown="bc")
     assert [e.causes for e in tried] == [("a",), ("b",), ("c",)]

@@ -1,36 +1,38 @@
 """A cause that others make needless, or that may as well not act, is dropped."""
 
-from types import SimpleNamespace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from fish_env.effects import catalogue
-from fish_env.inference import elimination
 from fish_env.inference.elimination import backward_elimination, may_not_act
+from fish_env.inference.estimate.fit import fit
+from fish_env.inference.explanation import Explanation
+from tests.inference.stated import Stated, apart, effect, fit_of
 
 
-def fit_of(effect, values, sd, correlation=0.0):
-    names = [f"effects.{effect}.{p.name}" for p in catalogue()[effect].parameters]
-    count = len(names)
-    covariance = np.outer(sd, sd) * (np.eye(count) * (1 - correlation) + correlation)
-    return SimpleNamespace(
-        problem=SimpleNamespace(known=catalogue()), effects=(effect,), names=tuple(names),
-        estimates=np.array(values), covariance=covariance,
-    )  # fmt: skip
+def fit_with(name, values, sd, correlation=0.0):
+    count = len(values)
+    problem = Stated(lambda z, effects: np.zeros((1, 1)), [catalogue()[name]])
+    own = np.outer(sd, sd) * (np.eye(count) * (1 - correlation) + correlation)
+    covariance = np.eye(count + 1)
+    covariance[1:, 1:] = own
+    found = {"estimates": np.r_[0.0, values], "covariance": covariance}
+    return fit_of(problem, (name,), **found)
 
 
 @pytest.mark.parametrize(
     ("fit", "idle"),
     [
-        (fit_of("block_scale", [0.989], [0.0148]), True),
-        (fit_of("block_scale", [0.95], [0.0148]), False),
-        (fit_of("current", [0.02, 0.0, 0.0], [0.005, 0.005, 0.005]), False),
-        (fit_of("current", [0.008, 0.0, 0.0], [0.005, 0.005, 0.005]), True),
-        (fit_of("current", [0.007, 0.007, -0.007], [0.005] * 3, 0.0), True),
-        (fit_of("current", [0.007, -0.007, 0.0], [0.005] * 3, 0.9), False),
-        (fit_of("servo_rate_limit", [6.0], [9.0]), False),
-        (fit_of("wave", [1e-3, 0.4, 1.0, 2.0, 1.5], [1e-3, 1e-6, 1e-6, 1e-6, 1e-6]), True),
+        (fit_with("block_scale", [0.989], [0.0148]), True),
+        (fit_with("block_scale", [0.95], [0.0148]), False),
+        (fit_with("current", [0.02, 0.0, 0.0], [0.005, 0.005, 0.005]), False),
+        (fit_with("current", [0.008, 0.0, 0.0], [0.005, 0.005, 0.005]), True),
+        (fit_with("current", [0.007, 0.007, -0.007], [0.005] * 3, 0.0), True),
+        (fit_with("current", [0.007, -0.007, 0.0], [0.005] * 3, 0.9), False),
+        (fit_with("servo_rate_limit", [6.0], [9.0]), False),
+        (fit_with("wave", [1e-3, 0.4, 1.0, 2.0, 1.5], [1e-3, 1e-6, 1e-6, 1e-6, 1e-6]), True),
     ],
     ids=["scale", "far", "current", "weak", "all weak", "together", "infinite", "shapes"],
 )
@@ -39,24 +41,30 @@ def test_a_region_that_holds_its_absence_shows_nothing(fit, idle):
     assert may_not_act(fit, fit.effects[0]) is idle
 
 
-def test_a_coefficient_is_off_at_its_nominal_value():
-    baseline = SimpleNamespace(mean=np.array([0.0, 2.0]), paths=("tail.area", "mass.total"))
-    fit = SimpleNamespace(
-        problem=SimpleNamespace(baseline=baseline), effects=(), names=baseline.paths,
-        estimates=np.array([0.0, 2.1]), covariance=np.diag([1.0, 0.04**2]),
-    )  # fmt: skip
-    assert not may_not_act(fit, "parameter:mass.total")
-    fit.covariance[1, 1] = 0.06**2
-    assert may_not_act(fit, "parameter:mass.total")
+@pytest.mark.parametrize(("sd", "idle"), [(0.04, False), (0.06, True)])
+def test_a_coefficient_is_off_at_its_nominal_value(sd, idle):
+    problem = Stated(lambda z, effects: np.zeros((1, 1)), paths=("tail.area", "mass.total"))
+    problem.baseline.mean[1] = 2.0
+    own = fit_of(problem, estimates=np.array([0.0, 2.1]), covariance=np.diag([1.0, sd**2]))
+    assert may_not_act(own, "parameter:mass.total") is idle
 
 
-@pytest.mark.parametrize(("value", "kept"), [(0.989, ("current",)), (0.9, ("current", "scale"))])
-def test_an_idle_cause_is_dropped_whatever_its_evidence(monkeypatch, value, kept):
-    smaller = SimpleNamespace(causes=("current",), score=50.0, fit=0.0)
-    both = SimpleNamespace(causes=("current", "scale"), score=0.0, fit=value)
-    monkeypatch.setattr(
-        elimination, "without", lambda e, names: smaller if "scale" in names else None
+@pytest.mark.parametrize(("wider", "kept"), [(3.0, ("current",)), (1.0, ("current", "scale"))])
+def test_an_idle_cause_is_dropped_whatever_its_evidence(wider, kept):
+    """Evidence takes the residuals for white; the region is wider where they are coloured."""
+    problem = Stated(
+        apart({"current": [9.0], "scale": [5.0]}), [effect("current"), effect("scale")]
     )
-    monkeypatch.setattr(elimination, "may_not_act", lambda fit, name: fit > 0.95)
-    monkeypatch.setattr(elimination, "surely_acts", lambda fit, name: False)
+    own = fit(problem, ("current", "scale"), refit_noise=False)
+    both = Explanation(("current", "scale"), replace(own, covariance=own.covariance * wider**2))
+    assert fit(problem, ("current",), refit_noise=False).objective - own.objective > 20.0
     assert backward_elimination(both).causes == kept
+
+
+def test_what_the_evidence_does_not_need_is_dropped_though_it_may_act():
+    problem = Stated(
+        apart({"current": [9.0], "scale": [2.2]}), [effect("current"), effect("scale")]
+    )
+    both = Explanation(("current", "scale"), fit(problem, ("current", "scale"), refit_noise=False))
+    assert not may_not_act(both.fit, "scale")
+    assert backward_elimination(both).causes == ("current",)

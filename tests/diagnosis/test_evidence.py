@@ -1,7 +1,5 @@
 """The evidence for an explanation, where it can be computed without approximation."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
@@ -10,24 +8,19 @@ from fish_env.inference.estimate.free import Linearised
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.left_out import left_out_scores
 from fish_env.inference.policy import POLICY
+from fish_env.inference.problem import Point
 from fish_env.inference.rivals import alike
-from tests.diagnosis.linear import COEFFICIENTS, LinearProblem, Sized
+from tests.diagnosis.linear import COEFFICIENTS, PATHS, LinearProblem
+from tests.inference.stated import Evaluated, Stated, effect, fit_of, size_of
 
 LINEAR = LinearProblem(signals=2)
 RANGE = 40.0
 """Of the effect's plausible values: its prior spread is that over the square root of twelve."""
 RUNS = 6
 RUN_OF = np.repeat(np.arange(RUNS), LINEAR.size // RUNS)
-PATHS = tuple(f"c{i}" for i in range(COEFFICIENTS))
-
-
-def effect(name):
-    return SimpleNamespace(parameters=[SimpleNamespace(plausible=(-0.5 * RANGE, 0.5 * RANGE))])
-
-
-KNOWN = {name: effect(name) for name in ("first", "second")}
+KNOWN = {name: effect(name, 0.5 * RANGE) for name in ("first", "second")}
 COLUMNS = dict(zip(KNOWN, LINEAR.columns, strict=True))
-PROBLEM = SimpleNamespace(baseline=Sized(PATHS), known=KNOWN)
+PROBLEM = Stated(lambda z, effects: (LINEAR.slopes @ z)[None], KNOWN.values(), PATHS)
 
 
 def explanation(data, effects=(), released=()):
@@ -37,18 +30,13 @@ def explanation(data, effects=(), released=()):
     best = -np.linalg.solve(slopes.T @ slopes + np.diag(prior), slopes.T @ data)
     residuals = data + slopes @ best
     times = np.repeat(3.0 * np.arange(60) + 1.0, 20)
-    fit = SimpleNamespace(
-        effects=effects,
-        released=released,
-        active=np.zeros((0, slopes.shape[1])),
+    lines = Linearised(residuals, slopes, np.repeat(np.arange(RUNS), 20 * 60 // RUNS), times)
+    sizes = dict(zip(map(size_of, effects), best[COEFFICIENTS:].tolist(), strict=True))
+    fit = fit_of(
+        PROBLEM, effects, released, Point(best[:COEFFICIENTS], sizes), linearised=lines,
         objective=residuals @ residuals + prior @ best**2,
-        point=SimpleNamespace(z=best[:COEFFICIENTS]),
-        linearised=Linearised(
-            residuals, slopes, np.repeat(np.arange(RUNS), 20 * 60 // RUNS), times
-        ),
-        problem=PROBLEM,
-        filtered=[SimpleNamespace(log_likelihood=-0.5 * r @ r) for r in np.split(residuals, RUNS)],
-    )
+        filtered=[Evaluated(-0.5 * r @ r, r) for r in np.split(residuals, RUNS)],
+    )  # fmt: skip
     return Explanation((*effects, *released), fit)
 
 

@@ -1,7 +1,6 @@
 """Gain on final runs: share of the reachable gap, and predictions without feedback."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +15,7 @@ from fish_env.inference.problem import Point
 from fish_env.params import load_fish
 from fish_env.simulator import Simulator
 from tests.identification.synthetic import ALL, FISH, Setup, simulate
+from tests.inference.stated import fit_of
 
 
 def squares(level, runs=3, windows=10, seed=0):
@@ -113,7 +113,7 @@ def test_runs_of_unknown_phase_are_judged_in_step():
     problem = SeriesProblem(data, paths=(path,))
     noise = Setup(channels=problem.channels).noise
     baseline, extended = (
-        SimpleNamespace(point=Point(np.array([z]), {}), noise=noise) for z in (0.0, 3.0)
+        fit_of(problem, point=Point(np.array([z]), {}), noise=noise) for z in (0.0, 3.0)
     )
     gap = gap_closed(problem, baseline, extended, np.random.default_rng(0))
     found = measure_gain(problem, baseline, extended, gap)

@@ -11,6 +11,7 @@ from fish_env.inference.estimate.coarse_fit import CoarseFitter
 from fish_env.inference.problem import Point
 from fish_env.inference.screening import residual_changes
 from tests.identification.synthetic import PATHS, Setup, simulate
+from tests.inference.stated import Stated, apart, effect, size_of
 
 QUICK_LAG = ("servo_lag", {"time_constant": 0.01})
 SLOW_LAG = ("servo_lag", {"time_constant": 0.1})
@@ -64,27 +65,50 @@ def test_a_setting_that_long_steps_do_not_follow_takes_the_usual_ones(fitted):
     assert not np.array_equal(slow, usual[1])
 
 
-def test_only_what_jumps_is_sketched_in_the_usual_steps(fitted, monkeypatch):
-    seen = []
-    settled = CoarseFitter._surveyed
+class Jumping(Stated):
+    """Two effects, one of which makes the rate jump; with long steps it is another problem."""
 
-    def surveyed(self, problem, free, vector):
-        seen.append(problem.longest_step)
-        return settled(self, problem, free, vector)
+    def __init__(self, **settings):
+        targets = {name: [3.0, 3.0] for name in ("lag", "backlash")}
+        super().__init__(apart(targets), [effect(name) for name in targets], **settings)
 
-    monkeypatch.setattr(CoarseFitter, "_surveyed", surveyed)
-    for effect, value in (("servo_lag.time_constant", 0.05), ("servo_backlash.gap", 0.05)):
-        start = Point(fitted.point.z, {f"effects.{effect}": value})
-        CoarseFitter(fitted).coarse_fit((effect.split(".")[0],), (), [start])
-    usual = fitted.problem.longest_step
-    assert sorted(set(seen)) == pytest.approx([usual, 2.0 * usual])
-    assert seen[0] == pytest.approx(2.0 * usual)
+    def is_nonsmooth(self, names):
+        return "backlash" in names
+
+    def with_long_steps(self):
+        return self.long
+
+
+def sketched_in(problem, name):
+    """Steps of the problems that a sketch of an effect asked for residuals."""
+    problem.long = Jumping(step=2.0 * problem.step)
+    fitter = CoarseFitter(fit(problem, refit_noise=False))
+    for part in (problem, problem.long):
+        part.log.simulated.clear()
+    fitter.coarse_fit((name,), (), [Point(np.zeros(1), {size_of(name): 1.0})])
+    return [part.step for part in (problem, problem.long) if part.log.simulated]
+
+
+def test_only_what_jumps_is_sketched_in_the_usual_steps(fitted):
+    assert sketched_in(Jumping(step=0.01), "lag") == [0.02]
+    assert sketched_in(Jumping(step=0.01), "backlash") == [0.01]
+    assert [fitted.problem.is_nonsmooth([name]) for name in ("servo_lag", "servo_backlash")] == [
+        False, True,
+    ]  # fmt: skip
+
+
+LIMITED = {"runs": 1, "duration": 4.0}
+
+
+def among(own, kind):
+    """The fit to a problem of another kind, with the same runs."""
+    return replace(own, problem=kind(simulate(Setup(**LIMITED)), paths=PATHS))
 
 
 @pytest.fixture(scope="module")
 def limited():
     """A fit with a rate limit in it, and forces along it."""
-    setup = Setup(runs=1, duration=4.0)
+    setup = Setup(**LIMITED)
     problem = SeriesProblem(simulate(setup), paths=PATHS)
     limit = Point(np.zeros(len(problem.baseline)), {"effects.servo_rate_limit.rate": 2.5})
     held = {"refit_noise": False, "noise": setup.noise}
@@ -92,18 +116,33 @@ def limited():
     return own, generic_forces(problem.runs, own.filtered)
 
 
-def test_a_push_does_the_same_in_long_steps_where_the_tails_rate_jumps(limited, monkeypatch):
+class UsualSteps(SeriesProblem):
+    """A problem without long steps."""
+
+    def with_long_steps(self):
+        return self
+
+
+class DivergingSteps(SeriesProblem):
+    """A problem whose long steps do not follow what is pushed first."""
+
+    def with_long_steps(self):
+        return Diverging(super().with_long_steps())
+
+
+def test_a_push_does_the_same_in_long_steps_where_the_tails_rate_jumps(limited):
     own, forces = limited
     long = BoundForces(own, forces).changes(forces.columns)
-    monkeypatch.setattr(SeriesProblem, "with_long_steps", lambda self: self)
-    usual = BoundForces(own, forces).changes(forces.columns)
+    usual = BoundForces(among(own, UsualSteps), forces).changes(forces.columns)
     assert not np.array_equal(long, usual)
-    apart = np.linalg.norm(long - usual, axis=0) / np.linalg.norm(usual, axis=0)
-    assert apart.max() < 0.05
-    assert np.median(apart) < 0.01
+    off = np.linalg.norm(long - usual, axis=0) / np.linalg.norm(usual, axis=0)
+    assert off.max() < 0.05
+    assert np.median(off) < 0.01
 
 
-def test_pushes_that_long_steps_do_not_follow_take_the_usual_ones(limited, monkeypatch):
+def test_pushes_that_long_steps_do_not_follow_take_the_usual_ones(limited):
     own, forces = limited
-    monkeypatch.setattr(SeriesProblem, "with_long_steps", lambda self: Diverging(self))
-    assert np.isfinite(BoundForces(own, forces).changes(forces.columns[:6])).all()
+    few = forces.columns[:6]
+    found = BoundForces(among(own, DivergingSteps), forces).changes(few)
+    usual = BoundForces(among(own, UsualSteps), forces).changes(few)
+    np.testing.assert_array_equal(found, usual)

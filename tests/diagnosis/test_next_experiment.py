@@ -1,13 +1,10 @@
 """The next experiment: manoeuvres within limits, and separation that no refit can close."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
-from fish_env.diagnosis import next_experiment
 from fish_env.diagnosis.manoeuvres import DURATION_S, MENU, Manoeuvre
-from fish_env.diagnosis.next_experiment import unfollowed
+from fish_env.diagnosis.next_experiment import best_of, unfollowed
 from fish_env.inference.verdict import Verdict
 
 LIMITS = {"tail_offset": 0.6, "tail_amplitude": 0.6, "tail_frequency": 2.6,
@@ -42,19 +39,16 @@ def test_a_manoeuvre_beyond_the_servo_would_be_found():
     ("verdict", "named"),
     [("no_misfit", ("seen",)), ("ambiguous", ("seen", "hardly", "never"))],
 )
-def test_only_what_a_manoeuvre_shows_is_promised(monkeypatch, verdict, named):
+def test_only_what_a_manoeuvre_shows_is_promised(verdict, named):
     """An offset of depth changes nothing that any manoeuvre could show."""
-    rivals = {"seen": 900.0, "hardly": 4.0, "never": 0.0}
-    monkeypatch.setattr(next_experiment, "rivals_of", lambda *given: rivals)
-    sizes = np.array(list(rivals.values()))
-    monkeypatch.setattr(next_experiment, "separation", lambda *given: sizes)
-    attribution = SimpleNamespace(accepted=SimpleNamespace(fit=None), rivals=())
-    found = next_experiment.propose(attribution, Verdict(verdict), ())
+    rivals, sizes = ("seen", "hardly", "never"), np.array([900.0, 4.0, 0.0])
+    weaker = [(0.5 * sizes, manoeuvre) for manoeuvre in MENU[1:]]
+    found = best_of(Verdict(verdict), rivals, [*weaker, (sizes, MENU[0])])
+    assert found.name == MENU[0].name
     assert found.separates == named
-    rivals.pop("seen")
-    sizes = sizes[1:]
-    if verdict == "no_misfit":
-        assert next_experiment.propose(attribution, Verdict(verdict), ()) is None
+    assert found.separation == pytest.approx(sizes[: len(named)].mean())
+    without = best_of(Verdict(verdict), rivals[1:], [(sizes[1:], m) for m in MENU])
+    assert (without is None) == (verdict == "no_misfit")
 
 
 def test_separation_is_what_no_coefficient_follows():

@@ -1,88 +1,69 @@
 """A look-alike that was taken for an earlier cause gives way once the others are there."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
-from fish_env.effects import catalogue
-from fish_env.inference import search
+from fish_env.inference.estimate.coarse_fit import CoarseFitter
+from fish_env.inference.estimate.fit import fit
 from fish_env.inference.explanation import Explanation
-from fish_env.inference.probes import Cause, probes_of
+from fish_env.inference.problem import Point
 from fish_env.inference.search import substituted
+from tests.inference.stated import Stated, cause_of, effect, signal_of, size_of
 
-KNOWN = catalogue()
-
-
-def fit_of(effects, objective):
-    problem = SimpleNamespace(known=KNOWN, samples=1000, baseline=())
-    values = {f"effects.{e}.{n}": v for e in effects for n, v in KNOWN[e].neutral.items()}
-    return SimpleNamespace(
-        problem=problem, effects=effects, released=(), objective=objective, noise=None,
-        names=tuple(values), point=SimpleNamespace(z=np.zeros(1), effects=values),
-        linearised=SimpleNamespace(slopes=np.eye(50, len(values))),
-    )  # fmt: skip
+SOFT, DELAY, LAG, CURRENT = NAMES = ("soft_tail", "delay", "lag", "current")
+KNOWN = {name: effect(name, lower=0.0 if name == LAG else -np.inf) for name in NAMES}
+SHAPES = np.random.default_rng(3).standard_normal((3, 40))
+"""What the first three would do if they were alike in nothing."""
 
 
-OBJECTIVES = {("servo_lag", "current"): -50.0, ("servo_delay", "current"): 20.0}
+def swimming(acting, size, of_lag=lambda size: size):
+    """A few runs in which one of the effects acts beside a current; all but that look alike."""
+    looks = {n: SHAPES.mean(axis=0) + 0.3 * own for n, own in zip(NAMES, SHAPES, strict=False)}
+    looks[CURRENT] = np.cos(np.arange(40.0))
+    truth = {acting: size, CURRENT: 8.0}
+
+    def residuals(z, effects):
+        sizes = {name: effects[size_of(name)] for name in NAMES}
+        sizes[LAG] = of_lag(sizes[LAG])
+        off = [(sizes[name] - truth.get(name, 0.0)) * looks[name] for name in NAMES]
+        return np.tile(z[0] + sum(off), (3, 1))
+
+    return Stated(residuals, KNOWN.values())
 
 
-class Judge:
-    """Sketches whose objective is told by their effects."""
-
-    def __init__(self, fit):
-        self.fit = fit
-
-    @property
-    def base(self):
-        return self.fit.objective
-
-    def coarse_fit(self, effects, released, begin):
-        names = {p.split(".")[1] for point in begin for p in point.effects}
-        assert names == set(effects)  # nothing of the effect that was taken out
-        return SimpleNamespace(effects=effects, objective=OBJECTIVES[effects], point=begin[0])
-
-
-class Passing(Judge):
-    """Sketches that run past the effect, to where it is off, unless they begin at a small size."""
-
-    def coarse_fit(self, effects, released, begin):
-        last = begin[-1].effects
-        near = len(begin) == 1 and min(last.values()) < 0.02
-        nothing = {p: v if "current" in p else 0.0 for p, v in last.items()}
-        point = begin[0] if near else SimpleNamespace(effects=nothing)
-        objective = OBJECTIVES[effects] if near else 500.0
-        return SimpleNamespace(effects=effects, objective=objective, point=point)
-
-
-def signals(*names):
-    return [SimpleNamespace(cause=Cause(n, probes_of(KNOWN[n])), probe=0) for n in names]
-
-
-def fitted(problem, coarse, noise, iterations):
-    return fit_of(coarse.effects, coarse.objective)
-
-
-def pairs(current, *names):
-    return [(current.causes[0], signal) for signal in signals(*names)]
+def pairs(*names):
+    return [(SOFT, signal_of(cause_of(KNOWN[name]), 50.0)) for name in names]
 
 
 @pytest.mark.parametrize(
-    ("reached", "kept"), [(0.0, ("servo_lag", "current")), (-90.0, ("tail_flexibility", "current"))]
+    ("acting", "size", "fitted"),
+    [(LAG, 8.0, 1), (LAG, 2.0, 1), (SOFT, 1.5, 1), (SOFT, 8.0, 0)],  # far behind: not fitted
 )
-def test_a_better_look_alike_takes_the_place(monkeypatch, reached, kept):
-    monkeypatch.setattr(search, "CoarseFitter", Judge)
-    monkeypatch.setattr(search, "_at_noise", fitted)
-    effects = ("tail_flexibility", "current")
-    now = Explanation(effects, fit_of(effects, reached))
-    others = pairs(now, "servo_delay", "servo_lag")
-    assert substituted(now, others, 1, lambda step: None)[0].causes == kept
+def test_a_better_look_alike_takes_the_place(acting, size, fitted):
+    own = fit(swimming(acting, size), (SOFT, CURRENT), refit_noise=False)
+    now = Explanation((SOFT, CURRENT), own)
+    best, *others = substituted(now, pairs(DELAY, LAG), 1, lambda step: None)
+    assert best.causes == (acting, CURRENT)
+    assert len(others) == fitted
+    # Nothing of the effect that was taken out is left.
+    assert best.fit.point.effects.keys() == {size_of(acting), size_of(CURRENT)}
 
 
-def test_one_that_ends_switched_off_is_tried_from_each_size(monkeypatch):
-    monkeypatch.setattr(search, "CoarseFitter", Passing)
-    monkeypatch.setattr(search, "_at_noise", fitted)
-    effects = ("tail_flexibility", "current")
-    now = Explanation(effects, fit_of(effects, 0.0))
-    found = substituted(now, pairs(now, "servo_lag"), 1, lambda step: None)
-    assert found[0].causes == ("servo_lag", "current")
+def astray(size):
+    """From a large size, which explains more than a small one, the slope leads past the truth."""
+    return 20.0 * float(np.interp(size, *zip(*TURNS, strict=True)))
+
+
+TURNS = [(-9.0, 0.0), (0.0, 0.0), (0.09, -0.5), (0.2, 1.0), (0.4, 0.02), (0.8, -0.12), (9.0, -0.12)]
+"""Of what a lag does, by its size; its probes are 0.1 and 0.6."""
+
+
+def test_one_that_ends_switched_off_is_tried_from_each_size():
+    own = fit(swimming(LAG, 20.0, astray), (SOFT, CURRENT), refit_noise=False)
+    now = Explanation((SOFT, CURRENT), own)
+    both = [Point(own.point.z, {size_of(CURRENT): 8.0, size_of(LAG): size}) for size in (0.1, 0.6)]
+    alone = CoarseFitter(own).coarse_fit((LAG, CURRENT), (), both)
+    assert alone.point.effects[size_of(LAG)] == 0.0
+    best = substituted(now, pairs(LAG), 1, lambda step: None)[0]
+    assert best.causes == (LAG, CURRENT)
+    assert best.fit.point.effects[size_of(LAG)] == pytest.approx(0.2, abs=0.01)

@@ -1,21 +1,25 @@
 """The verdicts of an attribution, and that adequacy comes before a name."""
 
-from types import SimpleNamespace
-
 import pytest
 
+from fish_env.inference.adequacy import Adequacy
+from fish_env.inference.attribution import Attribution
+from fish_env.inference.explanation import Explanation
+from fish_env.inference.preconditions import Precondition
 from fish_env.inference.verdict import VERDICTS, decide
+from tests.inference.stated import Stated, apart, effect, fit_of
+
+FIT = fit_of(Stated(apart({"current": [0.0]}), [effect("current")]))
+LEFT = {reached: Adequacy(reached, -11.0, ()) for reached in (True, False)}
 
 
 def attribution(causes=(), rivals=()):
-    return SimpleNamespace(
-        accepted=SimpleNamespace(causes=tuple(causes)),
-        rivals=tuple(SimpleNamespace(causes=tuple(names)) for names in rivals),
-    )
+    accepted, *others = (Explanation(tuple(names), FIT) for names in (causes, *rivals))
+    return Attribution(Explanation((), FIT), (), accepted, tuple(others), (), 0.0)
 
 
 def shown(*excited):
-    return tuple(SimpleNamespace(excited=value) for value in excited)
+    return tuple(Precondition(f"effect {i}", 0.1, {}, None, e) for i, e in enumerate(excited))
 
 
 SEEN = shown(True, True, False)
@@ -34,7 +38,7 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_each_verdict(name):
     causes, rivals, reached, preconditions = CASES[name]
-    verdict = decide(attribution(causes, rivals), SimpleNamespace(reached=reached), preconditions)
+    verdict = decide(attribution(causes, rivals), LEFT[reached], preconditions)
     assert verdict.name == name
     assert name in VERDICTS
     assert verdict.causes == (() if name == "outside_library" else causes)
@@ -42,7 +46,7 @@ def test_each_verdict(name):
 
 
 def test_an_effect_with_a_coefficient_is_a_cause():
-    found = decide(attribution(("current", PARAMETER)), SimpleNamespace(reached=True), SEEN)
+    found = decide(attribution(("current", PARAMETER)), LEFT[True], SEEN)
     assert found.name == "cause"
     assert found.causes == ("current", PARAMETER)
 
@@ -50,5 +54,5 @@ def test_an_effect_with_a_coefficient_is_a_cause():
 def test_nothing_is_named_while_something_is_left():
     for causes in ((), (PARAMETER,), ("current", "wave")):
         for rivals in ((), (("tether",),)):
-            found = decide(attribution(causes, rivals), SimpleNamespace(reached=False), BLIND)
+            found = decide(attribution(causes, rivals), LEFT[False], BLIND)
             assert (found.name, found.causes, found.alternatives) == ("outside_library", (), ())

@@ -86,7 +86,7 @@ def told(problem, filtered, settings):
     return np.array(rows)
 
 
-def unlikeness_in_long_steps(dataset):
+def unlikeness(dataset, in_long_steps=SeriesProblem.with_long_steps):
     """Effect -> largest error of what it changes, as a share, for steps to compare causes with."""
     problem, exact = SeriesProblem(dataset), SeriesProblem(dataset, dt=1e-3)
     filtered = problem.filtered(problem.start, noise_of(problem))
@@ -95,7 +95,7 @@ def unlikeness_in_long_steps(dataset):
         for cause in causes_of(problem) if cause.is_effect
         for alternative in cause.probes for setting in alternative
     ]  # fmt: skip
-    long, fine = (told(p, filtered, settings) for p in (problem.with_long_steps(), exact))
+    long, fine = (told(p, filtered, settings) for p in (in_long_steps(problem), exact))
     visible = np.linalg.norm(fine, axis=1)
     shares = np.linalg.norm(long - fine, axis=1) / np.maximum(visible, 1e-9)
     worst = {}
@@ -106,7 +106,7 @@ def unlikeness_in_long_steps(dataset):
 
 
 def test_causes_look_the_same_in_long_steps(dataset):
-    problem, worst = unlikeness_in_long_steps(dataset)
+    problem, worst = unlikeness(dataset)
     cornered = {name for name in worst if problem.known[name].step_error > 0.0}
     assert len(worst) > 20
     assert len(cornered) >= 2
@@ -116,9 +116,12 @@ def test_causes_look_the_same_in_long_steps(dataset):
     assert max(worst[name] for name in cornered) < 0.25
 
 
-def test_still_longer_steps_would_not_do(dataset, monkeypatch):
-    monkeypatch.setattr("fish_env.identification.runs.LONG_STEP_S", 0.04)
-    assert not max(unlikeness_in_long_steps(dataset)[1].values()) < 1.0
+def test_still_longer_steps_would_not_do(dataset):
+    def longer(problem):
+        fastest = problem.model.longest_step()
+        return problem.with_runs([run.in_long_steps(fastest, 0.04) for run in problem.runs])
+
+    assert not max(unlikeness(dataset, longer)[1].values()) < 1.0
 
 
 def test_long_steps_are_those_of_the_usual_freedoms_and_never_finer(dataset):
@@ -159,9 +162,16 @@ def test_only_corners_ask_for_fine_steps(dataset):
     assert not problem.without_refinement().refines_steps(LIMIT)
 
 
-def likeness_where_it_is_off(dataset, effect):
+class AnySmallest(SeriesProblem):
+    """A problem that takes every lag for one that its steps follow."""
+
+    def freedoms(self, names):
+        return tuple(replace(f, least=-np.inf) for f in super().freedoms(names))
+
+
+def likeness_where_it_is_off(dataset, effect, kind=SeriesProblem):
     """Cosine between the slope by a lag that is off and what a lag does that steps follow."""
-    problem = SeriesProblem(dataset).without_refinement()
+    problem = kind(dataset).without_refinement()
     free, noise = Free(problem, (effect,), ()), noise_of(problem)
     (path,) = free.names[free.count :]
     nothing = Point(np.zeros(free.count), {path: 0.0})
@@ -175,10 +185,10 @@ def likeness_where_it_is_off(dataset, effect):
 
 
 @pytest.mark.parametrize("effect", ["servo_lag", "wake_memory"])
-def test_a_lag_that_is_off_can_be_switched_on(dataset, effect, monkeypatch):
+def test_a_lag_that_is_off_can_be_switched_on(dataset, effect):
     assert likeness_where_it_is_off(dataset, effect) > 0.8
-    monkeypatch.setattr("fish_env.inference.vehicle.least_followed", lambda *a: -np.inf)
-    assert likeness_where_it_is_off(dataset, effect) < 0.2  # steps too long for it diverge
+    # Steps too long for it diverge.
+    assert likeness_where_it_is_off(dataset, effect, AnySmallest) < 0.2
 
 
 def test_only_what_is_too_quick_takes_other_steps(dataset):

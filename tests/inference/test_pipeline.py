@@ -1,32 +1,76 @@
 """Where something is left: held-out runs where nothing is named, then weaker causes."""
 
-from types import SimpleNamespace
+from dataclasses import dataclass
 
+import numpy as np
 import pytest
 
-from fish_env.inference import pipeline
 from fish_env.inference.adequacy import Adequacy, Misfit
+from fish_env.inference.attribution import Attribution, attribute
+from fish_env.inference.estimate.fit import Fit, fit
+from fish_env.inference.explanation import Explanation
+from fish_env.inference.pipeline import cross_validated, with_weaker_causes
+from fish_env.inference.probes import causes_of
+from tests.inference.stated import Stated, apart, effect
+
+LEFT = Adequacy(False, -11.0, (Misfit("u", "heave", -12.0, 0.01),))
+NAMES = ("wave", *(f"effect {i}" for i in range(60)))
+UNKNOWN = "unknown"
 
 
-def found(*causes):
-    return SimpleNamespace(accepted=SimpleNamespace(causes=causes, fit=causes), tolerated=0.0)
+class Pushes:
+    """A force on each sample, in all runs alike."""
+
+    def __init__(self, problem):
+        self.problem = problem
+        self.columns = np.arange(problem.samples)
+
+    def words(self, column):
+        return f"sample {column}", "heave"
+
+    def unit(self, column):
+        return 1.0
+
+    def changes(self, columns):
+        return np.tile(np.eye(self.problem.samples)[:, columns], (self.problem.run_count, 1))
+
+
+class Pushed(Stated):
+    """A problem with generic forces."""
+
+    def generic_terms(self, fit):
+        return Pushes(self)
 
 
 @pytest.mark.parametrize(
-    ("more", "reached", "kept"),
+    ("wave", "unknown", "kept"),
     [
-        (("wave",), True, ("wave",)),
-        (("wave",), False, ()),  # it explains something, but not all
-        ((), True, ()),  # nothing weaker was found
+        (1.8, 0.0, ("wave",)),
+        (1.8, 6.0, ()),  # it explains something, but not all
+        (0.0, 0.0, ()),  # nothing weaker was found
     ],
 )
-def test_a_weaker_cause_is_kept_if_it_leaves_nothing(monkeypatch, more, reached, kept):
-    before, left = found(), SimpleNamespace(reached=False)
-    monkeypatch.setattr(pipeline, "extended", lambda *given: found(*more))
-    monkeypatch.setattr(pipeline, "adequacy", lambda *given: SimpleNamespace(reached=reached))
-    attribution, adequacy = pipeline.with_weaker_causes(before, left, (), None, print)
-    assert attribution.accepted.causes == kept
-    assert adequacy.reached == bool(kept)
+def test_a_weaker_cause_is_kept_if_it_leaves_nothing(wave, unknown, kept):
+    targets = {**dict.fromkeys(NAMES, 0.0), "wave": wave, UNKNOWN: unknown}
+    runs = {name: np.full(3, size) for name, size in targets.items()}
+    problem = Pushed(apart(runs), [effect(name) for name in targets])
+    causes = [cause for cause in causes_of(problem) if cause.name != UNKNOWN]
+    rng, said = np.random.default_rng(0), []
+    before = attribute(problem, fit(problem), causes, rng)
+    assert before.accepted.causes == ()
+    found, left = with_weaker_causes(before, LEFT, causes, rng, said.append)
+    assert ("fitting wave" in said) == (wave > 0.0)
+    assert found.accepted.causes == kept
+    assert left.reached == bool(kept)
+    assert (found is before) == (left is LEFT) == (not kept)
+
+
+@dataclass(frozen=True)
+class Foretelling:
+    """A model of what is left that gains so much on runs it has not seen."""
+
+    held_out_gain: float
+    fit: Fit
 
 
 @pytest.mark.parametrize(
@@ -37,23 +81,19 @@ def test_a_weaker_cause_is_kept_if_it_leaves_nothing(monkeypatch, more, reached,
         (("hull_compression",), -1.0, False),  # it may imitate what acts
     ],
 )
-def test_one_half_of_the_runs_refutes_chance_in_the_other(monkeypatch, causes, gain, reached):
+def test_one_half_of_the_runs_refutes_chance_in_the_other(causes, gain, reached):
     """Where nothing is named."""
     tested = []
 
     def describe(fitted, threshold, other):
-        tested.append((fitted.runs, other.runs))
-        return SimpleNamespace(held_out_gain=gain)
+        tested.append((fitted.problem.run_ids, other.run_ids))
+        return Foretelling(gain, fitted)
 
-    def some(runs):
-        return SimpleNamespace(runs=tuple(runs), noise_of=lambda fit: fit.noise)
-
-    monkeypatch.setattr(pipeline, "fit", lambda half, *given, **settings: half)
-    problem = SimpleNamespace(run_count=5, some=some)
-    own = SimpleNamespace(problem=problem, effects=(), point=None, noise=None, released=())
-    found = SimpleNamespace(accepted=SimpleNamespace(causes=causes, fit=own))
-    left = Adequacy(False, -11.0, (Misfit("u", "heave", -12.0, 0.01),))
-    after = pipeline.cross_validated(found, left, describe, print)
+    problem = Stated(apart({"hull_compression": np.ones(5)}), [effect("hull_compression")])
+    nothing, found = (Explanation(names, fit(problem, names)) for names in ((), causes))
+    attribution = Attribution(nothing, (), found, (), (), 0.0)
+    after = cross_validated(attribution, LEFT, describe, lambda step: None)
     assert after.reached == reached
     assert after.refuted == (2.0 * gain if reached else None)
-    assert tested == ([] if causes else [((0, 2, 4), (1, 3)), ((1, 3), (0, 2, 4))])
+    odd, even = ("r0", "r2", "r4"), ("r1", "r3")
+    assert tested == ([] if causes else [(odd, even), (even, odd)])

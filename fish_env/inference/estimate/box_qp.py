@@ -8,7 +8,8 @@ direction, and the free unknowns then stop far from where they want to be.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +20,8 @@ from scipy.optimize import lsq_linear
 from fish_env.arrays import BoolArray, FloatArray
 
 SignArray = npt.NDArray[np.int8]
+Found: TypeAlias = tuple[FloatArray, SignArray]
+"""A point, and its active bounds as those of :class:`BoxMinimum`."""
 CHANGES_PER_UNKNOWN = 4
 """Most changes of the active set per unknown, before the library's solver takes over."""
 KKT_TOLERANCE = 1e-10
@@ -40,44 +43,7 @@ class BoxMinimum(NamedTuple):
     active: SignArray
 
 
-def minimise_in_box(
-    curvature: FloatArray, gradient: FloatArray, lower: FloatArray, upper: FloatArray
-) -> BoxMinimum:
-    """Minimise ``gradient @ s + s @ curvature @ s / 2`` over ``lower <= s <= upper``.
-
-    Args:
-        curvature: (n, n) symmetric positive definite; it may be singular to rounding.
-        gradient: (n,) at zero, which need not be within the box.
-        lower: (n,) lower bounds, minus infinity where there is none.
-        upper: (n,) upper bounds, infinity where there is none.
-
-    Returns:
-        The minimum and its active bounds.
-
-    Raises:
-        LinAlgError: curvature or gradient is not finite, or no curvature is positive definite
-            with such a diagonal.
-        ValueError: a lower bound is above its upper bound.
-    """
-    diagonal = np.diag(curvature)
-    if not (np.isfinite(curvature).all() and np.isfinite(gradient).all() and (diagonal > 0).all()):
-        raise LinAlgError("the curvature is not positive definite, or the gradient is not finite")
-    if (lower > upper).any():
-        i = int(np.argmax(lower > upper))
-        raise ValueError(f"unknown {i}: lower bound {lower[i]} is above upper bound {upper[i]}")
-    # Unit diagonal: unknowns of all sizes are then alike to tolerances and pivots.
-    unit = 1.0 / np.sqrt(diagonal)
-    model = _Model(curvature * unit * unit[:, None], gradient * unit, lower / unit, upper / unit)
-    found = model.by_active_set() if len(gradient) else (gradient, gradient.astype(np.int8))
-    if found is None or not model.is_minimum(*found):
-        found = model.by_library()
-    x, active = found
-    step = np.clip(x * unit, lower, upper)
-    step[active < 0], step[active > 0] = lower[active < 0], upper[active > 0]
-    return BoxMinimum(step, active)
-
-
-class _Model(NamedTuple):
+class BoxModel(NamedTuple):
     """A quadratic model of unit diagonal and its box."""
 
     curvature: FloatArray
@@ -85,7 +51,7 @@ class _Model(NamedTuple):
     lower: FloatArray
     upper: FloatArray
 
-    def by_active_set(self) -> tuple[FloatArray, SignArray] | None:
+    def by_active_set(self) -> Found | None:
         """The minimum and its active bounds; None where rounding keeps it from being found."""
         everything = np.ones(len(self.gradient), bool)
         free = self._newton(everything, self.gradient)
@@ -114,7 +80,7 @@ class _Model(NamedTuple):
             active[int(np.argmax(inward))] = 0
         return None
 
-    def by_library(self) -> tuple[FloatArray, SignArray]:
+    def by_library(self) -> Found:
         """The same by :func:`scipy.optimize.lsq_linear`, tiny eigenvalues raised."""
         values, vectors = eigh(self.curvature)
         root = np.sqrt(np.maximum(values, SMALLEST_EIGENVALUE * max(values[-1], 1.0)))
@@ -168,3 +134,47 @@ class _Model(NamedTuple):
         """Slopes (n,) of this size may be rounding."""
         terms = np.abs(self.gradient) + np.abs(self.curvature) @ np.abs(x)
         return np.asarray(KKT_TOLERANCE * terms)
+
+
+def minimise_in_box(
+    curvature: FloatArray,
+    gradient: FloatArray,
+    lower: FloatArray,
+    upper: FloatArray,
+    method: Callable[[BoxModel], Found | None] = BoxModel.by_active_set,
+    fallback: Callable[[BoxModel], Found] = BoxModel.by_library,
+) -> BoxMinimum:
+    """Minimise ``gradient @ s + s @ curvature @ s / 2`` over ``lower <= s <= upper``.
+
+    Args:
+        curvature: (n, n) symmetric positive definite; it may be singular to rounding.
+        gradient: (n,) at zero, which need not be within the box.
+        lower: (n,) lower bounds, minus infinity where there is none.
+        upper: (n,) upper bounds, infinity where there is none.
+        method: finds a minimum, or None; what it finds is checked.
+        fallback: finds one where the method does not.
+
+    Returns:
+        The minimum and its active bounds.
+
+    Raises:
+        LinAlgError: curvature or gradient is not finite, or no curvature is positive definite
+            with such a diagonal.
+        ValueError: a lower bound is above its upper bound.
+    """
+    diagonal = np.diag(curvature)
+    if not (np.isfinite(curvature).all() and np.isfinite(gradient).all() and (diagonal > 0).all()):
+        raise LinAlgError("the curvature is not positive definite, or the gradient is not finite")
+    if (lower > upper).any():
+        i = int(np.argmax(lower > upper))
+        raise ValueError(f"unknown {i}: lower bound {lower[i]} is above upper bound {upper[i]}")
+    # Unit diagonal: unknowns of all sizes are then alike to tolerances and pivots.
+    unit = 1.0 / np.sqrt(diagonal)
+    model = BoxModel(curvature * unit * unit[:, None], gradient * unit, lower / unit, upper / unit)
+    found = method(model) if len(gradient) else (gradient, gradient.astype(np.int8))
+    if found is None or not model.is_minimum(*found):
+        found = fallback(model)
+    x, active = found
+    step = np.clip(x * unit, lower, upper)
+    step[active < 0], step[active > 0] = lower[active < 0], upper[active > 0]
+    return BoxMinimum(step, active)

@@ -16,14 +16,20 @@ AT_ONCE = 1_000_000
 """Numbers of the blocks' products held at a time."""
 
 
-def inner(a: FloatArray, b: FloatArray) -> FloatArray:
-    """``a.T @ b`` of tall matrices (D, n) and (D, m)."""
+def inner(a: FloatArray, b: FloatArray, at_once: int = AT_ONCE) -> FloatArray:
+    """``a.T @ b`` of tall matrices (D, n) and (D, m).
+
+    Args:
+        a: (D, n) tall.
+        b: (D, m) tall.
+        at_once: numbers of the blocks' products held at a time.
+    """
     count = len(a) // BLOCK
     whole = count * BLOCK
     rows_a = a[:whole].T.reshape(a.shape[1], count, BLOCK).transpose(1, 0, 2)
     rows_b = b[:whole].T.reshape(b.shape[1], count, BLOCK).transpose(1, 2, 0)
     total: FloatArray = np.zeros((a.shape[1], b.shape[1]))
-    step = max(1, AT_ONCE // max(1, total.size))
+    step = max(1, at_once // max(1, total.size))
     for first in range(0, count, step):
         products = rows_a[first : first + step] @ rows_b[first : first + step]
         products[0] += total  # so that the order of the sum does not depend on the step

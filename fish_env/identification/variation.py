@@ -59,6 +59,8 @@ SENSOR_ERRORS = (
 5 Hz inside an inertial unit takes away; the picture of a camera
 some metres above the water shrinks with depth, by the refractive index and its height."""
 EVERY = (*VARIATIONS, *SENSOR_ERRORS)
+UPRIGHT = ("z", "roll", "pitch", "w", "p", "q")
+"""Channels that show how a fish floats. A camera above the tank alone sees none of them."""
 _MASS, _BUOYANCY = RECORD_FIELDS.index("mass_total"), RECORD_FIELDS.index("mass_buoyancy")
 _STATIC = {f"trim_{axis}": RECORD_FIELDS.index(f"static_{axis}") for axis in "xyz"}
 _GYROS = {"gyro_zero_p": "p", "gyro_zero_q": "q", "gyro_zero_r": "r"}
@@ -72,6 +74,13 @@ def varied_records(records: FloatArray, own: FloatArray) -> FloatArray:
         moved[row] += own[_INDEX[name]] * records[_MASS]
     moved[_BUOYANCY] += own[_INDEX["buoyancy"]]
     return moved
+
+
+def unseen(channels: Sequence[str]) -> list[int]:
+    """Numbers of runs that none of the channels would show: they stay zero, and nobody is told."""
+    if not set(UPRIGHT).isdisjoint(channels):
+        return []
+    return [i for name, i in _INDEX.items() if name.startswith(("trim_", "buoyancy"))]
 
 
 def varied_bias(bias: FloatArray, own: FloatArray, channels: Sequence[str]) -> FloatArray:

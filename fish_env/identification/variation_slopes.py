@@ -10,13 +10,15 @@ import numpy as np
 from fish_env.arrays import FloatArray
 from fish_env.identification.filtering import Filtered, Measurement, NoiseModel, RunFilter
 from fish_env.identification.tail_drive import RATE, SCALE
-from fish_env.identification.variation import BEAT, SAG
+from fish_env.identification.variation import BEAT, SAG, unseen
 from fish_env.inference.hypotheses import effects_of
 from fish_env.inference.problem import Point
 
 
 class Swimming(Protocol):
     """Runs and the filter on them."""
+
+    channels: tuple[str, ...]
 
     def neutral(self, names: Iterable[str]) -> dict[str, float]:
         """Values of effects as the fish's file has them, neutral where it says nothing."""
@@ -60,4 +62,6 @@ def swum_slopes(
     more[[BEAT, SAG]] = 0.0
     lanes = problem.lanes(np.repeat(point.z[:, None], count, axis=1), effects)
     rows = problem.filter_for(effects).innovations(*lanes, noise, filtered, variation=more)
-    return np.asarray((rows[1:] - rows[0]).T / steps)
+    slopes = np.asarray((rows[1:] - rows[0]).T / steps)
+    slopes[:, unseen(problem.channels)] = 0.0
+    return slopes

@@ -92,3 +92,17 @@ def test_a_camera_alone_has_no_inertial_unit_and_sees_no_depth():
     assert acting == {"marker_x", "marker_y", "marker_z", "camera_delay"}
     late = changes[:, channels.index("yaw"), NAMES.index("camera_delay")]
     assert np.abs(late).max() > 0.0
+
+
+@pytest.mark.parametrize(("channels", "floats"), [(("x", "y", "yaw"), False), (("x", "z"), True)])
+def test_a_camera_above_tells_nothing_of_how_a_fish_floats(channels, floats):
+    problem = SeriesProblem(simulate(Setup(runs=1, channels=channels)), paths=PATHS)
+    noise = problem.default_noise()
+    filtered = problem.filtered(problem.start, noise, keep_slopes=True)
+    steps = np.array([0.3 * v.usual for v in problem.variations])
+    slopes = problem.variation_slopes(problem.start, noise, filtered, steps)
+    named = {
+        v.name: np.abs(part).max() for v, part in zip(problem.variations, slopes.T, strict=True)
+    }
+    assert (named["trim_x"] > 0.0) == (named["buoyancy"] > 0.0) == floats
+    assert named["clock_offset"] > 0.0

@@ -162,7 +162,7 @@ def _in_words(episode: Episode, follower: PathFollower | None) -> str:
     return (
         f"{verdict}: over the last 10 s it was off by at most "
         f"{f'{beside:.1f} cm beside its path, ' if beside > 0 else ''}"
-        f"{100 * end.worst('depth_error'):.1f} cm, "
+        f"{100 * end.worst('depth_error'):.1f} cm in depth, "
         f"{np.degrees(end.worst('heading_error')):.1f} degrees over a tail beat and "
         f"{100 * end.worst('speed_error') / end.worst('goal_speed'):.0f} % of the speed."
     )

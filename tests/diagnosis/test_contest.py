@@ -72,8 +72,8 @@ def contest(
     present = Explanation(causes, fit(problem, causes, refit_noise=False))
     problem.learns, problem.log = learns, Log()
     begun = {name: wanted[name][0] - min(SHORT, 0.5 * wanted[name][0]) for name in gains}
-    probe = ((({SIZE: 1.0},),),)
-    named = {n: signal_of(cause_of(known[n], *probe), size**2) for n, size in begun.items()}
+    probes = (({SIZE: 1.0},),)
+    named = {n: signal_of(cause_of(known[n], probes), size**2) for n, size in begun.items()}
     hidden, lost = ([named[name] for name in names] for names in (unseen, wandering))
     seen = [named[name] for name in gains if name not in (*unseen, *wandering)]
     said = []

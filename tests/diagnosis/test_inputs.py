@@ -11,11 +11,11 @@ import yaml
 from fish_env.data import Dataset, load_dataset, write_dataset
 from fish_env.diagnosis.headline import headline
 from fish_env.diagnosis.inputs import check as check_module
-from fish_env.diagnosis.inputs import search as search_module
 from fish_env.diagnosis.inputs.changes import Change
 from fish_env.diagnosis.inputs.check import check_inputs, refuse_wrong_inputs
 from fish_env.diagnosis.inputs.lines import Lines
-from fish_env.diagnosis.inputs.search import Found
+from fish_env.diagnosis.inputs.search import Found, search
+from fish_env.diagnosis.inputs.weighing import Scales
 from fish_env.diagnosis.report.measurements import input_checks
 from fish_env.errors import DatasetError
 from fish_env.params import load_fish
@@ -204,16 +204,15 @@ def test_lines_name_columns_and_units_as_the_file_does():
     assert lines.signs(("y",)) == "channels: {x: {column: e, unit: m, sign: -1}}"
 
 
-def test_without_the_search_no_mistake_is_found(monkeypatch):
-    """The tests above test the search, and not something else that would find them."""
-    good = sensed(NINE, FIRST)
-    bad = spoilt(good, column("yaw", -1.0))
-    assert told(bad)
-    monkeypatch.setattr(search_module, "LEVEL", 0.0)
-    assert told(bad) == []
+def test_what_is_told_is_what_the_search_finds_and_puts_right():
+    bad = spoilt(sensed(NINE, FIRST), column("yaw", -1.0))
+    (fault,), scales = told(bad), Scales(load_fish(bad.fish))
+    (found,), right = search(bad, scales)
+    assert (fault.fix, fault.log_evidence) == (found.change.line, found.gain)
+    assert search(right, scales)[0] == []
 
 
-def test_a_fit_refuses_what_binds(monkeypatch):
+def test_a_fit_refuses_what_binds():
     bad = spoilt(sensed(NINE, FIRST), column("r", -1.0))
     with pytest.raises(DatasetError, match=r"r has the wrong sign.*channels: \{r: "):
         refuse_wrong_inputs(bad)

@@ -15,11 +15,17 @@ from tests.inference.stated import Stated, apart, effect, size_of
 
 QUICK_LAG = ("servo_lag", {"time_constant": 0.01})
 SLOW_LAG = ("servo_lag", {"time_constant": 0.1})
+SHORT = {"runs": 1, "duration": 4.0}
+
+
+def among(own, kind):
+    """The fit to a problem of another kind, with the same runs."""
+    return replace(own, problem=kind(simulate(Setup(**SHORT)), paths=PATHS))
 
 
 @pytest.fixture
 def fitted():
-    setup = Setup(runs=1, duration=4.0)
+    setup = Setup(**SHORT)
     problem = SeriesProblem(simulate(setup), paths=PATHS)
     return fit(problem, iterations=1, refit_noise=False, noise=setup.noise)
 
@@ -54,12 +60,23 @@ class Diverging:
         return out
 
 
+class UsualSteps(SeriesProblem):
+    """A problem without long steps."""
+
+    def with_long_steps(self):
+        return self
+
+
+class DivergingSteps(SeriesProblem):
+    """A problem whose long steps do not follow the first setting."""
+
+    def with_long_steps(self):
+        return Diverging(super().with_long_steps())
+
+
 def test_a_setting_that_long_steps_do_not_follow_takes_the_usual_ones(fitted):
-    own = replace(fitted)
-    object.__setattr__(own, "comparing", Diverging(fitted.comparing))
-    quick, slow = changes(own, QUICK_LAG, SLOW_LAG)
-    object.__setattr__(own, "comparing", own.problem)
-    usual = changes(own, QUICK_LAG, SLOW_LAG)
+    quick, slow = changes(among(fitted, DivergingSteps), QUICK_LAG, SLOW_LAG)
+    usual = changes(among(fitted, UsualSteps), QUICK_LAG, SLOW_LAG)
     np.testing.assert_array_equal(quick, usual[0])
     assert np.linalg.norm(slow - usual[1]) < 0.01 * np.linalg.norm(usual[1])
     assert not np.array_equal(slow, usual[1])
@@ -97,37 +114,15 @@ def test_only_what_jumps_is_sketched_in_the_usual_steps(fitted):
     ]  # fmt: skip
 
 
-LIMITED = {"runs": 1, "duration": 4.0}
-
-
-def among(own, kind):
-    """The fit to a problem of another kind, with the same runs."""
-    return replace(own, problem=kind(simulate(Setup(**LIMITED)), paths=PATHS))
-
-
 @pytest.fixture(scope="module")
 def limited():
     """A fit with a rate limit in it, and forces along it."""
-    setup = Setup(**LIMITED)
+    setup = Setup(**SHORT)
     problem = SeriesProblem(simulate(setup), paths=PATHS)
     limit = Point(np.zeros(len(problem.baseline)), {"effects.servo_rate_limit.rate": 2.5})
     held = {"refit_noise": False, "noise": setup.noise}
     own = fit(problem, ("servo_rate_limit",), limit, iterations=1, **held)
     return own, generic_forces(problem.runs, own.filtered)
-
-
-class UsualSteps(SeriesProblem):
-    """A problem without long steps."""
-
-    def with_long_steps(self):
-        return self
-
-
-class DivergingSteps(SeriesProblem):
-    """A problem whose long steps do not follow what is pushed first."""
-
-    def with_long_steps(self):
-        return Diverging(super().with_long_steps())
 
 
 def test_a_push_does_the_same_in_long_steps_where_the_tails_rate_jumps(limited):

@@ -29,8 +29,7 @@ def alarms(problem, threshold, repeats=400, corrected=True, **data):
     for _ in range(repeats):
         tested = signals(problem.fit(rng, **data), problem)
         if not corrected:
-            for s in tested:
-                object.__setattr__(s, "variance_inflation", 1.0)
+            tested = [replace(s, variance_inflation=1.0) for s in tested]
         found += min(s.log_p for s in tested) < threshold
     return found / repeats
 
@@ -116,8 +115,7 @@ def test_p_values_are_uniform_where_nothing_is_wrong(settings):
     rng, values = np.random.default_rng(2), []
     for _ in range(500):
         signal = signals(problem.fit(rng), problem)[0]
-        object.__setattr__(signal, "variance_inflation", 1.0)
-        values.append(np.exp(signal.log_p))
+        values.append(np.exp(replace(signal, variance_inflation=1.0).log_p))
     assert kstest(values, "uniform").pvalue > 0.01
     assert kstest(np.array(values) ** 1.5, "uniform").pvalue < 0.01
 
@@ -152,8 +150,7 @@ def test_the_smallest_detectable_size_is_found_four_times_in_five():
     problem = LinearProblem(signals=1)
     threshold = threshold_of(problem)
     rng = np.random.default_rng(3)
-    first = signals(problem.fit(rng), problem)[0]
-    object.__setattr__(first, "variance_inflation", 1.0)
+    first = replace(signals(problem.fit(rng), problem)[0], variance_inflation=1.0)
     size = smallest_detectable(first, 0, threshold)
     shift = -size * problem.columns[0][:, 0]
     power = alarms(problem, threshold, 400, corrected=False, added=shift)

@@ -9,7 +9,7 @@ import numpy as np
 
 from fish_env.arrays import FloatArray
 from fish_env.identification.filtering import Filtered, Measurement, NoiseModel, RunFilter
-from fish_env.identification.tail_drive import RATE, SCALE
+from fish_env.identification.tail_drive import RATE, SCALE, TailDrive
 from fish_env.identification.variation import BEAT, SAG, unseen
 from fish_env.inference.hypotheses import effects_of
 from fish_env.inference.problem import Point
@@ -19,6 +19,7 @@ class Swimming(Protocol):
     """Runs and the filter on them."""
 
     channels: tuple[str, ...]
+    drive: TailDrive
 
     def neutral(self, names: Iterable[str]) -> dict[str, float]:
         """Values of effects as the fish's file has them, neutral where it says nothing."""
@@ -44,7 +45,8 @@ def swum_slopes(
 ) -> FloatArray:
     """(D, K) change of each innovation with its own run's numbers, by differences.
 
-    A run's commands hold its beat, so the model's own effects change that.
+    A run's commands hold its beat, so the model's own effects change that. Where runs share one
+    beat none has another.
 
     Args:
         problem: the runs.
@@ -64,4 +66,6 @@ def swum_slopes(
     rows = problem.filter_for(effects).innovations(*lanes, noise, filtered, variation=more)
     slopes = np.asarray((rows[1:] - rows[0]).T / steps)
     slopes[:, unseen(problem.channels)] = 0.0
+    if not problem.drive.uneven:
+        slopes[:, [BEAT, SAG]] = 0.0
     return slopes

@@ -11,6 +11,7 @@ from fish_env.data import CommandSteps
 from fish_env.identification.own_beats import CLEARLY, LEAST, OwnBeats, own_beats, with_own_beats
 from fish_env.identification.runs import FREQUENCY
 from fish_env.identification.series import SeriesProblem
+from fish_env.identification.variation import BEAT, SAG
 from tests.identification.synthetic import Setup, simulate
 
 SETUP = Setup(runs=5, duration=24.0)
@@ -99,3 +100,14 @@ def test_two_runs_that_differ_are_enough_beside_a_misfit():
     lost = 0.5 * SETUP.duration * np.array(list(beats.sags.values()))
     found = np.array(list(beats.own.values())) * (1.0 - lost)
     np.testing.assert_allclose(found, ratios, atol=LEAST)
+
+
+@pytest.mark.parametrize("differ", [False, True])
+def test_only_runs_that_differ_may_have_a_beat_of_their_own(dataset, differ):
+    own = {"r1": 1.004} if differ else {}
+    problem = with_own_beats(SeriesProblem(dataset), OwnBeats(1.0, own))
+    noise = problem.default_noise()
+    filtered = problem.filtered(problem.start, noise, keep_slopes=True)
+    steps = np.array([0.3 * v.usual for v in problem.variations])
+    slopes = problem.variation_slopes(problem.start, noise, filtered, steps)
+    assert np.abs(slopes[:, [BEAT, SAG]]).max(axis=0).astype(bool).tolist() == [differ, differ]

@@ -23,7 +23,7 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "ROBOFISH_THREADS"):
 from rich.progress import track  # noqa: E402
 
 from fish_env.diagnosis.inputs.check import check_inputs  # noqa: E402
-from fish_env.identification.own_beats import CLEARLY, TELLING, own_beats  # noqa: E402
+from fish_env.identification.own_beats import CLEARLY, NOTICEABLE, TELLING, own_beats  # noqa: E402
 from fish_env.identification.series import SeriesProblem  # noqa: E402
 from fish_env.identification.tail_drive import tail_drive  # noqa: E402
 from scripts.hidden_runs import hidden_runs  # noqa: E402
@@ -59,9 +59,11 @@ def main() -> None:
     for name, tiers in (("one beat", ALIKE), ("own beats", DIFFERENT)):
         own = [row for row in rows if row["tier"] in tiers]
         clear = sum(max(row["gains"].values(), default=0.0) > CLEARLY for row in own)
-        several = sum(len(row["gains"]) >= TELLING for row in own)
+        several = sum(
+            sum(gain > NOTICEABLE for gain in row["gains"].values()) >= TELLING for row in own
+        )
         print(f"{name}: {clear} of {len(own)} sets have a run above {CLEARLY}")
-        print(f"{name}: {several} of {len(own)} sets have {TELLING} runs with a beat of their own")
+        print(f"{name}: {several} of {len(own)} sets have {TELLING} runs above {NOTICEABLE}")
     print(write_dated(options.out, "own-beats", {"clearly": CLEARLY, "rows": rows}))
 
 

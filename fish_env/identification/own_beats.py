@@ -9,7 +9,7 @@ left of both as something the runs differ in. What the runs share is a cause, to
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -37,10 +37,11 @@ LEAST = 1.5e-3
 CLEARLY = 0.2
 """Share of what the common beat leaves that the own beat of a single run has to take away for runs
 to differ. Of 24 sets of runs with one beat two had such a run."""
-TELLING = 2
-"""Runs with a beat of their own that say that runs differ, however little each takes away: beside a
-misfit it is little. Of the 24 sets with one beat none had two, where beats differ as servos do all
-had (`scripts/calibrate_own_beats.py`)."""
+TELLING, NOTICEABLE = 2, 0.05
+"""Runs with a beat of their own that say that runs differ, and the share that each has to take
+away: beside a misfit it is less than where nothing else is wrong. In short runs, whose beat is
+hardly known, it is a hundredth. No set of runs with one beat has two such runs, where beats differ
+as servos do all have (`scripts/calibrate_own_beats.py`)."""
 FEWEST = 3
 
 
@@ -92,10 +93,17 @@ def own_beats(problem: SeriesProblem) -> OwnBeats:
         found[run.id] = _minimum(mine, comb, own) / together
         if abs(found[run.id] - 1.0) >= LEAST:
             gains[run.id] = 1.0 - float(mine[own] / mine[common])
-    if len(gains) < TELLING and max(gains.values(), default=0.0) <= CLEARLY:
+    if not _differ(gains.values()):
         return OwnBeats(together, gains=gains)
     drive = replace(problem.drive.at(together), uneven=True)
     return replace(_sagging(free.with_drive(drive), found), common=together, gains=gains)
+
+
+def _differ(gains: Iterable[float]) -> bool:
+    """Whether runs differ, by the shares that their own beats take away."""
+    largest = sorted(gains, reverse=True)
+    several = len(largest) >= TELLING and largest[TELLING - 1] > NOTICEABLE
+    return several or max(largest, default=0.0) > CLEARLY
 
 
 def _sagging(problem: SeriesProblem, own: Mapping[str, float]) -> OwnBeats:

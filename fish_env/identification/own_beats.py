@@ -36,7 +36,7 @@ LEAST = 1.5e-3
 """Difference of two beats below which the comb cannot tell them apart."""
 CLEARLY = 0.2
 """Share of what the common beat leaves that the own beat of a single run has to take away for runs
-to differ. Of 24 sets of runs with one beat two had such a run."""
+to differ. Of 30 sets of runs with one beat one had such a run."""
 TELLING, NOTICEABLE = 2, 0.05
 """Runs with a beat of their own that say that runs differ, and the share that each has to take
 away: beside a misfit it is less than where nothing else is wrong. In short runs, whose beat is

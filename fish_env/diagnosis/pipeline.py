@@ -164,7 +164,7 @@ def _diagnose_runs(
     every = SeriesProblem(dataset, fish, dt=effort.step_s)
     every = every.with_drive(tail_drive(inputs.drive, inputs.drive_certain))
     if effort.retries:
-        every = with_own_beats(every, own_beats(every))
+        every = with_own_beats(every, own_beats(every, inputs.beats_corrected))
     chosen = _named(every, fitted)
     problem = chosen.some(chosen.spread(effort.runs)).until(effort.seconds)
     judging = _named(every, final) if final else None

@@ -64,11 +64,12 @@ class OwnBeats:
     gains: Mapping[str, float] = field(default_factory=dict)
 
 
-def own_beats(problem: SeriesProblem) -> OwnBeats:
+def own_beats(problem: SeriesProblem, differ: bool = False) -> OwnBeats:
     """Tail frequencies of runs by a comb of them, and how they sag where runs differ.
 
     Args:
         problem: all runs, those that are kept for judging too.
+        differ: whether runs are known to differ in their beat.
     """
     free = problem.with_runs([_with_free_phase(run) for run in problem.runs])
     if len(free.runs) < FEWEST or "frequency_scale" in free.model.effects:
@@ -93,7 +94,7 @@ def own_beats(problem: SeriesProblem) -> OwnBeats:
         found[run.id] = _minimum(mine, comb, own) / together
         if abs(found[run.id] - 1.0) >= LEAST:
             gains[run.id] = 1.0 - float(mine[own] / mine[common])
-    if not _differ(gains.values()):
+    if not (differ or _differ(gains.values())):
         return OwnBeats(together, gains=gains)
     drive = replace(problem.drive.at(together), uneven=True)
     return replace(_sagging(free.with_drive(drive), found), common=together, gains=gains)

@@ -62,6 +62,11 @@ class Inputs:
         """Whether the verdict is `inputs`."""
         return any(fault.binds for fault in self.faults)
 
+    @property
+    def beats_corrected(self) -> bool:
+        """Whether commands were put right by beats that the swaying of the hull shows."""
+        return any(f.kind == "beat" and f.decisive and f.corrected for f in self.faults)
+
     def as_list(self) -> list[Mapping[str, Any]]:
         """What ``diagnosis.json`` holds under ``inputs``."""
         return [fault.as_dict() for fault in self.faults]

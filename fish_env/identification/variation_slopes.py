@@ -56,16 +56,16 @@ def swum_slopes(
         steps: (K,) of each number, see ``variation.VARIATIONS``.
     """
     count = 1 + len(steps)
-    told = {**problem.neutral(effects_of((SCALE, RATE))), **point.effects}
+    beats = effects_of((SCALE, RATE)) if problem.drive.uneven else ()
+    told = {**problem.neutral(beats), **point.effects}
     effects = {path: np.full(count, value) for path, value in told.items()}
-    effects[SCALE][1 + BEAT] *= 1.0 + steps[BEAT]
-    effects[RATE][1 + SAG] += steps[SAG]
+    if problem.drive.uneven:
+        effects[SCALE][1 + BEAT] *= 1.0 + steps[BEAT]
+        effects[RATE][1 + SAG] += steps[SAG]
     more = np.column_stack([np.zeros(len(steps)), np.diag(steps)])
     more[[BEAT, SAG]] = 0.0
     lanes = problem.lanes(np.repeat(point.z[:, None], count, axis=1), effects)
     rows = problem.filter_for(effects).innovations(*lanes, noise, filtered, variation=more)
     slopes = np.asarray((rows[1:] - rows[0]).T / steps)
     slopes[:, unseen(problem.channels)] = 0.0
-    if not problem.drive.uneven:
-        slopes[:, [BEAT, SAG]] = 0.0
     return slopes

@@ -260,25 +260,43 @@ class OrbitFinder:
         states = self.swimmer.at_rest(self.commands[lanes], self.records[:, lanes])
         return self.beat(states, lanes, beats)[0]
 
-    def find(self, near: Orbits | None = None, afresh: bool = False) -> Orbits:
+    def find(self, near: Orbits | None = None, afresh: bool = False, alike: bool = False) -> Orbits:
         """Steady motion of all fish.
+
+        It is followed from where it was: a change of the fish that loses it is too large, and a
+        search from rest would find another motion, if any.
 
         Args:
             near: that of fish nearly alike, one for each; without it they start from rest.
             afresh: whether to work out derivatives anew where the motion near has given them.
+            alike: whether fish are so much alike that where one has none, its like has none.
         """
-        everyone = np.arange(len(self.commands))
+        asked = np.arange(len(self.commands))
         if near is None:
-            orbits = self._search(self.from_rest(everyone, BEATS_FROM_REST[0]), everyone, None)
+            orbits = self._search(self.from_rest(asked, BEATS_FROM_REST[0]), asked, None)
         else:
-            orbits = self._search(self._carried(near), everyone, near.slopes)
-            if afresh:
-                orbits = replace(orbits, slopes=self.slopes(orbits.states, everyone))
-        lost = np.flatnonzero(~(orbits.found & dies_out(orbits.slopes)))
-        if len(lost):
+            asked = np.flatnonzero(near.found) if alike else asked
+            orbits = self._near(near, asked, afresh)
+        lost = asked[~_steady(orbits)[asked]]
+        if len(lost) and near is None:
             again = self._search(self.from_rest(lost, BEATS_FROM_REST[1]), lost, None)
             orbits = orbits.updated(lost, again)
-        return replace(orbits, found=orbits.found & dies_out(orbits.slopes))
+        return replace(orbits, found=_steady(orbits))
+
+    def _near(self, near: Orbits, lanes: IntArray, afresh: bool) -> Orbits:
+        """Steady motion of some of the fish, looked for near that of like fish, and of no other."""
+        carried = self._carried(near)
+        orbits = Orbits(carried, near.slopes, near.means, np.zeros_like(near.found))
+        if not len(lanes):
+            return orbits
+        found = self._search(carried[:, lanes], lanes, near.slopes[lanes])
+        if afresh:
+            found = replace(found, slopes=self.slopes(found.states, lanes))
+        orbits = orbits.updated(lanes, found)
+        lost = lanes[~_steady(orbits)[lanes]]
+        if len(lost):
+            orbits = orbits.updated(lost, self._search(carried[:, lost], lost, None))
+        return orbits
 
     def _carried(self, near: Orbits) -> FloatArray:
         """States of other fish as a start: what effects add is set anew where kernels differ."""
@@ -331,6 +349,11 @@ def _repeats(before: FloatArray, after: FloatArray) -> BoolArray:
     """Whether the states that effects add have settled, too."""
     rows = slice(len(BASE_STATES), None)
     return np.asarray(np.all(np.abs(after[rows] - before[rows]) < 1e-4, axis=0))
+
+
+def _steady(orbits: Orbits) -> BoolArray:
+    """Whether the motion of each fish repeats, and small disturbances of it die out."""
+    return np.asarray(orbits.found & dies_out(orbits.slopes))
 
 
 def dies_out(slopes: FloatArray) -> BoolArray:

@@ -188,17 +188,15 @@ class TableProblem(Problem):
         """What the averages miss (N, D) at many points, in standard deviations of the noise.
 
         NaN where motion is not steady. Motion is looked for near that of the first point, that of
-        the first near the evaluation's.
+        the first near the evaluation's. Where the first has none, the others are not asked.
         """
         known = joined([s.orbit for s in filtered])
         first = self._finder(z[:, :1], {path: own[:1] for path, own in effects.items()})
         centre = first.find(known, afresh=True)
         means, count = [self.means(centre)], z.shape[1] - 1
         if count:
-            lost = np.flatnonzero(~centre.found)
-            near = centre.updated(lost, known.take(lost))
             others = self._finder(z[:, 1:], {path: own[1:] for path, own in effects.items()})
-            found = others.find(near.take(np.tile(np.arange(self.run_count), count)))
+            found = others.find(centre.take(np.tile(np.arange(self.run_count), count)), alike=True)
             means.append(self.means(found))
         return self.missed(np.concatenate(means), noise)
 

@@ -12,6 +12,8 @@ FEWEST_STUCK = 10
 """Samples in a row of one value; fewer may be coarse digits."""
 CHANCE = 1e-6
 """How likely such a row may be by coarse digits alone."""
+COARSE = 0.2
+"""Distinct values, as a share of all, below which digits hide the noise of a body at rest."""
 LEAP = 0.5
 """Usual steps by which a channel leaps into or out of a row of one value; a fish that comes to
 move after a rest does so more smoothly."""
@@ -28,6 +30,8 @@ _TURNING = ("roll", "yaw")
 def check_stuck(place: str, run: RecordedRun, channel: str) -> None:
     """Refuse a stretch in which a sensor holds one value, or writes zeros for what it missed.
 
+    Of a body at rest coarse digits show one value: not where nothing drives the vehicle.
+
     Raises:
         DatasetError: Names the channel, the value and the times.
     """
@@ -36,7 +40,9 @@ def check_stuck(place: str, run: RecordedRun, channel: str) -> None:
     if len(values) < 2 * FEWEST_STUCK:
         return
     steps = np.diff(values)
-    begin, length = _longest_row(steps == 0.0)
+    coarse = len(np.unique(values)) < COARSE * len(values)
+    at_rest = _during(run.still_s, time) & coarse
+    begin, length = _longest_row((steps == 0.0) & ~(at_rest[1:] & at_rest[:-1]))
     rows = length + 1
     resting = run.from_rest and begin == 0
     if rows < FEWEST_STUCK or resting:
@@ -54,6 +60,12 @@ def check_stuck(place: str, run: RecordedRun, channel: str) -> None:
         f"{time[begin]:.4g} s to {time[begin + length]:.4g} s, as if it were stuck; leave its "
         "cells empty where it was not measured"
     )
+
+
+def _during(stretches: FloatArray, time_s: FloatArray) -> BoolArray:
+    """Which times (n,) lie within one of some stretches (k, 2)."""
+    begin, end = stretches[:, :1], stretches[:, 1:]
+    return np.asarray(((time_s >= begin) & (time_s <= end)).any(axis=0))
 
 
 def _longest_row(same: BoolArray) -> tuple[int, int]:

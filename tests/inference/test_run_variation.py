@@ -1,14 +1,20 @@
 """Random effects over runs: found where they act, absent where they do not, integrated exactly."""
 
+from copy import copy
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 
+from fish_env.inference.estimate.free import predicted_variation
 from fish_env.inference.estimate.run_variation import (
     Likelihood,
     Marginal,
     RunVariation,
     fit_spread,
 )
+from fish_env.inference.problem import Point
+from tests.inference.stated import Evaluated, Stated, White
 
 RUNS, PER_RUN = 8, 200
 
@@ -110,3 +116,50 @@ def test_integrating_out_whitens_by_the_whole_covariance():
             for r in range(RUNS)
         )
     )
+
+
+class Growing(Stated):
+    """Runs whose growth differs: far from it the linear model says little."""
+
+    variations = (RunVariation("rate", "1", 1.0),)
+    _TIME = np.linspace(0.0, 2.0, 60)
+
+    def __init__(self, rates):
+        self.rates = np.asarray(rates)
+        self.own = np.zeros((len(rates), 1))
+        super().__init__(lambda z, effects: np.zeros((len(rates), len(self._TIME))))
+
+    @property
+    def variation(self):
+        return self.own
+
+    def with_variation(self, values):
+        moved = copy(self)
+        moved.own = values
+        return moved
+
+    def filtered(self, point, noise, near=()):
+        missed = 5.0 * (np.exp(np.outer(self.rates, self._TIME)) - np.exp(self.own * self._TIME))
+        return [Evaluated(float(-0.5 * row @ row), row) for row in missed]
+
+    def variation_slopes(self, point, noise, filtered, steps):
+        return (-5.0 * self._TIME * np.exp(self.own * self._TIME)).reshape(-1, 1)
+
+
+@dataclass(frozen=True)
+class Spreading(White):
+    spread: tuple[float, ...] = (2.0,)
+
+
+def test_a_prediction_of_a_runs_numbers_never_lowers_its_likelihood():
+    """The whole step of the linear model does, but for the first, which is near enough."""
+    problem, noise, at = Growing([0.02, 0.5, 1.0, 2.0]), Spreading(), Point(np.zeros(1), {})
+    moved, _ = predicted_variation(problem, at, noise)
+
+    def worth(one):
+        fits = np.array([run.log_likelihood for run in one.filtered(at, noise)])
+        return fits - 0.5 * (one.own[:, 0] / noise.spread[0]) ** 2
+
+    assert np.all(worth(moved) >= worth(problem))
+    assert moved.own[0, 0] == pytest.approx(0.02, abs=0.002)
+    assert np.all(moved.own[1:, 0] > 0.0)

@@ -24,6 +24,8 @@ SHORTEST = 0.02
 """Shortest step for differences, as a share of the longest."""
 DIFFERENCE = 0.3
 """Step for differences by what runs differ in, in usual spreads."""
+MOST_HALVINGS = 5
+"""Of a run's step to its own numbers."""
 LARGEST_SLOPE = 1e9
 """In standard deviations of the noise per unit; what exceeds it has diverged."""
 
@@ -223,6 +225,9 @@ def predicted_variation(
 ) -> tuple[Problem, Marginal | None]:
     """The problem at the best prediction of what its runs differ in, and how to integrate it out.
 
+    The prediction is of the linear model. A run whose likelihood it lowers goes only part of the
+    way, or stays.
+
     Args:
         problem: the problem, at an earlier prediction.
         point: values of the shared parameters.
@@ -235,11 +240,37 @@ def predicted_variation(
     filtered = problem.filtered(point, noise)
     marginal = marginal_of(problem, point, noise, filtered)
     assert marginal is not None
-    values = problem.variation.copy()
     residuals = np.concatenate([f.residuals for f in filtered])
-    values[:, active] = marginal.predicted(residuals) * spreads[active]
-    problem = problem.with_variation(values)
+    step = np.zeros_like(problem.variation)
+    step[:, active] = marginal.predicted(residuals) * spreads[active] - problem.variation[:, active]
+    problem = _moved(problem, step, filtered, point, noise)
     return problem, replace(marginal, at=problem.variation[:, active] / spreads[active])
+
+
+def _moved(
+    problem: Problem, step: FloatArray, filtered: Sequence[Evaluation], point: Point, noise: Any
+) -> Problem:
+    """The problem with every run's numbers moved by as much of a step (R, K) as helps the run."""
+    share = np.ones(problem.run_count)
+    before = _own_objectives(problem, filtered, noise)
+    for _ in range(MOST_HALVINGS):
+        moved = problem.with_variation(problem.variation + share[:, None] * step)
+        after = _own_objectives(moved, moved.filtered(point, noise, filtered), noise)
+        worse = ~(after <= before)
+        if not worse.any():
+            return moved
+        share[worse] *= 0.5
+    share[worse] = 0.0
+    return problem.with_variation(problem.variation + share[:, None] * step)
+
+
+def _own_objectives(problem: Problem, filtered: Sequence[Evaluation], noise: Any) -> FloatArray:
+    """(R,) -2 log likelihood of each run together with its own numbers, but for a constant."""
+    spreads = spread_of(problem, noise)
+    active = np.flatnonzero(spreads)
+    own = problem.variation[:, active] / spreads[active]
+    of_runs = np.array([-2.0 * f.log_likelihood for f in filtered])
+    return np.asarray(of_runs + np.sum(own**2, axis=1))
 
 
 def evaluated(problem: P, point: Point, noise: Any) -> tuple[P, Sequence[Any]]:

@@ -37,22 +37,21 @@ def backward_elimination(current: Explanation) -> Explanation:
 
 
 def surely_acts(fit: Fit, name: str) -> bool:
-    """Whether a cause is so many standard errors from doing nothing that no fit need tell."""
-    off = off_values(fit, name)
-    if not np.isfinite(list(off.values())).all():
+    """Whether a cause is so many standard errors from doing nothing that no fit need tell.
+
+    Of what is off at infinity no linear model tells that.
+    """
+    if name in fit.effects and not _is_off_at_finite(fit, name):
         return False
-    return _from_off(fit, off) > POLICY.sure_sd**2
+    return _from_off(fit, off_values(fit, name)) > POLICY.sure_sd**2
 
 
 def may_not_act(fit: Fit, name: str) -> bool:
     """Whether the 95 % region of what switches a cause on holds the values at which it is off.
 
-    The region is corrected for coloured residuals. What is off at infinity acts at any finite
-    value.
+    The region is corrected for coloured residuals.
     """
     off = off_values(fit, name)
-    if not np.isfinite(list(off.values())).all():
-        return False
     return bool(_from_off(fit, off) < chdtri(len(off), 0.05))
 
 
@@ -60,15 +59,14 @@ def insignificant(fit: Fit, causes: Sequence[str], threshold: float) -> tuple[st
     """Causes that are not significant beside the others, the weakest dropped before the next.
 
     Told by the covariance, which is corrected for coloured residuals: estimates of the others move
-    in a linear model as one is dropped. What is off at infinity is not judged.
+    in a linear model as one is dropped.
 
     Args:
         fit: with all causes.
         causes: their names.
         threshold: log p-value that each has to pass.
     """
-    at = {name: off_values(fit, name) for name in causes}
-    judged = {name: off for name, off in at.items() if np.isfinite(list(off.values())).all()}
+    judged = {name: off_values(fit, name) for name in causes}
     estimates, covariance = fit.estimates.copy(), fit.covariance.copy()
     dropped: list[str] = []
     while judged:
@@ -102,9 +100,22 @@ def _distance(gap: FloatArray, covariance: FloatArray) -> float:
 
 
 def off_values(fit: Fit, name: str) -> dict[str, float]:
-    """Path -> value, of what switches a cause on, at which it is off."""
+    """Path -> value, of what switches a cause on, at which it is off in the linear model.
+
+    What is off at infinity acts by its inverse, such as the time of a lag: that of a value v is
+    zero, to first order, at 2 v.
+    """
     if name in fit.effects:
         switching = fit.problem.known[name].switching
-        return {f"{PREFIX}{name}.{p.name}": p.neutral for p in switching}
+        paths = {f"{PREFIX}{name}.{p.name}": p.neutral for p in switching}
+        return {
+            path: off if np.isfinite(off) else 2.0 * float(fit.estimates[fit.names.index(path)])
+            for path, off in paths.items()
+        }
     path = name.removeprefix(PARAMETER)
     return {path: float(fit.problem.baseline.mean[fit.problem.baseline.paths.index(path)])}
+
+
+def _is_off_at_finite(fit: Fit, name: str) -> bool:
+    """Whether an effect is off at values that are finite."""
+    return all(np.isfinite(p.neutral) for p in fit.problem.known[name].switching)

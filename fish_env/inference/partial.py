@@ -160,22 +160,18 @@ class StandIns:
         """Log p-value of what each cause explains that no sum of forces makes good."""
         return {name: self._log_p(self.removed(name)) for name in self.causes}
 
-    def _log_p(self, removed: Removed | None) -> float:
-        if removed is None:
-            return -np.inf
+    def _log_p(self, removed: Removed) -> float:
         gap = removed.loss + self._explained(None) - self._explained(removed)
         return float(chi2_log_tail(max(gap, 0.0) / removed.inflation, len(removed.own)))
 
-    def removed(self, name: str) -> Removed | None:
-        """A cause taken out; None for one that is off at infinity: no slope leads there.
+    def removed(self, name: str) -> Removed:
+        """A cause taken out.
 
         A coefficient gets its prior back, and may move as far as that lets it.
         """
         off = off_values(self.fit, name)
         own = np.array([self.fit.names.index(path) for path in off])
         shift = np.array(list(off.values())) - self.fit.estimates[own]
-        if not np.isfinite(shift).all():
-            return None
         hessian = self.projector.hessian
         rest = np.setdiff1d(np.arange(len(hessian)), own)
         across = hessian[np.ix_(rest, own)]
@@ -201,7 +197,7 @@ class StandIns:
     @cached_property
     def _pool(self) -> list[Signal]:
         """Forces that are most indicated beside all causes, or without one of them."""
-        removed = [None, *(r for r in map(self.removed, self.causes) if r is not None)]
+        removed = [None, *map(self.removed, self.causes)]
         best: list[list[tuple[float, int, Signal]]] = [[] for _ in removed]
         forces = self.fit.problem.generic_terms(self.fit)
         for column, signal in generic_signals(forces, self.projector):

@@ -276,8 +276,6 @@ def substitutes(found: Explanation, shown: Screen) -> list[Substitute]:
         off = off_values(fit, cause)
         own = np.array([fit.names.index(path) for path in off])
         shift = np.array(list(off.values())) - fit.estimates[own]
-        if not np.isfinite(shift).all():
-            continue
         rest = np.setdiff1d(np.arange(len(fit.names)), own)
         hessian = projector.hessian
         inside = hessian[np.ix_(rest, rest)]

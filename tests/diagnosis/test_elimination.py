@@ -31,10 +31,11 @@ def fit_with(name, values, sd, correlation=0.0):
         (fit_with("current", [0.008, 0.0, 0.0], [0.005, 0.005, 0.005]), True),
         (fit_with("current", [0.007, 0.007, -0.007], [0.005] * 3, 0.0), True),
         (fit_with("current", [0.007, -0.007, 0.0], [0.005] * 3, 0.9), False),
-        (fit_with("servo_rate_limit", [6.0], [9.0]), False),
+        (fit_with("servo_rate_limit", [6.0], [9.0]), True),
+        (fit_with("servo_rate_limit", [6.0], [2.0]), False),
         (fit_with("wave", [1e-3, 0.4, 1.0, 2.0, 1.5], [1e-3, 1e-6, 1e-6, 1e-6, 1e-6]), True),
     ],
-    ids=["scale", "far", "current", "weak", "all weak", "together", "infinite", "shapes"],
+    ids=["scale", "far", "current", "weak", "all weak", "together", "infinite", "finite", "shapes"],
 )
 def test_a_region_that_holds_its_absence_shows_nothing(fit, idle):
     """All that switches a cause on counts together; where and when it acts does not."""

@@ -273,7 +273,7 @@ class RunFilter:
                 measurement.delay[0], measurement.gain[:, 0], measurement.bias[:, 0],
                 measurement.lens, data.clock,
                 data.steps(corners), *data.driven,
-                data.measured, self.codes, noise.sensor_sd**2, noise.jitter_sd * rates,
+                data.corrected, self.codes, noise.sensor_sd**2, noise.jitter_sd * rates,
                 data.covariance0, noise.wrench_variance, noise.correlation_s, noise.phase_sd**2,
                 self._history_rows(record, data), data.known_wrench, self.model.tables,
                 k, w, e, x, d, slopes.motion, slopes.channels, slopes.raw,
@@ -299,8 +299,8 @@ class RunFilter:
             assert result.slopes is not None
             slopes = result.slopes
             value = entry(
-                data.clock, data.measured, slopes.motion, slopes.channels, slopes.raw, result.gains,
-                result.wrench, made_with.correlation_s, noise.sensor_sd**2,
+                data.clock, data.corrected, slopes.motion, slopes.channels, slopes.raw,
+                result.gains, result.wrench, made_with.correlation_s, noise.sensor_sd**2,
                 noise.jitter_sd * rates, data.covariance0,
                 noise.wrench_variance, noise.correlation_s, noise.phase_sd**2,
             )  # fmt: skip
@@ -359,7 +359,7 @@ class RunFilter:
                 state0, data.swimming, record, sensors.pace, sensors.skew, sensors.delay,
                 sensors.gain, sensors.bias, sensors.lens, data.clock,
                 data.steps(gains.corners), *data.driven,
-                data.measured, self.codes, gains.gains, gains.whitening,
+                data.corrected, self.codes, gains.gains, gains.whitening,
                 noise.correlation_s, self._history_rows(record, data), data.known_wrench, basis,
                 column, size, self.model.tables, out, place, first, last,
             )  # fmt: skip

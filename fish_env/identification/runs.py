@@ -14,7 +14,7 @@ from fish_env.data.vocabulary import COMMANDS
 from fish_env.errors import DatasetError
 from fish_env.identification.channels import BY_NAME, Kind
 from fish_env.identification.state_blocks import N_ERROR, PHASE_COLUMN, columns
-from fish_env.identification.variation import BEAT, COUNT, SAG
+from fish_env.identification.variation import BEAT, COUNT, SAG, SENSOR_ERRORS
 from fish_env.model.frames import quaternion_from_euler
 from fish_env.model.state import BASE_STATES
 
@@ -78,6 +78,8 @@ class RunData:
         own_beat: its tail's frequency at the start over that of all runs, as far as measured.
         own_sag: share of it lost each second (1/s), likewise.
         variation: (K,) what this run differs in from the others, see ``variation.VARIATIONS``.
+        sensor_errors: (K,) errors of its sensors, see ``variation.SENSOR_ERRORS``.
+        distortion: (T, C) what they do to its samples; None for nothing.
     """
 
     id: str
@@ -97,11 +99,24 @@ class RunData:
     own_beat: float = 1.0
     own_sag: float = 0.0
     variation: FloatArray = field(default_factory=lambda: np.zeros(COUNT))
+    sensor_errors: FloatArray = field(default_factory=lambda: np.zeros(len(SENSOR_ERRORS)))
+    distortion: FloatArray | None = None
 
     @property
     def known_wrench(self) -> FloatArray:
         """(T, 6) known wrench, or no rows."""
         return self.wrench if self.wrench is not None else np.zeros((0, 6))
+
+    @cached_property
+    def corrected(self) -> FloatArray:
+        """(T, C) samples without the errors of the sensors, as far as these are known."""
+        if self.distortion is None:
+            return self.measured
+        return np.ascontiguousarray(self.measured - self.distortion)
+
+    def with_numbers(self, variation: FloatArray, sensor_errors: FloatArray) -> RunData:
+        """The same run with other numbers of its own, which do nothing to its samples as yet."""
+        return replace(self, variation=variation, sensor_errors=sensor_errors, distortion=None)
 
     def steps(self, corners: bool) -> IntArray:
         """(T,) RK4 steps up to each sample, finer for motion with corners."""
@@ -178,6 +193,7 @@ class RunData:
             fresh=self.fresh[own],
             measured=np.ascontiguousarray(self.measured[own]),
             wrench=None if self.wrench is None else np.ascontiguousarray(self.wrench[own]),
+            distortion=None if self.distortion is None else self.distortion[own],
         )
 
     @property

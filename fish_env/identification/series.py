@@ -33,10 +33,10 @@ from fish_env.identification.open_loop import windows, without_feedback
 from fish_env.identification.parameters import ALIKE, Baseline, changes_of, neutral_values
 from fish_env.identification.phases import settle_phases
 from fish_env.identification.runs import FINER, RunData, prepare_run
-from fish_env.identification.sensor_errors import slopes_of_runs
+from fish_env.identification.sensor_errors import distorted, slopes_of_runs
 from fish_env.identification.sensors import largest_jitter_of, largest_noise
 from fish_env.identification.tail_drive import TailDrive
-from fish_env.identification.variation import BEAT, EVERY, SAG, SENSOR_ERRORS, VARIATIONS
+from fish_env.identification.variation import BEAT, EVERY, SAG, VARIATIONS
 from fish_env.identification.variation_slopes import swum_slopes
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.hypotheses import effects_of
@@ -258,14 +258,20 @@ class SeriesProblem(Problem):
 
     @property
     def variation(self) -> FloatArray:
-        """(R, K) what each run differs in; sensor errors are integrated out and never set."""
-        own = np.array([run.variation for run in self.runs])
-        return np.hstack([own, np.zeros((len(own), len(SENSOR_ERRORS)))])
+        """(R, K) what each run differs in."""
+        return np.array([np.r_[run.variation, run.sensor_errors] for run in self.runs])
 
-    def with_variation(self, values: FloatArray) -> SeriesProblem:
-        """The same problem with other numbers (R, K) of the runs."""
-        pairs = zip(self.runs, values[:, : len(VARIATIONS)], strict=True)
-        return self.with_runs([replace(run, variation=own) for run, own in pairs])
+    def with_variation(self, values: FloatArray, point: Point, noise: NoiseModel) -> SeriesProblem:
+        """The same problem with other numbers (R, K) of the runs (see the protocol).
+
+        What errors of sensors do to the samples is worked out from the filtered motion.
+        """
+        own, errors = np.split(values, [len(VARIATIONS)], axis=1)
+        moved = [run.with_numbers(*n) for run, *n in zip(self.runs, own, errors, strict=True)]
+        if errors.any():
+            seen = self.filtered(point, noise, keep_slopes=True)
+            moved = distorted(moved, seen, self.channels)
+        return self.with_runs(moved)
 
     def variation_slopes(
         self, point: Point, noise: NoiseModel, filtered: Sequence[Filtered], steps: FloatArray

@@ -9,7 +9,6 @@ by hand. A battery slows the tail by what is left of its charge.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -34,7 +33,7 @@ their combs may have got wrong, see ``own_beats``."""
 COUNT = len(VARIATIONS)
 BEAT, SAG = (i for i in range(COUNT) if VARIATIONS[i].name in ("beat", "beat_sag"))
 DEGREE = float(np.deg2rad(1.0))
-_SENSORS = (
+SENSOR_ERRORS = (
     RunVariation("marker_x", "m", 0.01, shared=True),
     RunVariation("marker_y", "m", 0.01, shared=True),
     RunVariation("marker_z", "m", 0.01, shared=True),
@@ -56,7 +55,6 @@ _SENSORS = (
     RunVariation("depth_delay", "s", 0.02, shared=True, positive=True),
     RunVariation("inertial_smoothing", "1", 1.0, shared=True, positive=True),
 )
-SENSOR_ERRORS = tuple(replace(error, integrated=True) for error in _SENSORS)
 """Usual sizes: a centimetre, a degree, one per cent, a frame of a camera, all that a low-pass of
 5 Hz inside an inertial unit takes away; the picture of a camera
 some metres above the water shrinks with depth, by the refractive index and its height."""

@@ -125,7 +125,7 @@ def _residuals(
 ) -> FloatArray:
     """Whitened residuals (sets, D) of the model with some components in place."""
     rows: list[FloatArray] = [np.zeros(0)] * len(sets)
-    plain = problem.with_variation(np.zeros_like(problem.variation))
+    plain = problem.with_variation(np.zeros_like(problem.variation), accepted.point, noise)
     varied = spread_of(accepted.problem, noise).any()
     for chosen, of_set in ((problem, True), (plain, False)):
         own = [i for i, s in enumerate(sets) if not varied or (RUN_VARIATION in s) == of_set]

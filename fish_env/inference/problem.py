@@ -301,8 +301,14 @@ class Problem(Protocol):
         """(R, K) what each run differs in."""
         return np.zeros((self.run_count, 0))
 
-    def with_variation(self, values: FloatArray) -> Problem:
-        """The same problem with other numbers (R, K) of the runs."""
+    def with_variation(self, values: FloatArray, point: Point, noise: Any) -> Problem:
+        """The same problem with other numbers (R, K) of the runs.
+
+        Args:
+            values: the numbers.
+            point: values of the shared parameters, close to those that the numbers belong to.
+            noise: noise model.
+        """
         return self
 
     def variation_slopes(

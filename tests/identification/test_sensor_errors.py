@@ -6,11 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfilt
 
 from fish_env.identification.sensor_errors import innovation_slopes, sensor_slopes
 from fish_env.identification.series import SeriesProblem
 from fish_env.identification.variation import SENSOR_ERRORS
 from fish_env.inference.estimate.fit import fit, run_variation
+from fish_env.inference.estimate.free import predicted_variation
 from fish_env.inference.problem import Point
 from tests.identification.synthetic import PATHS, Setup, simulate
 
@@ -106,3 +108,36 @@ def test_a_camera_above_tells_nothing_of_how_a_fish_floats(channels, floats):
     }
     assert (named["trim_x"] > 0.0) == (named["buoyancy"] > 0.0) == floats
     assert named["clock_offset"] > 0.0
+
+
+def test_a_filter_in_the_inertial_unit_is_undone():
+    """It delays by a good part of a beat: its first estimate, linear in the record, falls short."""
+    data = simulate(Setup(runs=5, duration=16.0))
+    low_pass = butter(2, 5.0, fs=250.0, output="sos")
+    runs = []
+    for run in data.runs:
+        even = np.arange(0.0, run.time_s[-1], 0.004)
+        seen = dict(run.channels)
+        for name in ("roll", "pitch", "yaw", "p", "q", "r"):
+            values = np.interp(even, run.time_s, seen[name])
+            smooth = sosfilt(low_pass, values - values[0]) + values[0]
+            seen[name] = np.interp(run.time_s, even, smooth)
+        runs.append(replace(run, channels=seen))
+    problem = SeriesProblem(replace(data, runs=tuple(runs)))
+    at, plain = Point(np.zeros(len(problem.baseline)), {}), problem.default_noise()
+    k = [v.name for v in problem.variations].index("inertial_smoothing")
+    spread = np.zeros(len(problem.variations))
+    spread[k] = problem.variations[k].usual
+    noise = replace(plain, spread=spread)
+
+    def misfit(one):
+        return sum(-2.0 * f.log_likelihood for f in one.filtered(at, plain))
+
+    clean = misfit(SeriesProblem(data))
+    away = [misfit(problem) - clean]
+    for _ in range(4):
+        problem, _ = predicted_variation(problem, at, noise)
+        away.append(misfit(problem) - clean)
+    assert problem.variation[:, k].mean() == pytest.approx(1.0, abs=0.1)
+    assert away[1] > 3.0 * away[-1]
+    assert away[-1] < 0.02 * away[0]

@@ -133,7 +133,7 @@ class Growing(Stated):
     def variation(self):
         return self.own
 
-    def with_variation(self, values):
+    def with_variation(self, values, point, noise):
         moved = copy(self)
         moved.own = values
         return moved

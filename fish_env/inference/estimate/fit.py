@@ -309,7 +309,9 @@ def with_run_variation(own: Fit, dropped: Collection[str] = ()) -> Fit:
     if problem.variations and problem.run_count >= POLICY.fewest_runs_for_spread:
         found = run_variation(own)
         if found.sd.any() or own.noise.spread.any():
-            problem = problem.with_variation(np.where(found.sd > 0.0, found.values, 0.0))
+            # The fit moves them, run by run, as far as that helps.
+            numbers = np.where(found.sd > 0.0, problem.variation, 0.0)
+            problem = problem.with_variation(numbers, own.point, own.noise)
             noise = replace(own.noise, spread=found.sd)
     if problem is own.problem and not dropped:
         return own

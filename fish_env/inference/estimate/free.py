@@ -243,7 +243,7 @@ def predicted_variation(
     residuals = np.concatenate([f.residuals for f in filtered])
     step = np.zeros_like(problem.variation)
     step[:, active] = marginal.predicted(residuals) * spreads[active] - problem.variation[:, active]
-    problem = _moved(problem, step, filtered, point, noise, marginal)
+    problem = _moved(problem, step, filtered, point, noise)
     return problem, replace(marginal, at=problem.variation[:, active] / spreads[active])
 
 
@@ -253,37 +253,28 @@ def _moved(
     filtered: Sequence[Evaluation],
     point: Point,
     noise: Any,
-    marginal: Marginal,
 ) -> Problem:
     """The problem with every run's numbers moved by as much of a step (R, K) as helps the run."""
     share = np.ones(problem.run_count)
-    before = _own_objectives(problem, filtered, noise, marginal)
+    before = _own_objectives(problem, filtered, noise)
     for _ in range(MOST_HALVINGS):
-        moved = problem.with_variation(problem.variation + share[:, None] * step)
-        after = _own_objectives(moved, moved.filtered(point, noise, filtered), noise, marginal)
+        moved = problem.with_variation(problem.variation + share[:, None] * step, point, noise)
+        after = _own_objectives(moved, moved.filtered(point, noise, filtered), noise)
         worse = ~(after <= before)
         if not worse.any():
             return moved
         share[worse] *= 0.5
     share[worse] = 0.0
-    return problem.with_variation(problem.variation + share[:, None] * step)
+    return problem.with_variation(problem.variation + share[:, None] * step, point, noise)
 
 
-def _own_objectives(
-    problem: Problem, filtered: Sequence[Evaluation], noise: Any, marginal: Marginal
-) -> FloatArray:
-    """(R,) -2 log likelihood of each run together with its own numbers, but for a constant.
-
-    Those that are never set, but integrated out, are so here too.
-    """
+def _own_objectives(problem: Problem, filtered: Sequence[Evaluation], noise: Any) -> FloatArray:
+    """(R,) -2 log likelihood of each run together with its own numbers, but for a constant."""
     spreads = spread_of(problem, noise)
     active = np.flatnonzero(spreads)
     own = problem.variation[:, active] / spreads[active]
-    unset = marginal.some_of(np.array([problem.variations[i].integrated for i in active]))
-    residuals = np.concatenate([f.residuals for f in filtered])
-    absorbed = residuals**2 - unset.residuals(residuals) ** 2
-    of_runs = -2.0 * np.array([f.log_likelihood for f in filtered]) + np.sum(own**2, axis=1)
-    return np.asarray(of_runs - np.bincount(marginal.run_of, absorbed, problem.run_count))
+    of_runs = np.array([-2.0 * f.log_likelihood for f in filtered])
+    return np.asarray(of_runs + np.sum(own**2, axis=1))
 
 
 def evaluated(problem: P, point: Point, noise: Any) -> tuple[P, Sequence[Any]]:

@@ -46,7 +46,6 @@ class RunVariation:
             count as variation: what all runs have in common is a cause, to be found and named.
             What they may share is not taken to be far beyond the usual, which again is a cause.
         positive: whether it cannot be negative: no device shows what has yet to happen.
-        integrated: whether it is only integrated out, in the linear model, and never set.
     """
 
     name: str
@@ -54,7 +53,6 @@ class RunVariation:
     usual: float
     shared: bool = False
     positive: bool = False
-    integrated: bool = False
 
     @property
     def largest(self) -> float:
@@ -124,10 +122,6 @@ class Marginal:
             information = mine.T @ mine + np.eye(mine.shape[1])
             found.append(-np.linalg.solve(information, mine.T @ shifted[own]))
         return np.array(found)
-
-    def some_of(self, numbers: BoolArray) -> Marginal:
-        """The same with some of the runs' numbers (K,)."""
-        return Marginal(self.slopes[:, numbers], self.at[:, numbers], self.run_of)
 
     def some(self, runs: Sequence[int]) -> Marginal:
         """The same on some of the runs."""

@@ -37,7 +37,7 @@ class DecisionPolicy:
         out_of_reach: distance to the leader beyond which a fit is stopped.
         aic_penalty: expected gain of a coarse fit by a parameter without effect.
         largest_disturbance: strongest disturbance of the search, over the plausible limit.
-        sure_sd: standard errors from neutral beyond which a cause is kept without a fit that lacks it.
+        sure_sd: standard errors from neutral beyond which no fit without the cause is tried.
         pursuits: number of times that many causes are searched together.
         most_challenges: largest number of effects fitted in place of one found among many.
         relaxed_log_p: added to the log p-value of a cause if the adequacy test fails.

@@ -56,15 +56,15 @@ def simulate(
     rate: Annotated[float, typer.Option(help="Samples per second.")] = 10.0,
     out: Annotated[
         Path | None,
-        typer.Option(help="A .csv or .parquet file; without it, or with -, CSV is printed."),
+        typer.Option(help="A .csv or .parquet file. Without it, or with -, CSV is printed."),
     ] = None,
-    replay: Annotated[Path | None, typer.Option(help="HTML page that shows it swim.")] = None,
+    replay: Annotated[Path | None, typer.Option(help="HTML replay page to write.")] = None,
     trust_effects: TrustEffects = False,
 ) -> None:
     """Simulate one case and write pose and velocities over time.
 
-    A case names the fish, the duration, the schedule of commands and, if wanted, the initial
-    state and effects.
+    A case names the fish, the duration and the schedule of commands. It may also give the
+    initial state and effects.
 
     **Example:** `robofish simulate case.json --rate 50 --out swim.csv`
     """
@@ -84,14 +84,14 @@ def compare(
     dt: Annotated[float, typer.Option(help="Longest physics step, s.")] = 0.01,
     runs: Annotated[bool, typer.Option("--runs", help="Print every run.")] = False,
     replay: Annotated[
-        Path | None, typer.Option(help="HTML page that shows measured and simulated swim.")
+        Path | None, typer.Option(help="HTML replay page of measured and simulated runs.")
     ] = None,
     trust_effects: TrustEffects = False,
 ) -> None:
     """Compare measured motion with its simulation: how wrong it is, and where.
 
-    Runs over time are simulated from their measured start. Where the file does not know the
-    tail's phase, the best of sixteen over the first beat is taken.
+    Runs over time are simulated from their measured start. If the tail phase at the start is
+    unknown, the best of sixteen phases over the first beat is used.
 
     **Example:** `robofish compare msu-steady --out pictures --json errors.json`
     """
@@ -115,21 +115,21 @@ def import_command(
     ] = None,
     fish: Annotated[str | None, typer.Option(help="The fish: preset or parameter file.")] = None,
     frame: Annotated[
-        str | None, typer.Option(help="ned (z down) or enu (z up), if the logs do not tell.")
+        str | None, typer.Option(help="ned (z down) or enu (z up), if the logs do not say.")
     ] = None,
     name: Annotated[str | None, typer.Option(help="Name of the dataset.")] = None,
     run_column: Annotated[
-        str | None, typer.Option(help="Column that tells several runs in one table apart.")
+        str | None, typer.Option(help="Column whose value names the run, in a table of runs.")
     ] = None,
     start: Annotated[str | None, typer.Option(help="rest: each run began level and still.")] = None,
     yes: Annotated[
-        bool, typer.Option("--yes", help="Accept what is guessed; everything assumed is printed.")
+        bool, typer.Option("--yes", help="Accept all guesses without asking; print them.")
     ] = False,
 ) -> None:
     """Import logs: ROS bags, MATLAB, Parquet, Excel, CSV of any shape.
 
-    Guesses which column is what, shows it with a picture of each run, and writes a dataset once
-    you confirm. The mapping is written beside it as `import.yaml`; `--mapping` uses it again.
+    Guesses the meaning of each column, shows the guesses and a picture of each run, and writes
+    a dataset once you confirm. It also writes the mapping `import.yaml`, for `--mapping`.
 
     **Example:** `robofish import trial1.bag trial2.bag --out trials --fish zheng-2021-a`
     """
@@ -158,13 +158,13 @@ def replay(
         str | None, typer.Option(help="Fish whose size is drawn: preset or file.")
     ] = None,
     case: Annotated[
-        Path | None, typer.Option(help="Case the files were simulated from, for the tail's beat.")
+        Path | None, typer.Option(help="Case of the simulation; its commands move the tail.")
     ] = None,
 ) -> None:
-    """Write a page that shows fish swim in 3-D beside time plots; it opens without a network.
+    """Write a page with fish in 3-D beside time plots; it opens without a network.
 
-    Several files are shown at once. One whose name ends in measured, baseline or extended gets
-    that colour.
+    Several files are shown at once. A file whose name ends in measured, baseline or extended
+    gets the colour of that kind.
 
     **Example:** `robofish replay swim.csv --case case.json --out swim.html`
     """
@@ -179,7 +179,7 @@ def diagnose(
     dataset: Annotated[
         str, typer.Argument(help="A folder with dataset.yaml, or a shipped dataset's name.")
     ],
-    out: Annotated[Path, typer.Option(help="Folder for what is found.")] = Path("out/diagnosis"),
+    out: Annotated[Path, typer.Option(help="Folder for the results.")] = Path("out/diagnosis"),
     fish: OtherFish = None,
     quick: Quick = False,
     measured_beats: MeasuredBeats = False,
@@ -187,11 +187,11 @@ def diagnose(
     json: Json = None,
     trust_effects: TrustEffects = False,
 ) -> None:
-    """Find what the simulation gets wrong: a cause with numbers, or that no known cause fits.
+    """Find what the simulation lacks: a cause with its size, or that no known cause fits.
 
-    Refits the coefficients first, then tries every effect of the catalogue, and measures on runs
-    kept apart what the best one gains. Writes `diagnosis.json`, and `extended.yaml`, a fish file,
-    where there is something to extend. Other files in the folder stay.
+    Refits the coefficients, tries every effect of the catalogue, and measures the gain of the
+    best one on held-out runs. Writes `diagnosis.json`, `report.html`, and the fish file
+    `extended.yaml` if there is an extended model. Other files in the folder are kept.
 
     **Example:** `robofish diagnose pool-trials --out out/pool`
     """
@@ -212,22 +212,22 @@ def fit(
     effects: Annotated[
         str,
         typer.Option(
-            help="Effects to fit beside the coefficients, a comma between; or auto: those that "
-            "lower the held-out error."
+            help="Effects to fit beside the coefficients, separated by commas; or auto, for "
+            "those that lower the held-out error."
         ),
     ] = "",
     objective: Annotated[
         str | None,
         typer.Option(
-            help="What is minimised: errors one-step ahead, of a whole-run, or of means.",
+            help="Prediction errors to minimise: one-step, whole-run or means.",
             show_default="one-step; means of a steady table",
         ),
     ] = None,
     leave_out: Annotated[
         str | None,
         typer.Option(
-            help="Leave out each condition, run or value of a command in turn, and report the "
-            "errors there."
+            help="condition, run, or a command: leave out each of its values in turn, and report "
+            "the errors on the data left out."
         ),
     ] = None,
     out: Annotated[Path, typer.Option(help="The parameter file to write.")] = Path(
@@ -241,7 +241,7 @@ def fit(
         bool,
         typer.Option(
             "--trust-inputs",
-            help="Take signs, units and clocks as declared, although a check finds them wrong.",
+            help="Use signs, units and clocks as declared, even if the input check finds faults.",
         ),
     ] = False,
     trust_effects: TrustEffects = False,
@@ -305,7 +305,7 @@ def plot(
 def paper(
     out: Annotated[Path, typer.Option(help="Folder for tables and pictures.")] = Path("out/paper"),
 ) -> None:
-    """Repeat the four studies of the paper and check its statements one by one.
+    """Repeat the four studies of the paper and check each of its statements.
 
     Writes the paper's figures, `statements.md` and `paper.json`.
 
@@ -318,9 +318,9 @@ def paper(
 
 @app.command()
 def demo(
-    out: Annotated[Path, typer.Option(help="Folder for report, pictures.")] = Path("out/demo"),
+    out: Annotated[Path, typer.Option(help="Folder for the report.")] = Path("out/demo"),
 ) -> None:
-    """Show what the package does, in a minute or two: a diagnosis, a comparison, a swim.
+    """Show what the package does, in a minute or two: diagnosis, comparison and environment.
 
     **Example:** `robofish demo`
     """

@@ -12,9 +12,10 @@ from robofish_agents.evaluation.results import read_results
 ROOT = Path(__file__).resolve().parents[1]
 NOT_YET = "No agent is measured yet; `make benchmark-agents` does it."
 LEGEND = (
-    "Success, RMSE of depth and of heading over the whole episode, mean power of the tail: means "
-    "over 100 frozen episodes. On paths the RMSE are those of cross-track error and depth, at "
-    "places those of the distance from the place, over the whole episode and over the last 10 s"
+    "Each cell has success, RMSE of depth, RMSE of heading, and mean power of the tail: means over "
+    "100 frozen episodes. RMSE are over whole episodes. For `path` they are those of cross-track "
+    "error and of depth. For `station` both are of the distance from the place: over the whole "
+    "episode, and over its last 10 s"
 )
 
 
@@ -35,8 +36,8 @@ def section(file: Path = SHIPPED) -> str:
         f"Measured {record['date']}. {LEGEND} ([definitions](evaluation.md#metrics)).",
         overview(results),
         "### Time of a decision",
-        f"Of one fish, on {record['machine']['cores']} cores of {record['machine']['cpu']} that "
-        "other work shared: by the clock, and by processor time. At 10 Hz there are 100 ms.",
+        f"For one fish, on {record['machine']['cores']} cores of {record['machine']['cpu']} that "
+        "other work shared: wall-clock time and processor time. At 10 Hz, 100 ms are available.",
         _times(record["decision_times"]),
     ]
     for metric, (label, _) in LABELS.items():

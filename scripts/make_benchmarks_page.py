@@ -18,13 +18,13 @@ DIAGNOSIS = ROOT / "results"
 HEAD = """\
 # Benchmarks
 
-Written by `make docs` from the latest measurements, as they are. Each says where and when it was
-measured; the command repeats it.
+`make docs` writes this page from the latest measurements. Each section says where and when it was
+measured, and names the command that repeats it.
 """
 SPEED_HEAD = """\
 ## Speed
 
-`make bench` runs this simulator and others in one process, in turn.
+`make bench` runs this simulator and other simulators in one process, in turn.
 """
 AGENTS_HEAD = """\
 ## Agents
@@ -32,17 +32,23 @@ AGENTS_HEAD = """\
 DIAGNOSIS_HEAD = """\
 ## Diagnosis
 
-`make benchmark-diagnosis` hides effects, alone and in pairs, wrong coefficients, or nothing at all
-in made-up measurements, which another implementation of the physics computes, and counts what
-[the diagnosis](diagnosis.md) finds. Intervals are 95 % (Clopper-Pearson).
+`make benchmark-diagnosis` simulates measurements with another implementation of the physics. It hides
+one or more effects, wrong coefficients, or nothing in them, and counts the right and wrong answers of
+[the diagnosis](diagnosis.md). Intervals are 95 % (Clopper-Pearson).
 """
 REALISTIC_HEAD = """\
 ## Diagnosis of realistic robots
 
-`make benchmark-realistic` hides what real robots have: one main effect at three sizes among five to
-ten small ones, dirty sensors and runs that differ; single faults of sensors, inputs and robot;
-physics of another kind; nothing but noise. It is scored apart from the suite above. A name that is
-published is true if what it says acts, however small. Intervals are 95 % (Clopper-Pearson).
+`make benchmark-realistic` hides what real robots have:
+
+* one main effect, at three sizes, among five to ten small ones, with sensor errors and
+  run-to-run variation;
+* single faults of sensors, inputs and robot;
+* physics of another kind;
+* nothing but noise.
+
+It is scored apart from the suite above. A named cause counts as true if it acts, however small it is.
+Intervals are 95 % (Clopper-Pearson).
 """
 
 

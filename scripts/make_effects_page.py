@@ -16,12 +16,11 @@ PAGE = Path(__file__).resolve().parents[1] / "docs" / "effects.md"
 INTRODUCTION = """\
 # Catalogue of effects
 
-What a real fish may do that the [baseline model](model.md) leaves out. Written by
-`make docs` from the effects themselves; `robofish effects` prints the
-same.
+This page lists effects of real fish that the [baseline model](model.md) leaves out. `make docs`
+writes it from the declarations of the effects. `robofish effects` prints the same list.
 
 Every effect is off at its neutral values and then changes nothing, to the last bit. Switch effects
-on in a fish file, in Python, or for the environment:
+on in a fish file, in Python, or in the environment:
 
 ```yaml
 effects: {servo_lag: {time_constant: 0.05}, current: {north: 0.02}}
@@ -36,13 +35,13 @@ Simulator("zheng-2021-a", effects={"servo_lag": {"time_constant": 0.05}})
 gym.make("fish_env:RoboticFish3D-v0", effects={"added_mass": {"surge": 0.2, "sway": 1.0}})
 ```
 
-*xi* is the angle of the tail, *cmd* the angle commanded, *V_rel* the velocity through the water,
-*omega* the angular velocity, both in the body frame. "Plausible" is the range that a robotic fish
-of 29 cm and 2 kg may show, "possible" what is accepted. Where effects of one section act on the
-same quantity, they act in the order of this page. [Your own effect](your-own.md) is a file of
-yours.
+In the equations, *xi* is the tail angle and *cmd* the commanded angle. *V_rel* is the velocity
+through the water and *omega* the angular velocity, both in the body frame. "Plausible" is the range
+that a robotic fish of 29 cm and 2 kg may show, and "possible" the range that is accepted. Effects
+of one section that act on the same quantity act in the order of this page. You can add [your own
+effect](your-own.md#your-own-effect) in a Python file.
 """
-UNSEARCHED = "To simulate, and to fit on demand: `robofish diagnose` does not look for it."
+UNSEARCHED = "It can be simulated, and fitted on demand. `robofish diagnose` does not test it."
 
 
 def page() -> str:
@@ -58,7 +57,7 @@ def page() -> str:
 
 def _overview(effects: list[Effect]) -> str:
     rows = [f"| [`{e.name}`](#{e.name}) | {e.section} | {_cell(e.summary)} |" for e in effects]
-    return "\n".join(["| effect | section | what one sees |", "| --- | --- | --- |", *rows, ""])
+    return "\n".join(["| effect | section | what one observes |", "| --- | --- | --- |", *rows, ""])
 
 
 def _entry(effect: Effect) -> str:

@@ -19,7 +19,7 @@ SETTINGS = ROOT / "configs" / "env" / "robotic-fish-3d.yaml"
 HEAD = """\
 # The environment RoboticFish3D-v0
 
-Written by `make docs` from the docstrings of the environment.
+`make docs` writes this page from the docstrings of the environment.
 
 ```python
 import gymnasium as gym
@@ -45,7 +45,7 @@ observations, rewards, terminated, truncated, infos = envs.step(np.zeros((64, 5)
 SB3 = """\
 ## Stable-Baselines3
 
-`FishVecEnv` is the same batch as an SB3 `VecEnv`; it comes with
+`FishVecEnv` is the same batch as a `VecEnv` of Stable-Baselines3. It comes with
 `pip install ".[train]"`.
 
 ```python
@@ -70,7 +70,7 @@ def page() -> str:
             HEAD,
             single,
             "## Options\n",
-            "Keyword arguments of `gym.make`. " + raises + "\n",
+            "These are keyword arguments of `gym.make`. " + raises + "\n",
             _table(options),
             "## Many fish at once\n",
             many,
@@ -78,7 +78,7 @@ def page() -> str:
             _table(more),
             SB3,
             "## Settings\n",
-            f"The defaults, `configs/env/{SETTINGS.name}`; `config=` changes any of them:\n",
+            f"The defaults are in `configs/env/{SETTINGS.name}`. `config=` changes any of them:\n",
             f"```yaml\n{settings}```\n",
         ]
     )

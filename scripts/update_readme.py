@@ -68,9 +68,9 @@ def _speed_words(row: Mapping[str, Any]) -> str:
 def _verdict(verdict: Mapping[str, Any]) -> str:
     head = f"{verdict['claim'][0].upper()}{verdict['claim'][1:]}: at least {verdict['target']:g} "
     if verdict["ratio"] is None:
-        return f"{head}times as fast is the aim; not measured."
+        return f"{head}times as fast (target); not measured."
     ratio = verdict["ratio"]["median"]
-    return f"{head}times as fast is the aim; it is {ratio:.2g} times: {verdict['verdict']}."
+    return f"{head}times as fast (target); measured {ratio:.2g} times: {verdict['verdict']}."
 
 
 def diagnosis(folder: Path = DIAGNOSIS) -> str:
@@ -112,7 +112,7 @@ def statements(page: Path = STATEMENTS) -> str:
         if len(cells) == 5 and cells[0] != "motion" and "---" not in cells[0]:
             motions.setdefault(cells[0], []).append(cells[4].startswith("held"))
     parts = ", ".join(f"{m} {sum(held)} of {len(held)}" for m, held in motions.items())
-    return f"* The paper's statements that the model holds: {total[1]} of {total[2]} ({parts})."
+    return f"* The model reproduces {total[1]} of {total[2]} statements of the paper ({parts})."
 
 
 BLOCKS: dict[str, Callable[[], str]] = {

@@ -36,17 +36,18 @@ def evaluate(
         str, typer.Option(help="hold, track, path, station, both (hold and track), or all.")
     ] = ALL,
     episodes: Annotated[
-        int | None, typer.Option(min=1, help="Only the first so many episodes.")
+        int | None, typer.Option(min=1, help="Number of episodes, from the first one.")
     ] = None,
     json: Json = None,
     trust_effects: TrustEffects = False,
 ) -> None:
     """Measure an agent on frozen sets of episodes, with 95 % intervals.
 
-    `calm` is still water and exact sensors, `current` a steady flow, `noisy` has noise and delays,
-    `hard` all of it on another fish in each episode. `path/helix`, `path/waypoints`, `path/figure`
-    and `path/current` are paths, `station/current` and `station/waves` places to keep. A folder of
-    policies counts as one agent trained with several seeds.
+    The suite `calm` has still water and exact sensors, `current` a steady flow, and `noisy` noise
+    and delays. `hard` has all of these, and another fish in each episode. `path/helix`,
+    `path/waypoints`, `path/figure` and `path/current` are paths to follow. `station/current` and
+    `station/waves` are places to keep. A folder of policies counts as one agent trained with
+    several seeds.
 
     **Example:** `robofish evaluate --agent pid --suite calm --json pid.json`
     """

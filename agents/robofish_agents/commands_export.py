@@ -17,12 +17,12 @@ def register(app: typer.Typer) -> None:
 
 def export(
     policy: Annotated[
-        str, typer.Argument(help="A policy file; or hold or track, for the one that is shipped.")
+        str, typer.Argument(help="A policy file; or hold or track, for the shipped policy.")
     ],
     onnx: Annotated[Path | None, typer.Option(help="ONNX model to write.")] = None,
     c: Annotated[Path | None, typer.Option("--c", help="C header to write.")] = None,
     int8: Annotated[
-        bool, typer.Option("--int8", help="Weights of the C header with eight bits.")
+        bool, typer.Option("--int8", help="Store the weights of the C header with eight bits.")
     ] = False,
     config: Annotated[
         Path | None, typer.Option(help="Settings of the environment, if not in the policy's card.")
@@ -31,8 +31,8 @@ def export(
 ) -> None:
     """Write a policy as an ONNX model or a C header, each with its contract.
 
-    Normalisation and memory of the past are inside. The contract, FILE.json, says order, units,
-    rate and limits of all numbers.
+    The file contains the normalisation and the memory of past observations. The contract,
+    FILE.json, gives order, units, rate and limits of all numbers.
 
     **Example:** `robofish export hold --onnx hold.onnx --c hold.h`
     """

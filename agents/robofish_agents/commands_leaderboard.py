@@ -19,16 +19,16 @@ def register(app: typer.Typer) -> None:
 def leaderboard(
     add: Annotated[
         list[Path] | None,
-        typer.Option("--add", help="Results of `robofish evaluate --json`, to be shown as well."),
+        typer.Option("--add", help="Results of `robofish evaluate --json` to show as well."),
     ] = None,
     metric: Annotated[
-        str | None, typer.Option(help="Only this one, with its intervals; as in those files.")
+        str | None, typer.Option(help="Show only this metric of the results, with its intervals.")
     ] = None,
     json: Json = None,
 ) -> None:
     """Show how the shipped agents do on the frozen suites, best return first.
 
-    Each cell: success, RMSE of depth and heading over the whole episode, mean power of the tail.
+    Each cell: success, RMSE of depth and of heading over whole episodes, mean power of the tail.
 
     **Example:** `robofish leaderboard --add mine.json --metric success_rate`
     """

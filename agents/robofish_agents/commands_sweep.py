@@ -22,7 +22,9 @@ def sweep(
         list[str] | None,
         typer.Option("--set", help="KEY=VALUE,VALUE,...; may be given more than once."),
     ] = None,
-    steps: Annotated[int | None, typer.Option(help="Another number of steps.")] = None,
+    steps: Annotated[
+        int | None, typer.Option(help="Number of steps, instead of the file's.")
+    ] = None,
     address: Address = None,
     cpus: Cpus = None,
     temp: Temp = None,
@@ -31,8 +33,8 @@ def sweep(
     """Train under many seeds and settings, on all cores or on a Ray cluster.
 
     All combinations are trained. Each has a run folder as `robofish train` writes it, and a row in
-    `sweep.csv`. Run the same command again to go on: each training goes on from its checkpoint, a
-    finished one is not done again. Status 1 if one failed.
+    `sweep.csv`. Run the same command again to continue: each training continues from its
+    checkpoint, and finished trainings are skipped. The exit status is 1 if one failed.
 
     **Example:** `robofish sweep ppo-hold --seeds 0-4 --set ppo.gamma=0.97,0.98,0.99`
     """
@@ -56,7 +58,7 @@ def sweep(
         rows = run_sweep(trials, folder, ClusterSettings(address, cpus, temp), tell)
     except KeyboardInterrupt:
         raise Interrupted(
-            f"stopped; checkpoints stay in {folder}. Run the same command again to go on"
+            f"stopped; checkpoints stay in {folder}. Run the same command again to continue"
         ) from None
     finished = sum(row["state"] == FINISHED for row in rows)
     _report(console, rows, finished, str(folder / TABLE))

@@ -19,16 +19,16 @@ def swim(
     agent: Annotated[str, typer.Option(help="pid, mppi, pretrained, or a policy file.")] = "pid",
     task: Annotated[str, typer.Option(help="hold, track, path or station.")] = "track",
     suite: Annotated[
-        str, typer.Option(help="In what water: calm, current, path/helix, ..., or a file.")
+        str, typer.Option(help="Conditions: calm, current, path/helix, ..., or a file.")
     ] = "calm",
-    seed: Annotated[int, typer.Option(min=0, help="Of the episode.")] = 4,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the episode.")] = 4,
     path: Annotated[
         Path | None,
         typer.Option(help="CSV file with north, east, depth (m): a path to follow instead."),
     ] = None,
     out: Annotated[Path, typer.Option(help="Folder for pictures.")] = Path("out/swim"),
-    video: Annotated[Path | None, typer.Option(help="A film to write, .mp4.")] = None,
-    replay: Annotated[Path | None, typer.Option(help="HTML page that shows it swim.")] = None,
+    video: Annotated[Path | None, typer.Option(help="Video to write, .mp4.")] = None,
+    replay: Annotated[Path | None, typer.Option(help="HTML replay page to write.")] = None,
     json: Json = None,
     trust_effects: TrustEffects = False,
 ) -> None:

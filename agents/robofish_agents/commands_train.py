@@ -15,17 +15,19 @@ def train(
     out: Annotated[
         Path | None, typer.Option(help="Folder; default: out/train/NAME-seed-SEED.")
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="Another seed than the file's.")] = None,
-    steps: Annotated[int | None, typer.Option(help="Another number of steps.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed, instead of the file's.")] = None,
+    steps: Annotated[
+        int | None, typer.Option(help="Number of steps, instead of the file's.")
+    ] = None,
     resume: Annotated[
-        bool, typer.Option("--resume", help="Go on with the training in the folder.")
+        bool, typer.Option("--resume", help="Continue the training in the folder.")
     ] = False,
     trust_effects: TrustEffects = False,
 ) -> None:
     """Train a policy with Stable-Baselines3.
 
-    Leaves `policy.npz`, which swims without PyTorch, its `card.yaml`, checkpoints, evaluations and
-    a TensorBoard log. After a stop, `--resume` goes on as if nothing had happened.
+    Writes `policy.npz`, which runs without PyTorch, its `card.yaml`, checkpoints, evaluations and
+    a TensorBoard log. After a stop, `--resume` continues to the same result.
     Files in the folder that a training did not write are never replaced.
 
     **Example:** `robofish train ppo-hold`

@@ -103,7 +103,7 @@ def _cores(ray: Any) -> int:
     except Exception as error:  # of Ray or of its transport; the head no longer answers
         raise ConfigError(
             f"the cluster no longer answers ({type(error).__name__}); what is done is kept, run "
-            "the same command again to go on"
+            "the same command again to continue"
         ) from error
 
 

@@ -46,8 +46,9 @@ def campaign(
 ) -> None:
     """Diagnose many data sets on all cores, or on the machines of a Ray cluster.
 
-    Each gets a folder with the files of `robofish diagnose`, and a line in `campaign.csv`. Run the
-    same command again to go on: what is finished is not done again. Status 1 if one failed.
+    Each data set gets a folder with the files of `robofish diagnose`, and a line in `campaign.csv`.
+    Run the same command again to continue; finished data sets are skipped. The exit status is 1 if
+    one failed.
 
     **Example:** `robofish campaign 'trials/*' --out results`
     """
@@ -100,7 +101,7 @@ def diagnose_many(
             rows = run_campaign(cases, out, options, cluster, tell)
         except KeyboardInterrupt:
             raise Interrupted(
-                f"stopped; what is finished stays in {out}. Run the same command again to go on"
+                f"stopped; finished results stay in {out}. Run the same command again to continue"
             ) from None
     failed = sum(row.state == FAILED for row in rows)
     console.print(

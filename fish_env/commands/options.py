@@ -17,7 +17,7 @@ TrustEffects = Annotated[
     bool,
     typer.Option(
         "--trust-effects",
-        help="Run the Python files of effects that the fish's file names. Reading runs no code.",
+        help="Run the Python effect files that the fish file names. Without it they are refused.",
     ),
 ]
 Json = Annotated[
@@ -25,15 +25,15 @@ Json = Annotated[
 ]
 
 OtherFish = Annotated[
-    str | None, typer.Option(help="Another fish than the dataset names: preset or file.")
+    str | None, typer.Option(help="Fish to use instead of the dataset's: preset or file.")
 ]
 Quick = Annotated[
-    bool, typer.Option("--quick", help="Fit 20 s of two runs; compare no rival causes.")
+    bool, typer.Option("--quick", help="Fit 20 s of two runs; do not compare rival causes.")
 ]
-Seed = Annotated[int, typer.Option(min=0, help="Of all that is random.")]
+Seed = Annotated[int, typer.Option(min=0, help="Seed of all random numbers.")]
 MeasuredBeats = Annotated[
     bool,
-    typer.Option("--measured-beats", help="Take tail frequencies from the hull's sway."),
+    typer.Option("--measured-beats", help="Measure tail frequencies from the hull's sway."),
 ]
 Address = Annotated[
     str | None,
@@ -45,7 +45,7 @@ Address = Annotated[
 ]
 Cpus = Annotated[
     int | None,
-    typer.Option(help="Tasks side by side on this machine.", show_default="its cores"),
+    typer.Option(help="Number of parallel tasks on this machine.", show_default="its cores"),
 ]
 Temp = Annotated[
     Path | None,
@@ -66,8 +66,8 @@ class Commands(TyperGroup):
             return super().invoke(ctx)
         except KeyboardInterrupt:
             raise Interrupted(
-                "stopped; files that were complete stay, nothing is half written. Start again to "
-                "get the rest"
+                "stopped; complete files are kept, and nothing is half written. Run the command "
+                "again for the rest"
             ) from None
 
 

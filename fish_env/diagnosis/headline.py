@@ -127,19 +127,19 @@ def _doubtful(answer: Answer) -> bool:
 
 def _next_step(answer: Answer) -> str:
     verdict, proposal = answer["verdict"], answer.get("next_experiment") or {}
-    fly = ""
+    swim = ""
     if proposal.get("schedule"):
         aims = list(proposal.get("separates", ()))
-        fly = (
-            f"fly “{proposal.get('manoeuvre', 'the schedule')}” ({EXPERIMENT_FILE}), add the run "
+        swim = (
+            f"swim “{proposal.get('manoeuvre', 'the schedule')}” ({EXPERIMENT_FILE}), add the run "
             "to the dataset and diagnose again"
         )
         if aims:
             seen = "it separates the explanations" if verdict == "ambiguous" else "it would show "
             more = len(aims) - MOST_NAMED
             seen += "" if verdict == "ambiguous" else ", ".join(aims[:MOST_NAMED])
-            fly += f"; {seen}" + (f" and {more} more" if more > 0 and "show" in seen else "")
-        fly += "."
+            swim += f"; {seen}" + (f" and {more} more" if more > 0 and "show" in seen else "")
+        swim += "."
     if verdict == "inputs":
         faults = [f for f in answer.get("inputs", ()) if f["decisive"]]
         fixes = "; ".join(f"`{fault['fix']}`" for fault in faults)
@@ -147,14 +147,14 @@ def _next_step(answer: Answer) -> str:
     if answer.get("quick") and verdict in ("outside_library", "partial"):
         return "diagnose again without --quick."
     if verdict == "ambiguous":
-        return fly or "record more varied runs and diagnose again."
+        return swim or "record more varied runs and diagnose again."
     if _doubtful(answer):
         return "do not use the extended model; record more runs and diagnose again."
     if verdict in ("cause", "parameters", "partial"):
         return "simulate and train with extended.yaml, a fish file with what was found."
     if verdict == "outside_library":
         return "read “Where the misfit sits”, then add an effect of your own from a Python file."
-    return fly or "use the refitted coefficients; nothing needs to be added."
+    return swim or "use the refitted coefficients; nothing needs to be added."
 
 
 def _caveats(answer: Answer) -> str:

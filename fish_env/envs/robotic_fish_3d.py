@@ -40,7 +40,7 @@ def observation_space() -> Box[np.float32]:
 class RoboticFish3DEnv(Watched, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.float32]]):
     """A 29 cm robotic fish that holds or tracks depth and heading, follows paths or keeps a place.
 
-    One servo swings a rigid tail; inside, a weight block slides fore and aft and swings sideways.
+    One servo swings a rigid tail. Inside, a weight block slides fore and aft and swings sideways.
     Inertial frame: x north, y east, z down (depth). Body frame: x forward, y starboard, z down.
     Actions come at 10 Hz, the physics runs at 100 Hz (RK4); both can be set.
 
@@ -82,24 +82,24 @@ class RoboticFish3DEnv(Watched, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.
     | 23-27 | actuator positions in the order of the action | action range |
     | 28-32 | last action | 1 |
 
-    Errors are goal minus measured. The tail swings the heading by some degrees in every stroke, so
-    the heading error that counts is that of the mean heading vector over the last tail beat (at
-    most 1.5 s); the instantaneous one stands beside it. Before an episode's start the fish counts
-    as having kept its first heading and speed.
+    Errors are goal minus measured. The tail swings the heading by some degrees in every stroke.
+    The reward therefore uses the error of the mean heading vector over the last tail beat (at most
+    1.5 s). The instantaneous error is observed too. In the first beat of an episode, the means
+    assume that the fish kept its first heading and speed before the start.
 
     ## Tasks
 
-    Every task shows its goal as depth, heading and speed, so an agent of one runs on all.
+    Every task gives its goal as depth, heading and speed, so an agent of one task runs on all.
 
     * ``hold``: constant depth and heading. ``track``: signals that step, ramp or oscillate.
     * ``path``: a helix, legs between waypoints, or a figure of eight seen from the side: a circle
-      on which the depth swings twice a turn, because a fish that pitches through a loop tumbles.
-      Line-of-sight guidance turns path and position into depth, heading and their rates. Its
-      integral takes out a current, of which it knows nothing.
-    * ``station``: a place to stay at. The fish cannot stop, because it coasts for a metre. In a
+      on which the depth oscillates twice a turn. A vertical loop would make the fish tumble.
+      Line-of-sight guidance computes depth, heading and their rates from path and position. It
+      does not know the current; its integral removes the error that a current causes.
+    * ``station``: a place to keep. The fish cannot stop, because it coasts for a metre. In a
       current of at least 2 cm/s it heads against the flow and swims as fast as the flow. In slower
-      water it swims around the place on a circle of 0.4 m, near its smallest. Guidance knows the
-      effect ``current`` and no waves.
+      water it swims around the place on a circle of 0.4 m, near its smallest turning radius.
+      Guidance knows the effect ``current``, but not waves.
 
     Guidance knows the true position of the fish, as a camera above the tank would measure it.
 
@@ -107,24 +107,25 @@ class RoboticFish3DEnv(Watched, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.
 
     With tolerance(e, m) = 1 / (1 + (e/m)^2): ``0.4 tolerance(depth error, 0.10 m)
     + 0.4 tolerance(heading error, 0.20 rad) + 0.2 tolerance(speed error, 0.04 m/s)
-    - 0.05 P/(P + 0.1 W) - 0.05 mean((change of action)^2)/4``; P is the mean mechanical power of
-    the tail servo over the step. At most 1 a step; each term is in ``info``.
+    - 0.05 P/(P + 0.1 W) - 0.05 mean((change of action)^2)/4``. P is the mean mechanical power of
+    the tail servo over the step. The reward is at most 1 per step. Each term is in ``info``.
 
-    The tasks ``path`` and ``station`` add a term for the place and have other weights
-    (``reward.path``, ``reward.station`` in the settings): tolerance(cross-track error, 10 cm) and
-    tolerance(place error, 30 cm).
+    The tasks ``path`` and ``station`` add a term for the position: tolerance(cross-track error,
+    10 cm) and tolerance(place error, 30 cm). They have other weights (``reward.path`` and
+    ``reward.station`` in the settings).
 
     ## Start
 
-    Depth within 0.2 m and heading within 90 degrees of the goal, up to 0.1 m/s, a little tilted,
-    at a random tail phase, at (0, 0); actuators at zero. Paths begin at (0, 0); a place to keep is
-    up to 1 m away, and the heading is within 90 degrees of the bearing to it.
+    The fish starts at (0, 0), with its depth within 0.2 m and its heading within 90 degrees of the
+    goal. Its speed is up to 0.1 m/s, it is slightly tilted, its tail phase is random, and its
+    actuators are at zero. Paths begin at (0, 0). A place to keep is up to 1 m away, and the
+    heading is within 90 degrees of the bearing to it.
 
     ## End
 
-    Terminated when the fish leaves the tank (surface, bottom, walls if set), tumbles by more than
-    80 degrees, or the simulation diverges; ``info["failure"]`` says which
-    (:class:`fish_env.envs.layout.Failure`). Truncated only by the time limit (400 steps).
+    An episode is terminated if the fish leaves the tank (surface, bottom, walls if set), if it
+    tumbles by more than 80 degrees, or if the simulation diverges. ``info["failure"]`` says which
+    (:class:`fish_env.envs.layout.Failure`). It is truncated only by the time limit (400 steps).
 
     ## Info
 
@@ -135,37 +136,42 @@ class RoboticFish3DEnv(Watched, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.
     have been within 5 cm, 5 degrees and 20 %, ``is_success``: 1 once that is 10 s, ``failure``,
     ``time_s``.
 
-    Of a path: ``cross_track_error`` (m, to starboard of the path, seen from above) and
-    ``path_progress`` (0 to 1, the share of it that lies behind). Of a place: ``place_error`` (m,
-    distance in three dimensions). They are 0 in other tasks. On a path ``within_tolerance_s``
-    counts depth within 5 cm, cross-track error within 5 cm and speed within 20 %. At a place it
-    counts a place error within 45 cm, 1.5 body lengths, because a circling fish is 40 cm away.
+    The task ``path`` adds ``cross_track_error`` (m, to starboard of the path, seen from above) and
+    ``path_progress`` (0 to 1, the completed share of the path). The task ``station`` adds
+    ``place_error`` (m, distance in three dimensions). They are 0 in other tasks. On a path
+    ``within_tolerance_s`` counts depth within 5 cm, cross-track error within 5 cm and speed within
+    20 %. At a place it counts a place error within 45 cm, 1.5 body lengths, because a circling
+    fish is 40 cm away.
 
     ``reset`` also reports each randomised parameter as ``parameter/<path>``.
 
     ## Reset options
 
-    ``reset(options={"state": {...}, "goal": {...}, "parameters": {...}})``: state by ``position``
-    (m), ``euler`` (roll, pitch, yaw, rad), ``velocity_body`` (m/s), ``angular_velocity_body``
-    (rad/s), ``tail_phase`` (rad); goal by ``depth`` (m), ``heading`` (rad), ``cruise_speed`` (m/s)
-    or any field of :data:`fish_env.envs.layout.GOAL`; parameters by path, as in the fish's file.
-    A path may be given by ``waypoints`` (n, 3): north, east, depth (m), 2 to 32 of them, or by
-    ``path_radius`` (m, negative to port) with ``path_pitch`` (m deeper in a turn), ``path_swing``
-    and ``path_length`` (m); a place or the start of a path by ``north`` and ``east`` (m).
+    ``reset(options={"state": {...}, "goal": {...}, "parameters": {...}})`` takes
+
+    * ``state``: ``position`` (m), ``euler`` (roll, pitch, yaw, rad), ``velocity_body`` (m/s),
+      ``angular_velocity_body`` (rad/s), ``tail_phase`` (rad);
+    * ``goal``: ``depth`` (m), ``heading`` (rad), ``cruise_speed`` (m/s) or any field of
+      :data:`fish_env.envs.layout.GOAL`;
+    * ``goal`` of a path: 2 to 32 ``waypoints`` (n, 3): north, east, depth (m); or ``path_radius``
+      (m, negative to port) with ``path_pitch`` (m deeper in a turn), ``path_swing`` and
+      ``path_length`` (m);
+    * ``goal`` of a place, or the start of a path: ``north`` and ``east`` (m);
+    * ``parameters``: values by path, as in the fish file.
 
     ## Versions
 
-    * v0: first version. The tasks ``path`` and ``station`` came later; ``hold`` and ``track`` are
-      the same to the last bit.
+    * v0: first version. The tasks ``path`` and ``station`` were added later, without changing any
+      bit of ``hold`` and ``track``.
 
     Args:
         task: ``"hold"`` (constant references), ``"track"`` (steps, ramps, sines), ``"path"``
             (helix, waypoints, figure of eight) or ``"station"`` (keep a place).
         fish: name of a shipped fish, path of a parameter file (extended models included), or
-            parameters. What a file says of measurements (sensor delays, biases) belongs to the
-            recordings it was fitted to and does not act here.
+            parameters. Sensor effects of a fitted file (delays, biases) belong to its recordings
+            and are not simulated here.
         render_mode: None, ``"rgb_array"`` (``render`` returns pictures, no screen is needed) or
-            ``"human"`` (a window that runs in real time; without a screen a warning and no window).
+            ``"human"`` (a window that runs in real time; without a screen, a warning instead).
             Both need the extra ``render``.
         config: YAML file or mapping that changes configs/env/robotic-fish-3d.yaml.
         control_hz: actions a second.
@@ -177,7 +183,7 @@ class RoboticFish3DEnv(Watched, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.
             (rad), ``tank_depth`` (m), and ``phase`` (rad) at the start of each episode.
         observation_noise: standard deviations (SI) for ``depth``, ``depth_rate``, ``attitude``,
             ``heading``, ``velocity``, ``rates``, or single sensors.
-        observation_delay_s: age of what the sensors show (s); commands are known at once.
+        observation_delay_s: delay of the sensors (s); commands are observed without delay.
         action_delay_s: time until an action reaches the actuators (s).
         randomization: parameters drawn in each episode: ``"prior"``, ``"posterior"``, or
             path -> ``{"relative": sd}``, ``{"sd": sd}`` or ``[low, high]``.
@@ -186,7 +192,7 @@ class RoboticFish3DEnv(Watched, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.
         render_size: width and height of a picture (pixels).
 
     Raises:
-        ConfigError, ParameterError, EffectError: saying what to change.
+        ConfigError, ParameterError, EffectError: if an option is wrong, with the fix.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012

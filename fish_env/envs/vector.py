@@ -49,7 +49,7 @@ class RoboticFish3DVectorEnv(Watched, VectorEnv[Float32Array, Float32Array, npt.
     """N independent :class:`RoboticFish3DEnv`, advanced together on all cores.
 
     Fish i behaves to the last bit like a single environment that was reset with seed + i, whatever
-    the number of threads. Made by ``gymnasium.make_vec("RoboticFish3D-v0", num_envs=N)``.
+    the number of threads. Make it with ``gymnasium.make_vec("RoboticFish3D-v0", num_envs=N)``.
 
     Args:
         num_envs: number of fish.

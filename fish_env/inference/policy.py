@@ -1,4 +1,4 @@
-"""Every number that decides an inference, once, with where it comes from.
+"""Every number that decides an inference, with its source.
 
 A number has a source, or was calibrated by a script of the project, or was set by hand, and says
 which. ``docs/policy.md`` is made from this file, and every ``diagnosis.json`` holds the values that
@@ -25,41 +25,40 @@ class DecisionPolicy:
     """Thresholds of screening, search, adequacy, estimates and intervals.
 
     Attributes:
-        screen_level: share of data sets without a cause in which any passes the screen.
-        null_draws: draws of the smallest p-value's distribution.
-        power: of the smallest detectable sizes.
-        evidence_doubt: difference of -2 log evidence that decides nothing.
-        most_causes: causes that an explanation may have.
+        screen_level: share of data sets without a cause in which any cause passes the screening.
+        null_draws: number of draws of the smallest p-value's distribution.
+        power: power at the smallest detectable sizes.
+        evidence_doubt: difference of -2 log evidence below which explanations are rivals.
+        most_causes: largest number of causes in an explanation.
         worth_coarse_fit: statistic above which an effect is tried under relaxed noise.
-        most_relaxed: effects tried under relaxed noise.
+        most_relaxed: largest number of effects tried under relaxed noise.
         coarse_fit_behind: share of the leader's gain that a finalist may lack.
-        coarse_fit_leeway: difference of coarse fits in -2 log likelihood that excludes nobody.
-        out_of_reach: distance to the leader beyond which a fit is given up.
-        aic_penalty: what a coarse fit gains by a parameter without effect.
-        largest_disturbance: strongest disturbance while causes are missing, in plausible ones.
-        sure_sd: standard errors from neutral at which a cause is needed without a fit that tells.
-        pursuits: times that many causes are looked for together.
-        most_challenges: effects tried in full in place of one that was found among many.
-        relaxed_log_p: added to the log p-value of a cause where the adequacy test fails.
+        coarse_fit_leeway: difference of coarse fits in -2 log likelihood that excludes no cause.
+        out_of_reach: distance to the leader beyond which a fit is stopped.
+        aic_penalty: expected gain of a coarse fit by a parameter without effect.
+        largest_disturbance: strongest disturbance of the search, over the plausible limit.
+        sure_sd: standard errors from neutral beyond which no fit without the cause is tried.
+        pursuits: number of times that many causes are searched together.
+        most_challenges: largest number of effects fitted in place of one found among many.
+        relaxed_log_p: added to the log p-value of a cause if the adequacy test fails.
         adequacy_level: share of adequate explanations that the adequacy test rejects.
-        adequacy_certain: multiple of its log p-value that chance does not reach.
+        adequacy_certain: multiple of the threshold's log p-value that chance does not reach.
         prior_reach_sd: prior standard deviations that a coefficient may move.
         extreme_prior_sd: prior standard deviations that are implausible beside an effect.
         implausible_prior_sd: prior standard deviations, or plausible sizes, that are implausible.
-        far_start_sd: prior standard deviations beyond which nominal coefficients are a start too.
+        far_start_sd: prior standard deviations beyond which a fit also starts from nominal values.
         score_block_s: length of blocks over which scores are summed (s).
-        long_score_block_s: of the longer blocks (s).
+        long_score_block_s: length of the longer blocks (s).
         converged: predicted decrease of -2 log likelihood at which a fit has converged.
-        same_noise: relative change of a noise model that ends the alternation with it.
-        run_variation_gain: of -2 log likelihood by a spread over runs that is allowed for.
-        jitter_gain: of -2 log likelihood by sample times that jitter, which are then allowed for.
-        noisier_than_declared: median over channels of the noise that samples show over the
-            declared, from which the larger counts.
-        fewest_runs_for_spread: runs that a spread over runs needs.
-        fewest_runs_for_interval: runs that an interval over runs needs.
-        beyond_usual: spread over runs, in usual ones, that is a finding.
-        visible_misfit: misfit over noise below which there is nothing to share.
-        smallest_gap: gap of the baseline to the floor below which no share of it is quoted.
+        same_noise: relative change of the noise below which its alternation with the fit ends.
+        run_variation_gain: gain in -2 log likelihood from which a spread over runs is used.
+        jitter_gain: gain in -2 log likelihood from which jitter of the sample times is used.
+        noisier_than_declared: median ratio of found to declared noise that replaces the declared.
+        fewest_runs_for_spread: smallest number of runs for a spread over runs.
+        fewest_runs_for_interval: smallest number of runs for an interval over runs.
+        beyond_usual: spread over runs, over the usual one, from which it is a finding.
+        visible_misfit: misfit over noise below which the error budget has no shares.
+        smallest_gap: gap from baseline to noise below which no share of it is reported.
         least_share: share of the gap below which a named answer is called doubtful.
         prediction_window_s: length of predictions without feedback (s).
     """

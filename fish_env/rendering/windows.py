@@ -143,7 +143,7 @@ class Window:
         if self._helped:
             draw_help(picture)
         elif self.paused:
-            draw_note(picture, "paused: space goes on")
+            draw_note(picture, "paused: space to continue")
         elif time.monotonic() < self._noted_until:
             draw_note(picture, "H: what keys and mouse do")
         self._window.get_surface().blit(picture, (0, 0))

@@ -94,19 +94,19 @@ def markdown(record: dict[str, Any], declared: Declaration, rows: Sequence[Score
         "### What was hidden and what was found",
         _fish_table(record["fish"]),
         f"### Each fish: {label} on `{declared.tasks[0]}`",
-        "Mean over the seeds, in brackets their standard deviation; differences with their 95 % "
-        "intervals over the seeds. No gap: its interval reaches zero.",
+        "Cells show the mean over the seeds, with the standard deviation in brackets. Differences "
+        "have 95 % intervals over the seeds. 'No gap' means that the interval includes zero.",
         _each_fish(primary, _beside(record["beside"], declared.tasks[0], declared.metrics[0])),
         "### Means over fish and seeds",
-        "Beside them the PID controller and the policies shipped for "
-        f"`{declared.tasks[0]}`, both made on the nominal fish and many around it.",
+        "The last columns show the PID controller and the policies shipped for "
+        f"`{declared.tasks[0]}`, both made on the nominal fish and many fish around it.",
         _means_table(record["summary"], record["beside"]),
         "### Differences",
-        "With 95 % intervals over the fish; in brackets, on how many of them it is better.",
+        "Intervals are 95 %, over the fish. Brackets show on how many fish it is better.",
         _differences_table(record["summary"], len(record["fish"])),
         "### Share of the gap between nominal fish and truth that is closed",
-        "In per cent, with 95 % intervals over the fish. Open: the gap itself could be zero, and "
-        "the share mean little.",
+        "In per cent, with 95 % intervals over the fish. 'Open' means that the gap could be zero, "
+        "so the share has little meaning.",
         _closed_table(record["summary"]),
     ]
     return "\n\n".join(parts)

@@ -152,8 +152,8 @@ def test_the_speed_headline_takes_the_latest_measurement(tmp_path):
     (tmp_path / "speed-2026-01-02.json").write_text(json.dumps(record))
     lines = update_readme.speed(tmp_path)
     assert "120k/s for 1 fish on 1 thread, 2M/s for 64 fish on 2 threads (2 cores of a" in lines
-    assert "* One: at least 4 times as fast is the aim; it is 5.2 times: met." in lines
-    assert "* Two: at least 6 times as fast is the aim; not measured." in lines
+    assert "* One: at least 4 times as fast (target); measured 5.2 times: met." in lines
+    assert "* Two: at least 6 times as fast (target); not measured." in lines
     assert "not measured" in update_readme.speed(tmp_path / "none")
 
 

@@ -94,7 +94,7 @@ def _check_folder(config: TrainConfig, folder: Path, resume: bool) -> None:
     if (folder / CHECKPOINT).exists():
         if not resume:
             raise ConfigError(
-                f"{folder}: a training is kept here already; add --resume to go on with it, or "
+                f"{folder}: a training is kept here already; add --resume to continue it, or "
                 "give another folder with --out"
             )
         return

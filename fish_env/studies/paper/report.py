@@ -32,7 +32,7 @@ def statements_markdown(study: Study) -> str:
             "",
             "Written by `robofish paper`. "
             f"{held} of {len(statements)} statements are held by the model without effects. "
-            "Nothing here was tuned to make a statement hold.",
+            "No parameter was tuned to make a statement hold.",
             "",
             "Means and amplitudes are over whole tail beats after the transient. An amplitude is "
             "half the range. U_r, U_g, U_s are speeds along the path without the swaying of each "
@@ -49,7 +49,7 @@ def statements_markdown(study: Study) -> str:
             "## Numbers that need the measured values",
             "",
             "The paper prints these errors of its own simulation against its measurements. The "
-            "measured values stand only in its figures, so they are not checked here:",
+            "measured values appear only in its figures, so they are not checked here:",
             "",
             *(f"* {item}" for item in NOT_CHECKABLE),
             "",
@@ -71,10 +71,9 @@ def _lag_words(study: Study) -> str:
     return (
         "The paper's rate amplitudes fall with frequency. With an ideal servo this model cannot "
         "show that: its yaw amplitude is nearly constant in frequency, so the rate grows. The "
-        "effect `servo_lag` takes "
-        f"amplitude away as the beat quickens. Of the time constants {tried} s the longest, {lag:g}"
-        " s, is shown. It makes all three amplitudes fall, but then the turning rate no longer "
-        "grows with f1: a first-order lag alone does not give both."
+        "effect `servo_lag` reduces the amplitude at higher frequencies. Of the time constants "
+        f"{tried} s the longest, {lag:g} s, is shown. It makes all three amplitudes fall, but then "
+        "the turning rate no longer grows with f1: a first-order lag alone does not give both."
     )
 
 

@@ -32,9 +32,9 @@ AGENTS_HEAD = """\
 DIAGNOSIS_HEAD = """\
 ## Diagnosis
 
-`make benchmark-diagnosis` simulates measurements with another implementation of the physics. It hides
-one or more effects, wrong coefficients, or nothing in them, and counts the right and wrong answers of
-[the diagnosis](diagnosis.md). Intervals are 95 % (Clopper-Pearson).
+`make benchmark-diagnosis` simulates measurements with another implementation of the physics. It
+hides one or more effects, wrong coefficients, or nothing in them, and counts the right and wrong
+answers of [the diagnosis](diagnosis.md). Intervals are 95 % (Clopper-Pearson).
 """
 REALISTIC_HEAD = """\
 ## Diagnosis of realistic robots
@@ -47,8 +47,8 @@ REALISTIC_HEAD = """\
 * physics of another kind;
 * nothing but noise.
 
-It is scored apart from the suite above. A named cause counts as true if it acts, however small it is.
-Intervals are 95 % (Clopper-Pearson).
+It is scored apart from the suite above. A named cause counts as true if it acts, however small it
+is. Intervals are 95 % (Clopper-Pearson).
 """
 
 

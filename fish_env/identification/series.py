@@ -269,8 +269,7 @@ class SeriesProblem(Problem):
         own, errors = np.split(values, [len(VARIATIONS)], axis=1)
         moved = [run.with_numbers(*n) for run, *n in zip(self.runs, own, errors, strict=True)]
         if errors.any():
-            seen = self.filtered(point, noise, keep_slopes=True)
-            moved = distorted(moved, seen, self.channels)
+            moved = distorted(moved, self.filtered(point, noise, keep_slopes=True), self.channels)
         return self.with_runs(moved)
 
     def variation_slopes(

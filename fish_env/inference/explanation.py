@@ -19,6 +19,7 @@ from fish_env.inference.problem import Problem
 T = TypeVar("T")
 FEW_RUNS = 3
 """Runs on which a fit is begun, or tried."""
+MOST_TURNS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +69,19 @@ class Explanation:
         if found is None or found is self.fit or (stands_in and not beside_misfit):
             return self
         return Explanation(self.causes, found)
+
+    def varied_to_the_end(self) -> Explanation:
+        """With what the runs differ in also beside a misfit, again while that tells much more.
+
+        What runs differ in and what they share settle in turns.
+        """
+        best = self
+        for _ in range(MOST_TURNS):
+            more = best.varied(beside_misfit=True)
+            if more.score > best.score - POLICY.evidence_doubt:
+                break
+            best = more
+        return best
 
     @cached_property
     def _varied(self) -> Fit | None:

@@ -19,6 +19,10 @@ from fish_env.inference.shortlist import shortlisted
 
 LINEAR_DOUBT = 3.0 * POLICY.evidence_doubt
 """Cost of a substitute in the linear model that a fit may yet make good."""
+ALONE = 3
+"""Causes that are looked for one at a time, at most, while a large misfit is unexplained."""
+LIKES = 4
+"""Effects tried in place of each of these."""
 MOST = 6
 """Substitutes tried in coarse fits."""
 
@@ -53,6 +57,15 @@ def pursue(
         varied = current.varied(beside_misfit=True)
         if varied.score < current.score - POLICY.evidence_doubt:
             current, shown = varied, screen(varied.fit, causes, rng)
+    for _ in range(ALONE):
+        if not disturbance_at_limit(current.fit):
+            break
+        kept = _beside_drive(current, shown)
+        more = pursued(current, kept, report, least, relaxed_log_p, most=1)
+        if more is current:
+            break
+        current = _against_likes(more, screen(more.fit, causes, rng), report)
+        shown = screen(current.fit, causes, rng)
     for _ in range(POLICY.pursuits):
         more = pursued(current, _beside_drive(current, shown), report, least, relaxed_log_p)
         if more is current:
@@ -64,6 +77,22 @@ def pursue(
             current = _told_apart(current, begun.causes, shown)
             break
     return current, shown
+
+
+def _against_likes(
+    current: Explanation, shown: Screen, report: Callable[[str], None]
+) -> Explanation:
+    """The explanation after effects known to look like its last cause were tried in its place.
+
+    Beside a large misfit the linear model tells little. Fits do, once what the runs differ in has
+    settled beside each effect.
+    """
+    *_, last = current.causes
+    known = current.fit.problem.known[last].confusable_with
+    signals = {s.cause.name: s for s in shown.best() if s.cause.is_effect}
+    alike = [s for s in substitutes(current, shown) if s.cause == last and s.name in known]
+    pairs = [(last, signals[s.name]) for s in alike[:LIKES]]
+    return substituted(current, pairs, 1, report, beside_misfit=True)[0]
 
 
 def _beside_drive(current: Explanation, shown: Screen) -> Screen:

@@ -148,6 +148,7 @@ def pursued(
     report: Report,
     least: float = 0.0,
     relaxed_log_p: float = 0.0,
+    most: int = POLICY.most_causes,
 ) -> Explanation:
     """The explanation with all causes that show beside it and are needed; itself without such.
 
@@ -157,8 +158,9 @@ def pursued(
         report: told what is being done.
         least: statistic below which a simulation error explains a cause.
         relaxed_log_p: added to the log p-value that makes a cause significant.
+        most: further causes.
     """
-    room = POLICY.most_causes - len(current.causes)
+    room = min(most, POLICY.most_causes - len(current.causes))
     picks = picked(Projector(current.fit.extrapolated), shown, room, least, relaxed_log_p)
     if not picks:
         return current

@@ -126,27 +126,36 @@ def restart_from_winner(
 
 
 def substituted(
-    current: Explanation, pairs: Sequence[tuple[str, Signal]], most: int, report: Report
+    current: Explanation,
+    pairs: Sequence[tuple[str, Signal]],
+    most: int,
+    report: Report,
+    beside_misfit: bool = False,
 ) -> list[Explanation]:
     """The explanation, and others with another effect in place of one of its causes, best first.
 
     A cause is chosen while others are still missing. A similar one may then win because it
-    compensates for part of them.
+    compensates for part of them. Beside a misfit so may what the runs differ in, which settles
+    anew beside every effect.
 
     Args:
         current: causes with their fit.
         pairs: cause, and the effect to try in its place.
         most: how many to fit in full.
         report: told what is being done.
+        beside_misfit: whether much is still unknown.
     """
     own = current.fit
     fitter = CoarseFitter(own)
+    leeway = dict.fromkeys((name for name, _ in pairs), POLICY.coarse_fit_leeway)
+    if beside_misfit:
+        leeway = {name: max(least, _part(fitter, own, name)) for name, least in leeway.items()}
     found: list[tuple[float, tuple[str, ...], CoarseFit]] = []
     for name, signal in pairs:
         report(f"trying {signal.cause.name} instead of {name}")
         causes = tuple(signal.cause.name if c == name else c for c in current.causes)
         coarse = _swapped(fitter, own, name, signal)
-        if coarse is not None and coarse.objective < fitter.base + POLICY.coarse_fit_leeway:
+        if coarse is not None and coarse.objective < fitter.base + leeway[name]:
             found.append((coarse.objective, causes, coarse))
     others = []
     for _, causes, coarse in sorted(found, key=lambda f: f[0])[:most]:
@@ -154,7 +163,20 @@ def substituted(
         fitted = _at_noise(own.problem, coarse, own.noise, 4)
         if fitted is not None:
             others.append(Explanation(causes, fitted))
-    return sorted([current, *others], key=lambda e: e.score)
+    found_all = [current, *others]
+    if beside_misfit and others:
+        report("fitting what the runs differ in")
+        found_all = side_by_side([e.varied_to_the_end for e in found_all])
+    return sorted(found_all, key=lambda e: e.score)
+
+
+def _part(fitter: CoarseFitter, own: Fit, name: str) -> float:
+    """The part of what a cause explains in a coarse fit that a finalist may lack."""
+    effects = tuple(e for e in own.effects if e != name)
+    values = {p: v for p, v in own.point.effects.items() if p.split(".")[1] != name}
+    begin = [Point(own.point.z, values)]
+    left = reached(partial(fitter.coarse_fit, effects, own.released, begin))
+    return np.inf if left is None else POLICY.coarse_fit_behind * (left.objective - fitter.base)
 
 
 def _swapped(fitter: CoarseFitter, own: Fit, name: str, signal: Signal) -> CoarseFit | None:

@@ -138,6 +138,11 @@ class Growing(Stated):
         moved.own = values
         return moved
 
+    def some(self, runs):
+        part = Growing(self.rates[runs])
+        part.own = self.own[runs]
+        return part
+
     def filtered(self, point, noise, near=()):
         missed = 5.0 * (np.exp(np.outer(self.rates, self._TIME)) - np.exp(self.own * self._TIME))
         return [Evaluated(float(-0.5 * row @ row), row) for row in missed]

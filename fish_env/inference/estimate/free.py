@@ -26,6 +26,8 @@ DIFFERENCE = 0.3
 """Step for differences by what runs differ in, in usual spreads."""
 MOST_HALVINGS = 5
 """Of a run's step to its own numbers."""
+MOST_STEPS, NEAR = 6, 0.1
+"""To the numbers of runs that no fit has seen, and the step, in spreads, after which they stay."""
 LARGEST_SLOPE = 1e9
 """In standard deviations of the noise per unit; what exceeds it has diverged."""
 
@@ -257,14 +259,20 @@ def _moved(
     """The problem with every run's numbers moved by as much of a step (R, K) as helps the run."""
     share = np.ones(problem.run_count)
     before = _own_objectives(problem, filtered, noise)
+    worse = list(range(problem.run_count))
     for _ in range(MOST_HALVINGS):
-        moved = problem.with_variation(problem.variation + share[:, None] * step, point, noise)
-        after = _own_objectives(moved, moved.filtered(point, noise, filtered), noise)
-        worse = ~(after <= before)
-        if not worse.any():
-            return moved
+        part = problem.some(worse)
+        numbers = part.variation + share[worse, None] * step[worse]
+        moved = part.with_variation(numbers, point, noise)
+        near = [filtered[i] for i in worse]
+        after = _own_objectives(moved, moved.filtered(point, noise, near), noise)
+        worse = [i for i, value in zip(worse, after, strict=True) if not value <= before[i]]
+        if not worse:
+            break
         share[worse] *= 0.5
     share[worse] = 0.0
+    if share.all() and moved.run_count == problem.run_count:
+        return moved
     return problem.with_variation(problem.variation + share[:, None] * step, point, noise)
 
 
@@ -287,7 +295,13 @@ def evaluated(problem: P, point: Point, noise: Any) -> tuple[P, Sequence[Any]]:
         point: values of the shared parameters.
         noise: noise model.
     """
-    settled, _ = predicted_variation(problem.settled(point, noise), point, noise)
+    settled = problem.settled(point, noise)
+    spreads = np.maximum(spread_of(problem, noise), 1e-300)
+    for _ in range(MOST_STEPS):
+        before = settled.variation
+        settled, _ = predicted_variation(settled, point, noise)
+        if np.all(np.abs(settled.variation - before) < NEAR * spreads):
+            break
     return cast(P, settled), settled.filtered(point, noise)
 
 

@@ -306,8 +306,7 @@ class Problem(Protocol):
 
         Args:
             values: the numbers.
-            point: values of the shared parameters, close to those that the numbers belong to.
-            noise: noise model.
+            point, noise: shared parameters and noise model close to which the numbers belong.
         """
         return self
 

@@ -3,9 +3,9 @@
 A marker sits beside the origin, an inertial unit is screwed on a little askew, a compass bends with
 the heading, a camera looks down at an angle and into water, devices are late by some hundredths of
 a second. Each is linear in one number, with regressors that follow from the filtered motion. So no
-fish has to swim again to see what it does: the filter's own slopes carry a change of the measurements
-through to its innovations. Errors that are known are taken off the samples, and the regressors are
-then those of the corrected motion.
+fish has to swim again to see what it does: the filter's own slopes carry a change of the
+measurements through to its innovations. Errors that are known are taken off the samples, and the
+regressors are then those of the corrected motion.
 """
 
 from __future__ import annotations

@@ -41,11 +41,7 @@ class Point:
 
 
 class Noise(Protocol):
-    """A noise model; what is in it is the problem's own business.
-
-    A problem with ``variations`` keeps their standard deviations over runs (K,) in an attribute
-    ``spread``.
-    """
+    """A noise model: the problem's own, with spreads (K,) over runs as ``spread`` if it has any."""
 
     def is_close(self, other: Any, share: float) -> bool:
         """Whether another noise model differs by less than a share of this one."""
@@ -306,7 +302,8 @@ class Problem(Protocol):
 
         Args:
             values: the numbers.
-            point, noise: shared parameters and noise model close to which the numbers belong.
+            point: values of the shared parameters, close to theirs.
+            noise: noise model.
         """
         return self
 

@@ -6,7 +6,7 @@ vehicle's parameter file, and a coefficient that is a cause of its own ``paramet
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Mapping
 
 PREFIX = "effects."
 PARAMETER = "parameter:"
@@ -30,3 +30,8 @@ def parameter_of(path: str) -> str:
 def effects_of(paths: Iterable[str]) -> set[str]:
     """Names of the effects that some effect parameters belong to."""
     return {effect_of(path) for path in paths}
+
+
+def of_effects(values: Mapping[str, float], effects: Collection[str]) -> dict[str, float]:
+    """Those of effect parameters' values that belong to some effects."""
+    return {path: value for path, value in values.items() if effect_of(path) in effects}

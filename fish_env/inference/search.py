@@ -14,7 +14,7 @@ from fish_env.inference.effort import FULL, Effort
 from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.explanation import FEW_RUNS, Explanation, fitted_again, reached
-from fish_env.inference.hypotheses import PREFIX
+from fish_env.inference.hypotheses import PREFIX, of_effects
 from fish_env.inference.parallel import side_by_side
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
@@ -173,8 +173,7 @@ def substituted(
 def _part(fitter: CoarseFitter, own: Fit, name: str) -> float:
     """The part of what a cause explains in a coarse fit that a finalist may lack."""
     effects = tuple(e for e in own.effects if e != name)
-    values = {p: v for p, v in own.point.effects.items() if p.split(".")[1] != name}
-    begin = [Point(own.point.z, values)]
+    begin = [Point(own.point.z, of_effects(own.point.effects, effects))]
     left = reached(partial(fitter.coarse_fit, effects, own.released, begin))
     return np.inf if left is None else POLICY.coarse_fit_behind * (left.objective - fitter.base)
 
@@ -184,7 +183,7 @@ def _swapped(fitter: CoarseFitter, own: Fit, name: str, signal: Signal) -> Coars
 
     One that ends switched off had begun too far away, and is tried from each size in turn.
     """
-    kept = {p: v for p, v in own.point.effects.items() if p.split(".")[1] != name}
+    kept = of_effects(own.point.effects, {*own.effects} - {name})
     effects = tuple(signal.cause.name if e == name else e for e in own.effects)
     sizes = probed(own.problem, signal, every=True)
     begin = [Point(z, {**kept, **values}) for z in baselines(own) for values in sizes]
@@ -202,8 +201,7 @@ def without(current: Explanation, dropped: Collection[str]) -> Explanation | Non
     own = current.fit
     effects = tuple(e for e in own.effects if e not in dropped)
     released = tuple(p for p in own.released if f"parameter:{p}" not in dropped)
-    values = {p: v for p, v in own.point.effects.items() if p.split(".")[1] in effects}
-    begin = Point(own.point.z, values)
+    begin = Point(own.point.z, of_effects(own.point.effects, effects))
     smaller = reached(
         lambda: fit(
             own.problem, effects, begin, own.noise, released, refit_noise=False, iterations=4

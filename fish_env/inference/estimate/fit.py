@@ -27,6 +27,7 @@ from fish_env.inference.estimate.free import (
 from fish_env.inference.estimate.gauss_newton import descend, predicted_decrease
 from fish_env.inference.estimate.information import gradient, information, leverage, prior_precision
 from fish_env.inference.estimate.run_variation import Likelihood, Marginal, Spread, fit_spread
+from fish_env.inference.hypotheses import of_effects
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Evaluation, Point, Problem
 
@@ -316,8 +317,7 @@ def with_run_variation(own: Fit, dropped: Collection[str] = ()) -> Fit:
     if problem is own.problem and not dropped:
         return own
     effects = [name for name in own.effects if name not in dropped]
-    values = {p: v for p, v in own.point.effects.items() if p.split(".")[1] in effects}
-    start = Point(own.point.z, values)
+    start = Point(own.point.z, of_effects(own.point.effects, effects))
     return fit(problem, effects, start, noise, own.released, rounds=2)
 
 

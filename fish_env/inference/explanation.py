@@ -85,8 +85,15 @@ class Explanation:
 
     @cached_property
     def _varied(self) -> Fit | None:
-        """The fit with what the runs differ in; None where the simulation diverges."""
-        return reached(partial(with_run_variation, self.fit))
+        """The fit with what the runs differ in; None where the simulation diverges.
+
+        The fit itself where that is worse: the linear model which tells the spreads was then wrong.
+        """
+        found = reached(partial(with_run_variation, self.fit))
+        if found is None or found is self.fit:
+            return found
+        worse = Explanation(self.causes, found).score > self.score + POLICY.evidence_doubt
+        return self.fit if worse else found
 
     def extrapolated(self) -> Explanation:
         """The same causes, with estimates as ever finer steps put them."""

@@ -60,6 +60,15 @@ def test_what_differs_is_found_and_what_does_not_is_not(seed):
     assert np.all(np.abs(found.values[:, 1] + values[:, 1]) < 4.0 * found.errors[:, 1] + 1e-9)
 
 
+def test_slope_of_the_likelihood_is_its_derivative():
+    own, _ = likelihood(0, (0.5, 1.5), mean=0.3, may_share=False)
+    at, step = np.array([0.4, 1.1]), 1e-5
+    apart = [at * np.exp(step * unit) for unit in np.vstack([np.eye(2), -np.eye(2)])]
+    up, down = np.split(np.array([own(sd) for sd in apart]), 2)
+    np.testing.assert_allclose(own.slope(at), (up - down) / (2 * step), rtol=1e-5, atol=1e-4)
+    assert own.slope(np.array([0.4, 0.0]))[1] == 0.0
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_what_all_runs_have_in_common_is_no_variation_unless_it_may_be_shared(seed):
     apart, values = likelihood(seed, (0.0, 0.3), mean=2.0, may_share=False)

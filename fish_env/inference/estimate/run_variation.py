@@ -179,50 +179,90 @@ class Likelihood:
         shifted = residuals - np.einsum("dk,dk->d", own, at[run_of])
         edges = np.searchsorted(run_of, np.arange(len(at) + 1))
         slices = [slice(a, b) for a, b in pairwise(edges.tolist())]
-        self.grams = [own[s].T @ own[s] for s in slices]
-        cross = [own[s].T @ slopes[s] for s in slices]
-        self.cross = [np.hstack([c, g[:, common]]) for c, g in zip(cross, self.grams, strict=True)]
-        self.scores = [own[s].T @ shifted[s] for s in slices]
-        mixed = np.sum(cross, axis=0)[common]
-        both = np.sum(self.grams, axis=0)[np.ix_(common, common)] + WIDE * np.eye(common.sum())
+        self.grams = np.array([own[s].T @ own[s] for s in slices])
+        cross = np.array([own[s].T @ slopes[s] for s in slices])
+        self.cross = np.concatenate([cross, self.grams[:, :, common]], axis=2)
+        self.scores = np.array([own[s].T @ shifted[s] for s in slices])
+        mixed = cross.sum(axis=0)[common]
+        both = self.grams.sum(axis=0)[np.ix_(common, common)] + WIDE * np.eye(common.sum())
         self.information = np.block([[information, mixed.T], [mixed, both]])
         pulls = inner(slopes, shifted[:, None])[:, 0] + pull
-        self.gradient = np.r_[pulls, np.sum(self.scores, axis=0)[common]]
+        self.gradient = np.r_[pulls, self.scores.sum(axis=0)[common]]
 
     def __call__(self, sd: FloatArray) -> float:
         """-2 log likelihood of spreads (K,), but for a constant."""
-        left, pull, value = self.information.copy(), self.gradient.copy(), 0.0
-        for gram, cross, score in zip(self.grams, self.cross, self.scores, strict=True):
-            inner_, factor = _kept(gram, sd)
-            value += float(np.linalg.slogdet(inner_)[1])
-            moved = factor @ np.linalg.solve(inner_, factor.T @ score)
-            value -= float(score @ moved)
-            left -= cross.T @ (factor @ np.linalg.solve(inner_, factor.T @ cross))
-            pull -= cross.T @ moved
-        value += float(np.linalg.slogdet(left)[1])
-        return value - float(pull @ np.linalg.solve(left, pull))
+        at = self._at(sd)
+        value = at.score_norm + float(np.linalg.slogdet(at.left)[1])
+        return value - float(at.pull @ np.linalg.solve(at.left, at.pull))
+
+    def slope(self, sd: FloatArray) -> FloatArray:
+        """Derivative (K,) of that by the logarithms of the spreads; zero of those that are none.
+
+        With Q = (I + F M'M F)^-1, F = diag(sd) and q_k column k of F Q, the covariance F Q F of a
+        run's numbers changes by 2 q_k q_k' when the logarithm of spread k does.
+        """
+        at = self._at(sd)
+        inverse = np.linalg.inv(at.left)
+        columns = at.half.swapaxes(1, 2)
+        across, told = columns @ self.cross[:, at.own], columns @ self.scores[:, at.own, None]
+        known = np.einsum("rkm,rkm->rk", across @ inverse, across)
+        off = told[:, :, 0] - across @ (inverse @ at.pull)
+        slope = np.zeros(len(sd))
+        slope[at.own] = 2.0 * np.sum(1.0 - at.kept - off**2 - known, axis=0)
+        return slope
 
     def predicted(self, sd: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Best predictions (R, K) of the runs' own numbers, and their standard errors (R, K)."""
-        left, pull = self.information.copy(), self.gradient.copy()
-        parts = []
-        for gram, cross, score in zip(self.grams, self.cross, self.scores, strict=True):
-            inner_, factor = _kept(gram, sd)
-            posterior = factor @ np.linalg.solve(inner_, factor.T)
-            left -= cross.T @ posterior @ cross
-            pull -= cross.T @ posterior @ score
-            parts.append((posterior, cross, score))
-        covariance = np.linalg.inv(left)
-        step = -covariance @ pull
-        values = [-(p @ (score + cross @ step)) for p, cross, score in parts]
-        spreads = [np.diag(p + p @ c @ covariance @ c.T @ p) for p, c, _ in parts]
-        return np.array(values), np.sqrt(np.maximum(spreads, 0.0))
+        at = self._at(sd)
+        values, errors = np.zeros(self.scores.shape), np.zeros(self.scores.shape)
+        covariance = np.linalg.inv(at.left)
+        step = -covariance @ at.pull
+        cross, scores = self.cross[:, at.own], self.scores[:, at.own]
+        values[:, at.own] = -np.einsum("rij,rj->ri", at.posterior, scores + cross @ step)
+        along = at.posterior @ cross
+        variance = np.diagonal(at.posterior, axis1=1, axis2=2) + np.einsum(
+            "rkm,rkm->rk", along @ covariance, along
+        )
+        errors[:, at.own] = np.sqrt(np.maximum(variance, 0.0))
+        return values, errors
+
+    def _at(self, sd: FloatArray) -> _Posterior:
+        own = np.flatnonzero(sd)
+        root = sd[own]
+        cross, scores = self.cross[:, own], self.scores[:, own]
+        whole = np.eye(len(own)) + root[:, None] * self.grams[:, own[:, None], own] * root
+        inverse = np.linalg.inv(whole)
+        half = root[:, None] * inverse
+        posterior = half * root
+        along = np.einsum("rij,rj->ri", posterior, scores)
+        left = self.information - np.tensordot(cross, posterior @ cross, axes=((0, 1), (0, 1)))
+        pull = self.gradient - np.tensordot(cross, along, axes=((0, 1), (0, 1)))
+        score_norm = float(np.linalg.slogdet(whole)[1].sum() - np.sum(scores * along))
+        kept = np.diagonal(inverse, axis1=1, axis2=2)
+        return _Posterior(own, half, posterior, kept, left, pull, score_norm)
 
 
-def _kept(gram: FloatArray, sd: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """I + T^1/2 M'M T^1/2, and T^1/2 = diag(sd)."""
-    factor = np.diag(sd)
-    return np.eye(len(sd)) + factor @ gram @ factor, factor
+@dataclass(frozen=True, eq=False)
+class _Posterior:
+    """The runs' own numbers given the residuals, at k spreads that are not zero.
+
+    Attributes:
+        own: (k,) which spreads these are.
+        half: (R, k, k) F Q, with Q = (I + F M'M F)^-1 and F the diagonal of the spreads.
+        posterior: (R, k, k) covariance F Q F of the numbers.
+        kept: (R, k) diagonal of Q.
+        left: (n, n) information of the shared parameters, the numbers integrated out.
+        pull: (n,) gradient by the shared parameters, likewise.
+        score_norm: -2 log likelihood of the spreads, the shared parameters held.
+    """
+
+    own: IntArray
+    half: FloatArray
+    posterior: FloatArray
+    kept: FloatArray
+    left: FloatArray
+    pull: FloatArray
+    score_norm: float
 
 
 def fit_spread(likelihood: Likelihood, variations: Sequence[RunVariation]) -> Spread:
@@ -284,13 +324,20 @@ def _largest(
     """Spreads (K,) of largest density with only some of them active, and -2 log of it."""
     sd, own = np.zeros(len(largest)), list(active)
 
-    def value(logs: FloatArray) -> float:
+    def spread(logs: FloatArray) -> FloatArray:
         trial = np.zeros(len(largest))
         trial[own] = np.exp(logs)
-        return _posterior(likelihood, trial)
+        return trial
+
+    def value(logs: FloatArray) -> float:
+        return _posterior(likelihood, spread(logs))
+
+    def slope(logs: FloatArray) -> FloatArray:
+        trial = spread(logs)
+        return np.asarray((likelihood.slope(trial) + 2.0 * trial**2)[own])
 
     limits = [(float(np.log(SMALLEST)), float(np.log(largest[i]))) for i in own]
-    found = minimize(value, np.log(begin[own]), method="L-BFGS-B", bounds=limits)
+    found = minimize(value, np.log(begin[own]), jac=slope, method="L-BFGS-B", bounds=limits)
     sd[own] = np.exp(found.x)
     sd[sd <= 2.0 * SMALLEST] = 0.0
     return sd, _posterior(likelihood, sd)

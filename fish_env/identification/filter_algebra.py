@@ -17,6 +17,9 @@ WIDE, MOVING_WIDE = -(-N_ERROR // 8) * 8, -(-N_MOVING // 8) * 8
 column at once, in registers, which pays only if no column is left over."""
 TOGETHER = 3
 """Channels that the covariance loses at once."""
+LARGEST_TURN = 0.3
+"""By which one sample may correct the tail's phase (rad). What a phase does is a sine: over this
+much it is off its tangent by 5 %, and beyond it a correction soon points the wrong way."""
 
 
 @kernel
@@ -142,8 +145,8 @@ def predict_covariance(p, f, keep, variance, wander, scratch, turned):
 
 
 @kernel
-def update_covariance(p, rows, measured, noise_variance, smear, s, w, seen, gain):
-    """Take a sample into the covariance, in place.
+def whitened_gain(p, rows, measured, noise_variance, smear, s, w, seen, gain):
+    """Covariance of a sample's innovations, and what :func:`take_into_covariance` needs of it.
 
     Channels first, error states last: the innermost loops run over rows of memory.
 
@@ -157,8 +160,8 @@ def update_covariance(p, rows, measured, noise_variance, smear, s, w, seen, gain
         s: (C, C) scratch.
         w: (C, C) becomes the inverse Cholesky factor of the innovations' covariance.
         seen: (C, 24) scratch: covariance of channels and error states.
-        gain: (C to the next multiple of 3, 24) becomes the Kalman gain, transposed; the rows beyond
-            the channels are zero.
+        gain: (C to the next multiple of 3, 24) becomes the gain of whitened innovations,
+            transposed; the rows beyond the channels are zero.
 
     Returns:
         Logarithm of the determinant of the innovations' covariance.
@@ -187,25 +190,58 @@ def update_covariance(p, rows, measured, noise_variance, smear, s, w, seen, gain
                 if measured[j] == measured[j]:
                     s[i, j] += smear[i] * smear[j]
     log_det = cholesky_inverse(s, w)
-    for j in range(channels):  # the gain is w' w seen; at first w seen, which p loses the square of
+    for j in range(channels):
         for i in range(WIDE):
             gain[j, i] = 0.0
         for m in range(j + 1):
             factor = w[j, m]
             for i in range(WIDE):
                 gain[j, i] += factor * seen[m, i]
+    return log_det
+
+
+@kernel
+def share_taken(gain, white):
+    """Share of a correction by which the tail's phase is turned no more than the slopes hold.
+
+    Where a command changes, a small error of the motion may look like half a beat. Taken whole, it
+    puts the filter out of step for seconds.
+
+    Args:
+        gain: (., 24) of whitened innovations, transposed.
+        white: (C,) whitened innovations.
+    """
+    turn = 0.0
+    for j in range(white.shape[0]):
+        turn += gain[j, N_ERROR - 1] * white[j]
+    return LARGEST_TURN / abs(turn) if abs(turn) > LARGEST_TURN else 1.0
+
+
+@kernel
+def take_into_covariance(p, w, share, gain):
+    """Take a sample into the covariance, in place.
+
+    Args:
+        p: (19, 24) covariance.
+        w: (C, C) inverse Cholesky factor of the innovations' covariance.
+        share: of the correction that is made. What is left of the covariance is that of the error
+            after such a correction (Joseph's form).
+        gain: (., 24) of whitened innovations, transposed; becomes that of innovations.
+    """
+    lost = share * (2.0 - share)
+    channels = w.shape[0]
     for first in range(0, gain.shape[0], TOGETHER):
         for i in range(N_ERROR):
             for j in range(WIDE):
                 total = p[i, j]
                 for m in range(TOGETHER):
-                    total -= gain[first + m, i] * gain[first + m, j]
+                    total -= lost * gain[first + m, i] * gain[first + m, j]
                 p[i, j] = total
     for j in range(channels):
+        factor = share * w[j, j]
         for i in range(WIDE):
-            gain[j, i] *= w[j, j]
+            gain[j, i] *= factor
         for m in range(j + 1, channels):
-            factor = w[m, j]
+            factor = share * w[m, j]
             for i in range(WIDE):
                 gain[j, i] += factor * gain[m, i]
-    return log_det

@@ -15,7 +15,9 @@ import numpy as np
 from fish_env.identification.filter_algebra import (
     predict_covariance,
     room,
-    update_covariance,
+    share_taken,
+    take_into_covariance,
+    whitened_gain,
     widened,
 )
 from fish_env.identification.state_blocks import N_ERROR, N_MOVING
@@ -90,8 +92,8 @@ def carry(work, width, known, sample, sign, count):
 def ekf_run(
     state0, swimming, par, pace_one, skew_one, delay_one, gain, bias, lens_one, clock, substeps,
     times, values, measured, codes, noise_variance, smear, covariance0, wrench_variance,
-    wrench_decay_s, wander, history_rows, known, tables, k_out, w_out, e_out, x_out, d_out, f_out,
-    h_out, raw_out,
+    wrench_decay_s, wander, history_rows, known, tables, k_out, w_out, e_out, share_out, x_out,
+    d_out, f_out, h_out, raw_out,
 ):  # fmt: skip
     """Extended Kalman filter over one run, relinearised at every sample.
 
@@ -123,6 +125,7 @@ def ekf_run(
         k_out: (T, 19, C) gains.
         w_out: (T, C, C) whitening.
         e_out: (T, C) whitened innovations.
+        share_out: (T,) share of the correction that was made.
         x_out: (T, states) filtered states.
         d_out: (T, 6) filtered wrench.
         f_out: (T, 12, 19) slopes of the moving part over the interval before, or no rows.
@@ -174,7 +177,7 @@ def ekf_run(
             predict_covariance(p, f, keep, wrench_variance, wander * span, scratch, turned)
         observation_rows(work, width, codes, gain, lens, measured[sample], rows)
         innovations_of(work, width, measured[sample], codes, gains, biases, lens, e)
-        log_det = update_covariance(
+        log_det = whitened_gain(
             p, rows, measured[sample], noise_variance, smear[sample], s, w, seen, k_gain
         )  # fmt: skip
         log_likelihood -= 0.5 * log_det
@@ -184,6 +187,8 @@ def ekf_run(
                 total += w[i, j] * e[j, 0]
             e_out[sample, i] = total
             log_likelihood -= 0.5 * total * total
+        share_out[sample] = share_taken(k_gain, e_out[sample])
+        take_into_covariance(p, w, share_out[sample], k_gain)
         for i in range(N_ERROR):
             total = 0.0
             for j in range(channels):

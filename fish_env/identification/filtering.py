@@ -80,6 +80,7 @@ class Filtered:
         gains: (T, 19, C) Kalman gains.
         whitening: (T, C, C) inverse Cholesky factors of the innovations' covariances.
         innovations: (T, C) whitened.
+        shares: (T,) share of its correction that each sample was allowed.
         states: (T, states) filtered states.
         wrench: (T, 6) filtered disturbance, body frame (N, N m).
         log_likelihood: without its constant.
@@ -90,6 +91,7 @@ class Filtered:
     gains: FloatArray
     whitening: FloatArray
     innovations: FloatArray
+    shares: FloatArray
     states: FloatArray
     wrench: FloatArray
     log_likelihood: float
@@ -255,18 +257,14 @@ class RunFilter:
             data, rates = job
             record, measurement = self._of_run(data, records, sensors)
             samples, channels = data.measured.shape
-            states = len(self.kernels.state_names)
             k = np.zeros((samples, N_ERROR, channels))
             w = np.zeros((samples, channels, channels))
-            e = np.zeros((samples, channels))
-            x = np.zeros((samples, states))
+            e, share = np.zeros((samples, channels)), np.zeros(samples)
+            x = np.zeros((samples, len(self.kernels.state_names)))
             d = np.zeros((samples, 6))
             rows = samples if keep_slopes else 0
-            slopes = Slopes(
-                np.zeros((rows, N_MOVING, N_ERROR)),
-                np.zeros((rows, channels, N_ERROR)),
-                np.zeros((rows, channels)),
-            )
+            shapes = ((N_MOVING, N_ERROR), (channels, N_ERROR), (channels,))
+            slopes = Slopes(*(np.zeros((rows, *shape)) for shape in shapes))
             state0 = self._starts(data, measurement)[:, 0].copy()
             value = entry(
                 state0, data.swimming, record, measurement.pace[0], measurement.skew[0],
@@ -276,9 +274,10 @@ class RunFilter:
                 data.corrected, self.codes, noise.sensor_sd**2, noise.jitter_sd * rates,
                 data.covariance0, noise.wrench_variance, noise.correlation_s, noise.phase_sd**2,
                 self._history_rows(record, data), data.known_wrench, self.model.tables,
-                k, w, e, x, d, slopes.motion, slopes.channels, slopes.raw,
+                k, w, e, share, x, d, slopes.motion, slopes.channels, slopes.raw,
             )  # fmt: skip
-            return Filtered(k, w, e, x, d, float(value), slopes if keep_slopes else None, corners)
+            kept = slopes if keep_slopes else None
+            return Filtered(k, w, e, share, x, d, float(value), kept, corners)
 
         return list(_threads().map(one, zip(self.runs, self.rates, strict=True)))
 
@@ -300,8 +299,8 @@ class RunFilter:
             slopes = result.slopes
             value = entry(
                 data.clock, data.corrected, slopes.motion, slopes.channels, slopes.raw,
-                result.gains, result.wrench, made_with.correlation_s, noise.sensor_sd**2,
-                noise.jitter_sd * rates, data.covariance0,
+                result.gains, result.shares, result.wrench, made_with.correlation_s,
+                noise.sensor_sd**2, noise.jitter_sd * rates, data.covariance0,
                 noise.wrench_variance, noise.correlation_s, noise.phase_sd**2,
             )  # fmt: skip
             return float(value)

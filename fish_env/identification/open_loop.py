@@ -55,6 +55,7 @@ def without_feedback(
         np.zeros((samples, len(run.covariance0), channels)),
         np.tile(units, (samples, 1, 1)),
         np.zeros((samples, channels)),
+        np.ones(samples),
         np.zeros((samples, states)),
         np.zeros((samples, 6)),
         0.0,

@@ -15,7 +15,8 @@ from fish_env.identification.filter_algebra import (
     MOVING_WIDE,
     predict_covariance,
     room,
-    update_covariance,
+    take_into_covariance,
+    whitened_gain,
     widened,
 )
 from fish_env.identification.state_blocks import N_ERROR, N_MOVING
@@ -28,8 +29,8 @@ from fish_env.model.composed import entry_point
 
 @entry_point
 def replay_run(
-    clock, measured, f_in, h_in, raw_in, k_in, d_in, decay_in_s, noise_variance, smear,
-    covariance0, wrench_variance, wrench_decay_s, wander,
+    clock, measured, f_in, h_in, raw_in, k_in, share_in, d_in, decay_in_s, noise_variance,
+    smear, covariance0, wrench_variance, wrench_decay_s, wander,
 ):  # fmt: skip
     """Log likelihood (without its constant) of a run under another noise model.
 
@@ -40,6 +41,7 @@ def replay_run(
         h_in: (T, C, 19) slopes of the channels.
         raw_in: (T, C) innovations.
         k_in: (T, 19, C) gains they were made with.
+        share_in: (T,) shares of the corrections that were made, which are made again.
         d_in: (T, 6) filtered wrench.
         decay_in_s: correlation time of the wrench they were made with (s).
         noise_variance: (C,).
@@ -74,9 +76,10 @@ def replay_run(
                 moved[i] = keep * stray[i] + (keep - kept) * d_in[sample - 1, j]
             moved[N_ERROR - 1] = stray[N_ERROR - 1]
             stray[:] = moved
-        log_det = update_covariance(
+        log_det = whitened_gain(
             p, h_in[sample], measured[sample], noise_variance, smear[sample], s, w, seen, gain
         )  # fmt: skip
+        take_into_covariance(p, w, share_in[sample], gain)
         log_likelihood -= 0.5 * log_det
         for i in range(channels):
             total = raw_in[sample, i]

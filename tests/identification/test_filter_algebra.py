@@ -4,11 +4,14 @@ import numpy as np
 import pytest
 
 from fish_env.identification.filter_algebra import (
+    LARGEST_TURN,
     N_ERROR,
     N_MOVING,
     predict_covariance,
     room,
-    update_covariance,
+    share_taken,
+    take_into_covariance,
+    whitened_gain,
     widened,
 )
 
@@ -36,8 +39,9 @@ def test_prediction_is_the_lyapunov_step():
     assert not p[:, N_ERROR:].any()
 
 
+@pytest.mark.parametrize("share", [1.0, 0.3])
 @pytest.mark.parametrize("channels", [1, 4, 9, 11])
-def test_update_is_that_of_kalman(channels):
+def test_update_is_that_of_kalman_by_a_share(channels, share):
     rng = np.random.default_rng(channels)
     before = covariance(rng)
     rows = np.zeros((channels, N_ERROR))
@@ -49,17 +53,27 @@ def test_update_is_that_of_kalman(channels):
         measured[lost], rows[lost] = np.nan, 0.0
     p = widened(before)
     _, _, s, w, seen, gain = room(channels)
-    log_det = update_covariance(p, rows, measured, noise, smear, s, w, seen, gain)
+    log_det = whitened_gain(p, rows, measured, noise, smear, s, w, seen, gain)
+    take_into_covariance(p, w, share, gain)
     told = np.isfinite(measured)
     together = np.where(told, smear, 0.0)
     spread = rows @ before @ rows.T + np.diag(np.where(told, noise, 1.0))
     spread += np.outer(together, together)
-    kalman = before @ rows.T @ np.linalg.inv(spread)
+    kalman = share * before @ rows.T @ np.linalg.inv(spread)
     np.testing.assert_allclose(gain[:channels, :N_ERROR].T, kalman, rtol=1e-9, atol=1e-11)
-    np.testing.assert_allclose(
-        p[:, :N_ERROR], before - kalman @ rows @ before, rtol=1e-9, atol=1e-9
-    )
+    kept = np.eye(N_ERROR) - kalman @ rows
+    noisy = spread - rows @ before @ rows.T
+    joseph = kept @ before @ kept.T + kalman @ noisy @ kalman.T
+    np.testing.assert_allclose(p[:, :N_ERROR], joseph, rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(w.T @ w, np.linalg.inv(spread), rtol=1e-9, atol=1e-11)
     assert log_det == pytest.approx(np.linalg.slogdet(spread)[1])
     assert not gain[channels:].any()
     assert not p[:, N_ERROR:].any()
+
+
+def test_one_sample_turns_the_phase_no_further_than_its_slopes_hold():
+    gain = np.zeros((3, 24))
+    gain[:, N_ERROR - 1] = 0.5, -0.2, 0.1
+    near, far = np.array([0.3, 0.1, -0.2]), np.array([5.0, 1.0, 3.0])
+    assert share_taken(gain, near) == 1.0
+    assert share_taken(gain, far) * abs(gain[:, N_ERROR - 1] @ far) == pytest.approx(LARGEST_TURN)

@@ -11,7 +11,6 @@ regressors are then those of the corrected motion.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from scipy.signal import butter, sosfilt
@@ -170,26 +169,6 @@ def slopes_of_runs(
         for run, one in zip(runs, filtered, strict=True)
     ]
     return np.concatenate(parts)
-
-
-def distorted(
-    runs: Sequence[RunData], filtered: Sequence[Filtered], channels: Sequence[str]
-) -> list[RunData]:
-    """Runs with what the errors of their sensors do to their samples.
-
-    An error that moves samples far, as a filter in an inertial unit, is not linear in the recorded
-    motion. Taken off the samples it is, in the motion that they then show.
-
-    Args:
-        runs: prepared runs, with their errors.
-        filtered: each of them filtered, with its slopes, close to those errors.
-        channels: names of their channels.
-    """
-    pairs = zip(runs, filtered, strict=True)
-    return [
-        replace(run, distortion=sensor_slopes(run.clock, one, channels) @ run.sensor_errors)
-        for run, one in pairs
-    ]
 
 
 def _put(

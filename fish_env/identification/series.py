@@ -32,8 +32,9 @@ from fish_env.identification.noise import (
 from fish_env.identification.open_loop import windows, without_feedback
 from fish_env.identification.parameters import ALIKE, Baseline, changes_of, neutral_values
 from fish_env.identification.phases import settle_phases
+from fish_env.identification.run_numbers import renumbered
 from fish_env.identification.runs import FINER, RunData, prepare_run
-from fish_env.identification.sensor_errors import distorted, slopes_of_runs
+from fish_env.identification.sensor_errors import slopes_of_runs
 from fish_env.identification.sensors import largest_jitter_of, largest_noise
 from fish_env.identification.tail_drive import TailDrive
 from fish_env.identification.variation import BEAT, EVERY, SAG, VARIATIONS
@@ -262,15 +263,8 @@ class SeriesProblem(Problem):
         return np.array([np.r_[run.variation, run.sensor_errors] for run in self.runs])
 
     def with_variation(self, values: FloatArray, point: Point, noise: NoiseModel) -> SeriesProblem:
-        """The same problem with other numbers (R, K) of the runs (see the protocol).
-
-        What errors of sensors do to the samples is worked out from the filtered motion.
-        """
-        own, errors = np.split(values, [len(VARIATIONS)], axis=1)
-        moved = [run.with_numbers(*n) for run, *n in zip(self.runs, own, errors, strict=True)]
-        if errors.any():
-            moved = distorted(moved, self.filtered(point, noise, keep_slopes=True), self.channels)
-        return self.with_runs(moved)
+        """The same problem with other numbers (R, K) of the runs (see the protocol)."""
+        return self.with_runs(renumbered(self, values, point, noise))
 
     def variation_slopes(
         self, point: Point, noise: NoiseModel, filtered: Sequence[Filtered], steps: FloatArray

@@ -24,8 +24,8 @@ SHORTEST = 0.02
 """Shortest step for differences, as a share of the longest."""
 DIFFERENCE = 0.3
 """Step for differences by what runs differ in, in usual spreads."""
-MOST_HALVINGS = 5
-"""Of a run's step to its own numbers."""
+DAMPING = (0.0, 0.3, 3.0, 30.0)
+"""Of a run's step to its own numbers, one after another until its likelihood rises."""
 MOST_STEPS, NEAR = 6, 0.1
 """To the numbers of runs that no fit has seen, and the step, in spreads, after which they stay."""
 LARGEST_SLOPE = 1e9
@@ -227,8 +227,8 @@ def predicted_variation(
 ) -> tuple[Problem, Marginal | None]:
     """The problem at the best prediction of what its runs differ in, and how to integrate it out.
 
-    The prediction is of the linear model. A run whose likelihood it lowers goes only part of the
-    way, or stays.
+    The prediction is of the linear model. Where that lowers a run's likelihood the run goes only
+    part of the way, or stays.
 
     Args:
         problem: the problem, at an earlier prediction.
@@ -243,37 +243,21 @@ def predicted_variation(
     marginal = marginal_of(problem, point, noise, filtered)
     assert marginal is not None
     residuals = np.concatenate([f.residuals for f in filtered])
-    step = np.zeros_like(problem.variation)
-    step[:, active] = marginal.predicted(residuals) * spreads[active] - problem.variation[:, active]
-    problem = _moved(problem, step, filtered, point, noise)
-    return problem, replace(marginal, at=problem.variation[:, active] / spreads[active])
-
-
-def _moved(
-    problem: Problem,
-    step: FloatArray,
-    filtered: Sequence[Evaluation],
-    point: Point,
-    noise: Any,
-) -> Problem:
-    """The problem with every run's numbers moved by as much of a step (R, K) as helps the run."""
-    share = np.ones(problem.run_count)
-    before = _own_objectives(problem, filtered, noise)
+    numbers, before = problem.variation.copy(), _own_objectives(problem, filtered, noise)
     worse = list(range(problem.run_count))
-    for _ in range(MOST_HALVINGS):
-        part = problem.some(worse)
-        numbers = part.variation + share[worse, None] * step[worse]
-        moved = part.with_variation(numbers, point, noise)
+    for damping in DAMPING:
+        trial = problem.variation.copy()
+        trial[:, active] = marginal.predicted(residuals, damping) * spreads[active]
+        part = problem.some(worse).with_variation(trial[worse], point, noise)
         near = [filtered[i] for i in worse]
-        after = _own_objectives(moved, moved.filtered(point, noise, near), noise)
-        worse = [i for i, value in zip(worse, after, strict=True) if not value <= before[i]]
+        after = _own_objectives(part, part.filtered(point, noise, near), noise)
+        better = [i for i, value in zip(worse, after, strict=True) if value <= before[i]]
+        numbers[better] = trial[better]
+        worse = [i for i in worse if i not in better]
         if not worse:
             break
-        share[worse] *= 0.5
-    share[worse] = 0.0
-    if share.all() and moved.run_count == problem.run_count:
-        return moved
-    return problem.with_variation(problem.variation + share[:, None] * step, point, noise)
+    problem = problem.with_variation(numbers, point, noise)
+    return problem, replace(marginal, at=problem.variation[:, active] / spreads[active])
 
 
 def _own_objectives(problem: Problem, filtered: Sequence[Evaluation], noise: Any) -> FloatArray:

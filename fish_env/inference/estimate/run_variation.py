@@ -109,18 +109,21 @@ class Marginal:
         """What integrating costs in -2 log likelihood."""
         return float(sum(np.log1p(variance).sum() for _, _, variance in self.parts))
 
-    def predicted(self, residuals: FloatArray) -> FloatArray:
+    def predicted(self, residuals: FloatArray, damping: float = 0.0) -> FloatArray:
         """Best prediction (R, K) of the runs' own numbers, in units of their spread.
 
         Args:
             residuals: (D,) whitened, at the numbers where the slopes were taken.
+            damping: by how much more information than there is each number is held where it is
+                (Marquardt, 1963, J. SIAM 11, 431).
         """
-        shift = np.einsum("dk,dk->d", self.slopes, self.at[self.run_of])
-        shifted, found = residuals - shift, []
-        for own in self._slices:
+        found = []
+        for own, at in zip(self._slices, self.at, strict=True):
             mine = self.slopes[own]
             information = mine.T @ mine + np.eye(mine.shape[1])
-            found.append(-np.linalg.solve(information, mine.T @ shifted[own]))
+            held = damping * np.diag(np.diag(information))
+            pull = mine.T @ residuals[own] + at
+            found.append(at - np.linalg.solve(information + held, pull))
         return np.array(found)
 
     def some(self, runs: Sequence[int]) -> Marginal:

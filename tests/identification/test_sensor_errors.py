@@ -45,6 +45,22 @@ def test_the_filter_takes_a_change_of_its_data_as_the_slopes_say(filtered, name)
     assert np.linalg.norm(after - before - expected) < 0.05 * np.linalg.norm(expected)
 
 
+def test_samples_put_right_do_not_depend_on_the_way_there(filtered):
+    problem, point, noise, _ = filtered
+    numbers = np.zeros_like(problem.variation)
+    own = {"camera_delay": 0.03, "inertial_smoothing": 1.0, "gyro_gain_r": 0.05}
+    for i, variation in enumerate(problem.variations):
+        numbers[:, i] = own.get(variation.name, 0.0)
+    at_once = problem.with_variation(numbers, point, noise)
+    part = problem.with_variation(0.3 * numbers, point, noise)
+    in_steps = part.with_variation(numbers, point, noise)
+    apart = (at_once.runs[0].corrected - in_steps.runs[0].corrected) / problem.sensor_sd
+    moved = (at_once.runs[0].corrected - problem.runs[0].measured) / problem.sensor_sd
+    assert np.sqrt(np.nanmean(apart**2)) < 0.1
+    assert np.sqrt(np.nanmean(moved**2)) > 1.0
+    assert at_once.with_variation(numbers, point, noise).runs == at_once.runs
+
+
 def test_a_late_camera_is_what_its_regressor_says(filtered):
     problem, _, _, (result,) = filtered
     (run,) = problem.runs

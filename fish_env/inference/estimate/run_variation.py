@@ -340,7 +340,9 @@ def _largest(
         return np.asarray((likelihood.slope(trial) + 2.0 * trial**2)[own])
 
     limits = [(float(np.log(SMALLEST)), float(np.log(largest[i]))) for i in own]
-    found = minimize(value, np.log(begin[own]), jac=slope, method="L-BFGS-B", bounds=limits)
+    found = minimize(
+        value, np.log(np.maximum(begin[own], SMALLEST)), jac=slope, method="L-BFGS-B", bounds=limits
+    )
     sd[own] = np.exp(found.x)
     sd[sd <= 2.0 * SMALLEST] = 0.0
     return sd, _posterior(likelihood, sd)

@@ -9,6 +9,7 @@ from fish_env.data import CommandSteps, Run
 from fish_env.effects import catalogue
 from fish_env.effects.extended import build_model
 from fish_env.identification import SeriesProblem
+from fish_env.identification.filter_algebra import LARGEST_TURN
 from fish_env.identification.jitter import channel_rates
 from fish_env.identification.open_loop import errors
 from fish_env.identification.phases import settle_phases

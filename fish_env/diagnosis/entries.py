@@ -15,8 +15,8 @@ from fish_env.diagnosis.gain import Gain, Pair
 from fish_env.diagnosis.next_experiment import Proposal
 from fish_env.diagnosis.residual_model import ResidualModel, Term
 from fish_env.effects.extended import PREFIX
-from fish_env.identification.filtering import NoiseModel
 from fish_env.identification.generic_forces import wrench_unit
+from fish_env.identification.noise_model import NoiseModel
 from fish_env.inference.budget import Budget
 from fish_env.inference.hypotheses import PARAMETER
 from fish_env.inference.preconditions import Precondition

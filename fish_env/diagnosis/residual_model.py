@@ -15,13 +15,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fish_env.arrays import FloatArray, IntArray
-from fish_env.identification.filtering import Filtered, NoiseModel
+from fish_env.identification.filtering import Filtered
 from fish_env.identification.generic_forces import (
     BoundForces,
     GenericForces,
     generic_forces,
     probes,
 )
+from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.runs import RunData
 from fish_env.identification.series import SeriesProblem, series_of
 from fish_env.inference.adequacy import NOTHING, generic_signals

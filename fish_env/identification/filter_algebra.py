@@ -17,9 +17,6 @@ WIDE, MOVING_WIDE = -(-N_ERROR // 8) * 8, -(-N_MOVING // 8) * 8
 column at once, in registers, which pays only if no column is left over."""
 TOGETHER = 3
 """Channels that the covariance loses at once."""
-LARGEST_TURN = 0.3
-"""By which one sample may correct the tail's phase (rad). What a phase does is a sine: over this
-much it is off its tangent by 5 %, and beyond it a correction soon points the wrong way."""
 
 
 @kernel
@@ -201,7 +198,7 @@ def whitened_gain(p, rows, measured, noise_variance, smear, s, w, seen, gain):
 
 
 @kernel
-def share_taken(gain, white):
+def share_taken(gain, white, reach):
     """Share of a correction by which the tail's phase is turned no more than the slopes hold.
 
     Where a command changes, a small error of the motion may look like half a beat. Taken whole, it
@@ -210,11 +207,12 @@ def share_taken(gain, white):
     Args:
         gain: (., 24) of whitened innovations, transposed.
         white: (C,) whitened innovations.
+        reach: largest turn (rad).
     """
     turn = 0.0
     for j in range(white.shape[0]):
         turn += gain[j, N_ERROR - 1] * white[j]
-    return LARGEST_TURN / abs(turn) if abs(turn) > LARGEST_TURN else 1.0
+    return reach / abs(turn) if abs(turn) > reach else 1.0
 
 
 @kernel

@@ -92,8 +92,8 @@ def carry(work, width, known, sample, sign, count):
 def ekf_run(
     state0, swimming, par, pace_one, skew_one, delay_one, gain, bias, lens_one, clock, substeps,
     times, values, measured, codes, noise_variance, smear, covariance0, wrench_variance,
-    wrench_decay_s, wander, history_rows, known, tables, k_out, w_out, e_out, share_out, x_out,
-    d_out, f_out, h_out, raw_out,
+    wrench_decay_s, wander, reach, history_rows, known, tables, k_out, w_out, e_out, share_out,
+    x_out, d_out, f_out, h_out, raw_out,
 ):  # fmt: skip
     """Extended Kalman filter over one run, relinearised at every sample.
 
@@ -119,6 +119,7 @@ def ekf_run(
         wrench_variance: (6,) stationary variance of the wrench.
         wrench_decay_s: its correlation time (s).
         wander: variance that the tail phase gains in a second (rad^2/s).
+        reach: largest turn of the tail phase by one sample (rad).
         history_rows: room for late tail commands, 0 for none.
         known: (T, 6) known force and moment from each sample to the next, or no rows.
         tables: packed coefficient curves.
@@ -187,7 +188,7 @@ def ekf_run(
                 total += w[i, j] * e[j, 0]
             e_out[sample, i] = total
             log_likelihood -= 0.5 * total * total
-        share_out[sample] = share_taken(k_gain, e_out[sample])
+        share_out[sample] = share_taken(k_gain, e_out[sample], reach)
         take_into_covariance(p, w, share_out[sample], k_gain)
         for i in range(N_ERROR):
             total = 0.0

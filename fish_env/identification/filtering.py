@@ -17,9 +17,10 @@ from fish_env.effects.extended import ExtendedModel
 from fish_env.identification.applied_wrench import EFFECT as APPLIED_WRENCH
 from fish_env.identification.channels import codes_of
 from fish_env.identification.jitter import channel_rates
+from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.runs import RunData
 from fish_env.identification.state_blocks import N_ERROR, N_MOVING
-from fish_env.identification.variation import EVERY, varied_bias, varied_delay, varied_records
+from fish_env.identification.variation import varied_bias, varied_delay, varied_records
 from fish_env.model.history import history_rows
 from fish_env.model.runtime import Kernels, kernels
 from fish_env.model.state import BASE_STATES
@@ -36,40 +37,6 @@ TEMPLATES = tuple(
 )
 
 _LOADING = Lock()
-
-
-@dataclass(frozen=True)
-class NoiseModel:
-    """What is random in a measured run.
-
-    Attributes:
-        sensor_sd: (C,) white noise of each channel.
-        force_sd: stationary standard deviation of the disturbance force, each axis (N).
-        moment_sd: of the disturbance moment, each axis (N m).
-        correlation_s: correlation time of the disturbance (s).
-        phase_sd: random walk of the tail's phase about its command (rad/s^0.5).
-        jitter_sd: how early or late samples are, all channels of one alike (s).
-        spread: (K,) standard deviation over runs of what differs between them.
-    """
-
-    sensor_sd: FloatArray
-    force_sd: float
-    moment_sd: float
-    correlation_s: float
-    phase_sd: float = 0.0
-    jitter_sd: float = 0.0
-    spread: FloatArray = field(default_factory=lambda: np.zeros(len(EVERY)))
-
-    def is_close(self, other: NoiseModel, share: float) -> bool:
-        """Whether the disturbance of another noise model differs by less than a share of this."""
-        names = ("force_sd", "moment_sd", "correlation_s")
-        pairs = [(getattr(self, name), getattr(other, name)) for name in names]
-        return all(abs(np.log(b / a)) < share for a, b in pairs)
-
-    @property
-    def wrench_variance(self) -> FloatArray:
-        """(6,) variances of force and moment."""
-        return np.repeat([self.force_sd**2, self.moment_sd**2], 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,8 +240,8 @@ class RunFilter:
                 data.steps(corners), *data.driven,
                 data.corrected, self.codes, noise.sensor_sd**2, noise.jitter_sd * rates,
                 data.covariance0, noise.wrench_variance, noise.correlation_s, noise.phase_sd**2,
-                self._history_rows(record, data), data.known_wrench, self.model.tables,
-                k, w, e, share, x, d, slopes.motion, slopes.channels, slopes.raw,
+                noise.phase_reach, self._history_rows(record, data), data.known_wrench,
+                self.model.tables, k, w, e, share, x, d, slopes.motion, slopes.channels, slopes.raw,
             )  # fmt: skip
             kept = slopes if keep_slopes else None
             return Filtered(k, w, e, share, x, d, float(value), kept, corners)

@@ -13,7 +13,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from fish_env.arrays import FloatArray, IntArray
-from fish_env.identification.filtering import Filtered, NoiseModel, Pushes
+from fish_env.identification.filtering import Filtered, Pushes
+from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.runs import RunData
 from fish_env.inference.estimate.fit import Fit
 from fish_env.sensing.channels import channels_from_states

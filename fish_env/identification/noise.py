@@ -13,13 +13,12 @@ from scipy.optimize import minimize
 
 from fish_env.arrays import FloatArray
 from fish_env.data.schema import Dataset
-from fish_env.identification.filtering import Filtered, NoiseModel, RunFilter
+from fish_env.identification.filtering import Filtered, RunFilter
+from fish_env.identification.noise_model import NoiseModel
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point
 from fish_env.params.schema import FishParams
 
-RELAXED_PHASE_SD = 0.3
-"""Random walk of the phase (rad/s^0.5) that stays in step with a beat that is a tenth off."""
 UNEVEN_PHASE_SD = 0.03
 """Random walk of the tail's phase (rad/s^0.5) that a fit begins with where runs beat differently:
 no such beat is constant to the last. Its size is then estimated with the disturbance."""
@@ -32,7 +31,7 @@ JITTER_TRIALS = (1e-3, 2e-3, 4e-3)
 """Jitters (s) that are tried before one is fitted: beside twice or half its best size, it still
 has most of its likelihood."""
 ORDER = 4
-WINDOW = 30
+WOW = 30
 QUANTILE = 0.15
 GAIN = 0.1
 """The disturbance is found when a step gains no more log likelihood, or e times as much of one of
@@ -62,7 +61,7 @@ def white_noise_sd(dataset: Dataset, channel: str) -> float:
 def _window_spreads(values: FloatArray) -> list[float]:
     scale = np.sqrt(sum(comb(ORDER, k) ** 2 for k in range(ORDER + 1)))
     differences = np.diff(values, ORDER) / scale
-    window = min(WINDOW, len(differences))
+    window = min(WOW, len(differences))
     if window < 3:
         return []
     count = len(differences) // window
@@ -73,7 +72,7 @@ def _window_spreads(values: FloatArray) -> list[float]:
 @cache
 def _quantile_of_white_noise() -> float:
     """What the low quantile is when the noise is white with unit spread (fixed draws)."""
-    normals = np.random.default_rng(0).standard_normal(WINDOW * 4000 + ORDER)
+    normals = np.random.default_rng(0).standard_normal(WOW * 4000 + ORDER)
     return float(np.quantile(_window_spreads(normals), QUANTILE))
 
 

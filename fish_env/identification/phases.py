@@ -13,7 +13,8 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from fish_env.arrays import FloatArray
-from fish_env.identification.filtering import Measurement, NoiseModel, RunFilter
+from fish_env.identification.filtering import Measurement, RunFilter
+from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.runs import FREQUENCY, RunData
 from fish_env.identification.state_blocks import PHASE_COLUMN
 from fish_env.inference.problem import Point
@@ -24,7 +25,7 @@ FINE = np.arange(-2, 3, dtype=np.float64) * 0.065
 COARSE_SD, FINE_SD = 0.15, 0.08
 """How far the filter may take the phase to be off (rad). Where that is much, the first samples turn
 it by what else they do not fit, and it has been settled wrongly before they are understood."""
-WINDOW_S = 3.0
+WOW_S = 3.0
 AMPLITUDE, PHASE = 1, 13
 
 
@@ -103,4 +104,4 @@ def _beginning(run: RunData) -> RunData:
     """The beginning of a run, up to some seconds after its tail starts to beat."""
     beats = run.command_values[:, AMPLITUDE] * run.command_values[:, FREQUENCY] > 0
     first = max(0.0, float(run.command_times[np.argmax(beats)])) if beats.any() else 0.0
-    return run.until(first + WINDOW_S)
+    return run.until(first + WOW_S)

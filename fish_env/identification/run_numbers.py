@@ -14,7 +14,8 @@ from typing import Protocol
 import numpy as np
 
 from fish_env.arrays import FloatArray
-from fish_env.identification.filtering import Filtered, NoiseModel
+from fish_env.identification.filtering import Filtered
+from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.runs import RunData
 from fish_env.identification.sensor_errors import sensor_slopes
 from fish_env.identification.variation import VARIATIONS

@@ -17,11 +17,10 @@ from fish_env.effects.extended import ExtendedModel, build_model
 from fish_env.errors import EffectError
 from fish_env.identification.applied_wrench import EFFECT as APPLIED_WRENCH
 from fish_env.identification.channels import usable_channels
-from fish_env.identification.filtering import Filtered, Measurement, NoiseModel, Pushes, RunFilter
+from fish_env.identification.filtering import Filtered, Measurement, Pushes, RunFilter
 from fish_env.identification.generic_forces import BoundForces, generic_forces
 from fish_env.identification.kernel_kinds import LEAN, quickest, with_stages
 from fish_env.identification.noise import (
-    RELAXED_PHASE_SD,
     UNEVEN_PHASE_SD,
     disturbance_range,
     fitted_noise,
@@ -29,6 +28,7 @@ from fish_env.identification.noise import (
     white_noise_sd,
     widest_disturbance,
 )
+from fish_env.identification.noise_model import RELAXED_PHASE_SD, NoiseModel
 from fish_env.identification.open_loop import windows, without_feedback
 from fish_env.identification.parameters import ALIKE, Baseline, changes_of, neutral_values
 from fish_env.identification.phases import settle_phases

@@ -8,7 +8,8 @@ from typing import Protocol
 import numpy as np
 
 from fish_env.arrays import FloatArray
-from fish_env.identification.filtering import Filtered, Measurement, NoiseModel, RunFilter
+from fish_env.identification.filtering import Filtered, Measurement, RunFilter
+from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.tail_drive import RATE, SCALE, TailDrive
 from fish_env.identification.variation import BEAT, SAG, unseen
 from fish_env.inference.hypotheses import effects_of

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.stats import chi2, ncx2
 
-from fish_env.identification.filtering import NoiseModel
+from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.series import SeriesProblem
 from fish_env.inference.detectability import changes
 from fish_env.inference.estimate.fit import Fit, fit

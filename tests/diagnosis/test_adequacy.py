@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from fish_env.effects import catalogue
-from fish_env.identification.filtering import NoiseModel
 from fish_env.identification.generic_forces import generic_forces, regressors
 from fish_env.identification.noise import disturbance_range
+from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.open_loop import without_feedback
 from fish_env.identification.runs import RunData
 from fish_env.inference.adequacy import Adequacy, Misfit, adequacy, implausible_estimates

@@ -8,7 +8,7 @@ import pytest
 from fish_env.data import CommandSteps, Dataset, Run
 from fish_env.diagnosis.gain import Gain, Pair, measure_gain
 from fish_env.identification import SeriesProblem, open_loop
-from fish_env.identification.filtering import NoiseModel
+from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.runs import RunData
 from fish_env.inference.gain import WORST, by_window, gap_closed, reachable_share, squared_errors
 from fish_env.inference.problem import Point

@@ -9,7 +9,6 @@ from fish_env.data import CommandSteps, Run
 from fish_env.effects import catalogue
 from fish_env.effects.extended import build_model
 from fish_env.identification import SeriesProblem
-from fish_env.identification.filter_algebra import LARGEST_TURN
 from fish_env.identification.jitter import channel_rates
 from fish_env.identification.open_loop import errors
 from fish_env.identification.phases import settle_phases
@@ -207,21 +206,6 @@ def test_a_replayed_noise_model_has_the_filters_likelihood():
     other = replace(other, jitter_sd=0.003)
     full = sum(r.log_likelihood for r in problem.filtered(problem.start, other))
     assert problem.lean_filter.replay(filtered, setup.noise, other) == pytest.approx(full, abs=0.5)
-
-
-def test_a_tail_that_is_late_does_not_put_the_filter_out_of_step():
-    """Where a command changes, what a delay leaves looks like half a beat to the phase."""
-    setup = Setup(runs=4, duration=16.0)
-    problem = problem_of(setup)
-    late = [replace(run, command_times=run.command_times - 0.06) for run in problem.runs]
-    wandering = replace(setup.noise, phase_sd=0.2)
-    early = problem.with_runs(late)
-    results = early.filtered(problem.start, wandering, keep_slopes=True)
-    turns = [np.einsum("tc,tc->t", r.gains[:, -1], np.nan_to_num(r.slopes.raw)) for r in results]
-    assert np.abs(np.concatenate(turns)).max() <= LARGEST_TURN + 1e-12
-    assert min(r.shares.min() for r in results) < 0.5
-    again = early.lean_filter.replay(results, wandering, wandering)
-    assert again == pytest.approx(sum(r.log_likelihood for r in results), rel=1e-9)
 
 
 def test_missing_samples_and_uneven_times_leave_the_errors_white():

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from fish_env.identification.filter_algebra import (
-    LARGEST_TURN,
     N_ERROR,
     N_MOVING,
     predict_covariance,
@@ -75,5 +74,6 @@ def test_one_sample_turns_the_phase_no_further_than_its_slopes_hold():
     gain = np.zeros((3, 24))
     gain[:, N_ERROR - 1] = 0.5, -0.2, 0.1
     near, far = np.array([0.3, 0.1, -0.2]), np.array([5.0, 1.0, 3.0])
-    assert share_taken(gain, near) == 1.0
-    assert share_taken(gain, far) * abs(gain[:, N_ERROR - 1] @ far) == pytest.approx(LARGEST_TURN)
+    assert share_taken(gain, near, 0.3) == 1.0
+    assert share_taken(gain, far, 0.3) * abs(gain[:, N_ERROR - 1] @ far) == pytest.approx(0.3)
+    assert share_taken(gain, far, np.inf) == 1.0

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from fish_env.data import Dataset
-from fish_env.identification.filtering import NoiseModel
 from fish_env.identification.noise import (
     DisturbanceRange,
     disturbance_range,
     fit_noise,
     white_noise_sd,
 )
+from fish_env.identification.noise_model import NoiseModel
 from fish_env.params import load_fish
 from tests.identification.synthetic import SENSOR_SD, Setup, simulate
 

@@ -7,10 +7,11 @@ import pytest
 
 from fish_env.data import CommandSteps, Dataset, Run
 from fish_env.identification import SeriesProblem
-from fish_env.identification.filtering import NoiseModel
+from fish_env.identification.noise_model import LARGEST_TURN, NoiseModel
 from fish_env.identification.phases import settle_phases
 from fish_env.inference.problem import Point
 from fish_env.simulator import Simulator
+from tests.identification.synthetic import PATHS, Setup, simulate
 
 FISH = "zheng-2021-a"
 CHANNELS = ("x", "y", "z", "yaw")
@@ -92,3 +93,20 @@ def test_a_phase_that_is_a_little_off_is_put_right(swum, wrong):
     time_s = run.clock[-1]
     told = truth + 2 * np.pi * (1.7 * 5.0 + 1.4 * (time_s - 5.0))
     assert off(states[-1, 13], told) < 0.5 * abs(wrong)
+
+
+def test_a_tail_that_is_late_does_not_put_the_filter_out_of_step():
+    """Where a command changes, what a delay leaves looks like half a beat to the phase."""
+    setup = Setup(runs=4, duration=16.0)
+    problem = SeriesProblem(simulate(setup), paths=PATHS)
+    late = [replace(run, command_times=run.command_times - 0.06) for run in problem.runs]
+    wandering = replace(setup.noise, phase_sd=0.2)
+    early = problem.with_runs(late)
+    results = early.filtered(problem.start, wandering, keep_slopes=True)
+    turns = [np.einsum("tc,tc->t", r.gains[:, -1], np.nan_to_num(r.slopes.raw)) for r in results]
+    assert np.abs(np.concatenate(turns)).max() <= LARGEST_TURN + 1e-12
+    assert min(r.shares.min() for r in results) < 0.5
+    again = early.lean_filter.replay(results, wandering, wandering)
+    assert again == pytest.approx(sum(r.log_likelihood for r in results), rel=1e-9)
+    free = early.filtered(problem.start, replace(wandering, phase_sd=0.3))
+    assert min(r.shares.min() for r in free) == 1.0, "relaxed noise finds a phase wherever it is"

@@ -31,7 +31,7 @@ JITTER_TRIALS = (1e-3, 2e-3, 4e-3)
 """Jitters (s) that are tried before one is fitted: beside twice or half its best size, it still
 has most of its likelihood."""
 ORDER = 4
-WOW = 30
+WINDOW = 30
 QUANTILE = 0.15
 GAIN = 0.1
 """The disturbance is found when a step gains no more log likelihood, or e times as much of one of
@@ -61,7 +61,7 @@ def white_noise_sd(dataset: Dataset, channel: str) -> float:
 def _window_spreads(values: FloatArray) -> list[float]:
     scale = np.sqrt(sum(comb(ORDER, k) ** 2 for k in range(ORDER + 1)))
     differences = np.diff(values, ORDER) / scale
-    window = min(WOW, len(differences))
+    window = min(WINDOW, len(differences))
     if window < 3:
         return []
     count = len(differences) // window
@@ -72,7 +72,7 @@ def _window_spreads(values: FloatArray) -> list[float]:
 @cache
 def _quantile_of_white_noise() -> float:
     """What the low quantile is when the noise is white with unit spread (fixed draws)."""
-    normals = np.random.default_rng(0).standard_normal(WOW * 4000 + ORDER)
+    normals = np.random.default_rng(0).standard_normal(WINDOW * 4000 + ORDER)
     return float(np.quantile(_window_spreads(normals), QUANTILE))
 
 

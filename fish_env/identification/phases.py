@@ -25,7 +25,7 @@ FINE = np.arange(-2, 3, dtype=np.float64) * 0.065
 COARSE_SD, FINE_SD = 0.15, 0.08
 """How far the filter may take the phase to be off (rad). Where that is much, the first samples turn
 it by what else they do not fit, and it has been settled wrongly before they are understood."""
-WOW_S = 3.0
+WINDOW_S = 3.0
 AMPLITUDE, PHASE = 1, 13
 
 
@@ -104,4 +104,4 @@ def _beginning(run: RunData) -> RunData:
     """The beginning of a run, up to some seconds after its tail starts to beat."""
     beats = run.command_values[:, AMPLITUDE] * run.command_values[:, FREQUENCY] > 0
     first = max(0.0, float(run.command_times[np.argmax(beats)])) if beats.any() else 0.0
-    return run.until(first + WOW_S)
+    return run.until(first + WINDOW_S)

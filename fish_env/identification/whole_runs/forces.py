@@ -16,7 +16,7 @@ from fish_env.identification.series import SeriesProblem
 from fish_env.identification.whole_runs.own_numbers import OwnNumbers
 from fish_env.inference.problem import Point
 
-BL_SD = 1e9
+BLIND_SD = 1e9
 """Sensor noise (SI) with which a filter corrects nothing."""
 
 
@@ -36,7 +36,7 @@ def forces_of(
         own: of each run, (K,).
         scale: effect parameter that multiplies the commanded tail frequency.
     """
-    blind = NoiseModel(np.full(len(series.channels), BL_SD), 1e-9, 1e-9, 1.0)
+    blind = NoiseModel(np.full(len(series.channels), BLIND_SD), 1e-9, 1e-9, 1.0)
     found: list[Filtered] = []
     for i, (kind, values) in enumerate(zip(kinds, own, strict=True)):
         run = series.runs[i]

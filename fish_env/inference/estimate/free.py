@@ -256,7 +256,8 @@ def predicted_variation(
         worse = [i for i in worse if i not in better]
         if not worse:
             break
-    problem = problem.with_variation(numbers, point, noise)
+    whole = len(better) == problem.run_count  # nothing to work out again
+    problem = part if whole else problem.with_variation(numbers, point, noise)
     return problem, replace(marginal, at=problem.variation[:, active] / spreads[active])
 
 

@@ -20,6 +20,7 @@ from fish_env.identification.runs import RunData
 from fish_env.identification.series import SeriesProblem, series_of
 from fish_env.inference.attribution import Attribution
 from fish_env.inference.estimate.fit import Fit
+from fish_env.inference.hypotheses import effects_of
 from fish_env.inference.preconditions import Precondition
 from fish_env.inference.probes import effect_values
 from fish_env.inference.problem import Point, Problem
@@ -170,7 +171,7 @@ def information_of(fit: Fit) -> FloatArray:
 
 def _lanes(problem: Problem, points: Sequence[Point]) -> tuple[FloatArray, dict[str, FloatArray]]:
     paths = list(dict.fromkeys(path for point in points for path in point.effects))
-    neutral = problem.neutral({path.split(".")[1] for path in paths})
+    neutral = problem.neutral(effects_of(paths))
     effects = {
         path: np.array([point.effects.get(path, neutral[path]) for point in points])
         for path in paths

@@ -109,7 +109,7 @@ def widened(covariance):
 
 
 @kernel
-def predict_covariance(p, f, keep, variance, wander, scratch, turned):
+def predict_covariance(p, f, keep, variance, phase_walk, scratch, turned):
     """p = F p F' + Q in place, F = [f; keep on the wrench; 1 on the phase].
 
     Args:
@@ -117,7 +117,7 @@ def predict_covariance(p, f, keep, variance, wander, scratch, turned):
         f: (12, 19) slopes of the moving rows.
         keep: what is left of the wrench after the interval.
         variance: (6,) stationary variance of the wrench.
-        wander: variance that the tail phase gains over the interval (rad^2).
+        phase_walk: variance that the tail phase gains over the interval (rad^2).
         scratch: (19, 24).
         turned: (19, 16) becomes f transposed; the columns beyond the moving rows are zero.
     """
@@ -138,7 +138,7 @@ def predict_covariance(p, f, keep, variance, wander, scratch, turned):
             p[j, i] = p[i, j]
     for j in range(6):
         p[N_MOVING + j, N_MOVING + j] += variance[j] * (1.0 - keep * keep)
-    p[N_ERROR - 1, N_ERROR - 1] += wander
+    p[N_ERROR - 1, N_ERROR - 1] += phase_walk
 
 
 @kernel
@@ -222,8 +222,8 @@ def take_into_covariance(p, w, share, gain):
     Args:
         p: (19, 24) covariance.
         w: (C, C) inverse Cholesky factor of the innovations' covariance.
-        share: of the correction that is made. What is left of the covariance is that of the error
-            after such a correction (Joseph's form).
+        share: of the correction that is made. The covariance becomes that of the error after such
+            a correction (Joseph's form).
         gain: (., 24) of whitened innovations, transposed; becomes that of innovations.
     """
     lost = share * (2.0 - share)

@@ -92,7 +92,7 @@ def carry(work, width, known, sample, sign, count):
 def ekf_run(
     state0, swimming, par, pace_one, skew_one, delay_one, gain, bias, lens_one, clock, substeps,
     times, values, measured, codes, noise_variance, smear, covariance0, wrench_variance,
-    wrench_decay_s, wander, reach, history_rows, known, tables, k_out, w_out, e_out, share_out,
+    wrench_decay_s, phase_walk, reach, history_rows, known, tables, k_out, w_out, e_out, share_out,
     x_out, d_out, f_out, h_out, raw_out,
 ):  # fmt: skip
     """Extended Kalman filter over one run, relinearised at every sample.
@@ -118,7 +118,7 @@ def ekf_run(
         covariance0: (19, 19) of the initial error state.
         wrench_variance: (6,) stationary variance of the wrench.
         wrench_decay_s: its correlation time (s).
-        wander: variance that the tail phase gains in a second (rad^2/s).
+        phase_walk: variance that the tail phase gains in a second (rad^2/s).
         reach: largest turn of the tail phase by one sample (rad).
         history_rows: room for late tail commands, 0 for none.
         known: (T, 6) known force and moment from each sample to the next, or no rows.
@@ -175,7 +175,7 @@ def ekf_run(
             keep = math.exp(-span / wrench_decay_s)
             for j in range(6):
                 work[(WRENCH + j) * width] *= keep
-            predict_covariance(p, f, keep, wrench_variance, wander * span, scratch, turned)
+            predict_covariance(p, f, keep, wrench_variance, phase_walk * span, scratch, turned)
         observation_rows(work, width, codes, gain, lens, measured[sample], rows)
         innovations_of(work, width, measured[sample], codes, gains, biases, lens, e)
         log_det = whitened_gain(

@@ -30,7 +30,7 @@ from fish_env.model.composed import entry_point
 @entry_point
 def replay_run(
     clock, measured, f_in, h_in, raw_in, k_in, share_in, d_in, decay_in_s, noise_variance,
-    smear, covariance0, wrench_variance, wrench_decay_s, wander,
+    smear, covariance0, wrench_variance, wrench_decay_s, phase_walk,
 ):  # fmt: skip
     """Log likelihood (without its constant) of a run under another noise model.
 
@@ -49,7 +49,7 @@ def replay_run(
         covariance0: (19, 19) of the initial error state.
         wrench_variance: (6,) stationary variance of the wrench.
         wrench_decay_s: its correlation time (s).
-        wander: variance that the tail phase gains in a second (rad^2/s).
+        phase_walk: variance that the tail phase gains in a second (rad^2/s).
     """
     channels = measured.shape[1]
     p = widened(covariance0)
@@ -64,7 +64,7 @@ def replay_run(
             keep = math.exp(-span / wrench_decay_s)
             kept = math.exp(-span / decay_in_s)
             predict_covariance(
-                p, f_in[sample], keep, wrench_variance, wander * span, scratch, turned
+                p, f_in[sample], keep, wrench_variance, phase_walk * span, scratch, turned
             )
             for i in range(MOVING_WIDE):
                 total = 0.0

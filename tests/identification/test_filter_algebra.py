@@ -25,14 +25,14 @@ def covariance(rng):
 def test_prediction_is_the_lyapunov_step():
     rng = np.random.default_rng(0)
     before, slopes = covariance(rng), rng.standard_normal((N_MOVING, N_ERROR))
-    variance, keep, wander = rng.uniform(1.0, 2.0, 6), 0.8, 0.3
+    variance, keep, phase_walk = rng.uniform(1.0, 2.0, 6), 0.8, 0.3
     transition = np.diag([0.0] * N_MOVING + [keep] * 6 + [1.0])
     transition[:N_MOVING] = slopes
     added = np.zeros(N_ERROR)
-    added[N_MOVING:PHASE], added[PHASE] = variance * (1.0 - keep**2), wander
+    added[N_MOVING:PHASE], added[PHASE] = variance * (1.0 - keep**2), phase_walk
     p = widened(before)
     scratch, turned, *_ = room(1)
-    predict_covariance(p, slopes, keep, variance, wander, scratch, turned)
+    predict_covariance(p, slopes, keep, variance, phase_walk, scratch, turned)
     expected = transition @ before @ transition.T + np.diag(added)
     np.testing.assert_allclose(p[:, :N_ERROR], expected, rtol=1e-12, atol=1e-12)
     assert not p[:, N_ERROR:].any()

@@ -21,7 +21,9 @@ from fish_env.inference.problem import Point
 
 COARSE = np.arange(24, dtype=np.float64) * (np.pi / 12.0)
 FINE = np.arange(-2, 3, dtype=np.float64) * 0.065
-"""Phases tried: all round, then around the best (rad)."""
+NEAR = np.arange(-3, 4, dtype=np.float64) * (np.pi / 12.0)
+"""Phases tried: all round, then around the best (rad); around the present one instead, where a
+change of the parameters by what an effect usually is does not turn it further."""
 COARSE_SD, FINE_SD = 0.15, 0.08
 """How far the filter may take the phase to be off (rad). Where that is much, the first samples turn
 it by what else they do not fit, and it has been settled wrongly before they are understood."""
@@ -55,24 +57,39 @@ class Filtering(Protocol):
 S = TypeVar("S", bound=Filtering)
 
 
-def settle_phases(problem: S, point: Point, noise: NoiseModel) -> S:
+def settle_phases(problem: S, point: Point, noise: NoiseModel, nearby: bool = False) -> S:
     """The problem with the likeliest starting phase of every run whose phase is unknown.
 
     Args:
-        problem: its runs' own phases are not used.
+        problem: its runs' own phases are used only as centres of what is near them.
         point: parameters to judge by.
         noise: noise model to judge by.
+        nearby: try only phases near those of the runs, and all where the outermost is best.
     """
     unknown = [i for i, run in enumerate(problem.runs) if not run.phase_known]
     if not unknown:
         return problem
     runs = list(problem.runs)
-    rough = [(run, COARSE) for run in (runs[i] for i in unknown)]
-    found = _likeliest(problem, point, noise, rough, COARSE_SD)
+    own = [runs[i] for i in unknown]
+    found = _nearest(problem, point, noise, own) if nearby else None
+    if found is None:
+        found = _likeliest(problem, point, noise, [(run, COARSE) for run in own], COARSE_SD)
     close = [(runs[i], phase + FINE) for i, phase in zip(unknown, found, strict=True)]
     for i, phase in zip(unknown, _likeliest(problem, point, noise, close, FINE_SD), strict=True):
         runs[i] = _starting(runs[i], phase, FINE_SD)
     return problem.with_runs(runs)
+
+
+def _nearest(
+    problem: Filtering, point: Point, noise: NoiseModel, runs: Sequence[RunData]
+) -> list[float] | None:
+    """The likeliest phase near each run's own; None where one is not between those tried."""
+    begun = [float(run.state0[PHASE]) for run in runs]
+    tried = [(run, phase + NEAR) for run, phase in zip(runs, begun, strict=True)]
+    found = _likeliest(problem, point, noise, tried, COARSE_SD)
+    reach = 0.99 * NEAR[-1]
+    inside = [abs(phase - own) < reach for phase, own in zip(found, begun, strict=True)]
+    return found if all(inside) else None
 
 
 def _likeliest(

@@ -37,7 +37,7 @@ from fish_env.identification.runs import FINER, RunData, prepare_run
 from fish_env.identification.sensor_errors import slopes_of_runs
 from fish_env.identification.sensors import largest_jitter_of, largest_noise
 from fish_env.identification.tail_drive import TailDrive
-from fish_env.identification.variation import BEAT, EVERY, SAG, VARIATIONS
+from fish_env.identification.variation import EVERY, VARIATIONS
 from fish_env.identification.variation_slopes import swum_slopes
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.hypotheses import effects_of
@@ -192,8 +192,7 @@ class SeriesProblem(Problem):
         noise = small_disturbance(self.sensor_sd)
         if not self.drive.uneven:
             return noise
-        spread = noise.spread.copy()
-        spread[[BEAT, SAG]] = VARIATIONS[BEAT].usual, VARIATIONS[SAG].usual
+        spread = np.array([variation.usual for variation in self.variations])
         return replace(noise, phase_sd=UNEVEN_PHASE_SD, spread=spread)
 
     def fitted_noise(
@@ -216,9 +215,9 @@ class SeriesProblem(Problem):
         """Whether a disturbance is as strong as any that a noise model may have."""
         return bool(widest_disturbance(self.fish).left_by(noise))
 
-    def settled(self, point: Point, noise: NoiseModel) -> SeriesProblem:
+    def settled(self, point: Point, noise: NoiseModel, nearby: bool = False) -> SeriesProblem:
         """The same problem with the likeliest starting phase of every run that has none."""
-        return settle_phases(self, point, noise)
+        return settle_phases(self, point, noise, nearby)
 
     @cached_property
     def largest_sensor_sd(self) -> FloatArray:

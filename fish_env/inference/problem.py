@@ -343,8 +343,14 @@ class Problem(Protocol):
         """Whether a disturbance is as strong as any that a noise model may have."""
         return False
 
-    def settled(self, point: Point, noise: Any) -> Problem:
-        """The same problem with what is unknown of each run's start where it suits a point."""
+    def settled(self, point: Point, noise: Any, nearby: bool = False) -> Problem:
+        """The same problem with what is unknown of each run's start where it suits a point.
+
+        Args:
+            point: values of the parameters.
+            noise: noise model.
+            nearby: look only around what suited a point close by.
+        """
         return self
 
     @property

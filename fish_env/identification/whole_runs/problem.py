@@ -257,8 +257,10 @@ class WholeRunProblem(Problem):
         """Whether the own numbers of every run are near their estimates."""
         return self.starts is not None
 
-    def settled(self, point: Point, noise: SimulationNoise) -> WholeRunProblem:
-        """The same problem with the likeliest own numbers of every run."""
+    def settled(
+        self, point: Point, noise: SimulationNoise, nearby: bool = False
+    ) -> WholeRunProblem:
+        """The same problem with the likeliest own numbers of every run (see the protocol)."""
         if self.starts is not None:
             return self
         return self.started(likeliest(self, point, noise))

@@ -9,8 +9,14 @@ from functools import cached_property, partial
 import numpy as np
 
 from fish_env.arrays import FloatArray
-from fish_env.inference.estimate.fit import Fit, quadratic
-from fish_env.inference.estimate.free import Free, linearise, objective_of, objectives_with_gains
+from fish_env.inference.estimate.fit import Fit
+from fish_env.inference.estimate.free import (
+    Free,
+    linearise,
+    objective_of,
+    objectives_with_gains,
+    quadratic,
+)
 from fish_env.inference.estimate.gauss_newton import descend
 from fish_env.inference.problem import Point, Problem
 
@@ -111,7 +117,7 @@ class CoarseFitter:
         if few.starts_known:
             values = self._objectives(few, free, vectors)
             return few, vectors[int(np.argmin(values))]
-        settled = [few.settled(free.unpack(v), noise) for v in vectors]
+        settled = [few.settled(free.unpack(v), noise, nearby=True) for v in vectors]
         pairs = zip(settled, vectors, strict=True)
         return min(pairs, key=lambda pair: self._objectives(pair[0], free, [pair[1]])[0])
 

@@ -21,11 +21,14 @@ from fish_env.inference.estimate.free import (
     marginal_of,
     objective,
     objective_of,
-    predicted_variation,
+    objective_with,
+    quadratic,
     residuals_at,
+    spread_of,
 )
 from fish_env.inference.estimate.gauss_newton import descend, predicted_decrease
 from fish_env.inference.estimate.information import gradient, information, leverage, prior_precision
+from fish_env.inference.estimate.joint import descend_jointly
 from fish_env.inference.estimate.run_variation import Likelihood, Marginal, Spread, fit_spread
 from fish_env.inference.hypotheses import of_effects
 from fish_env.inference.policy import POLICY
@@ -161,13 +164,18 @@ def fit(
     vector = free.bounds.clip(free.pack(Point(given.z, values)))
     noise = noise or problem.default_noise()
     filtered: Sequence[Evaluation] = ()
+    marginal: Marginal | None = None
     for round_ in range(rounds if refit_noise else 1):
         problem = problem.settled(free.unpack(vector), noise)
-        problem, marginal = predicted_variation(problem, free.unpack(vector), noise)
         report(f"fitting parameters, round {round_ + 1}")
-        vector, value, filtered = gauss_newton(
-            problem, free, vector, noise, iterations, tolerance, give_up_above, marginal, filtered
-        )
+        if spread_of(problem, noise).any():
+            problem, vector, value, filtered, marginal = descend_jointly(
+                problem, free, vector, noise, iterations, tolerance, give_up_above
+            )
+        else:
+            vector, value, filtered = gauss_newton(
+                problem, free, vector, noise, iterations, tolerance, give_up_above, near=filtered
+            )
         if not refit_noise:
             break
         report(f"fitting the noise, round {round_ + 1}")
@@ -178,8 +186,9 @@ def fit(
         if last.is_close(noise, POLICY.same_noise):
             break
     if refit_noise:
-        value, filtered = objective(problem, free, vector, noise, marginal, filtered)
-    marginal = marginal_of(problem, free.unpack(vector), noise, filtered)
+        value, filtered = objective(problem, free, vector, noise, near=filtered)
+        marginal = marginal_of(problem, free.unpack(vector), noise, filtered)
+        value = objective_with(free, vector, filtered, marginal)
     return _finish(problem, free, names, tuple(released), vector, noise, value, filtered, marginal)
 
 
@@ -225,16 +234,6 @@ def gauss_newton(
         return quadratic(free, at, linearise(problem, free, at, noise, filtered, marginal))
 
     return descend(vector, evaluate, linearised, free.bounds, iterations, tolerance, give_up_above)
-
-
-def quadratic(free: Free, vector: FloatArray, lin: Linearised) -> tuple[FloatArray, FloatArray]:
-    """Half the Hessian (n, n) and half the gradient (n,) of the objective, for Gauss-Newton.
-
-    The steps of later slopes are suited to this Hessian.
-    """
-    hessian = information(lin.slopes, free.prior)
-    free.suit_steps(hessian)
-    return hessian, gradient(lin.slopes, lin.residuals, free.prior, vector)
 
 
 def _leverage(
@@ -300,14 +299,16 @@ def run_variation(own: Fit) -> Spread:
 def with_run_variation(own: Fit, dropped: Collection[str] = ()) -> Fit:
     """The fit, made again where its runs differ by more, or less, than it allows for.
 
-    A few runs tell no spread.
+    A few runs tell no spread. Runs whose drive is uneven differ in everything: every spread is then
+    the usual one from the first fit on, and fits move the runs' numbers themselves.
 
     Args:
         own: the fit.
         dropped: effects that the new fit goes without.
     """
     problem, noise = own.problem, own.noise
-    if problem.variations and problem.run_count >= POLICY.fewest_runs_for_spread:
+    enough = problem.run_count >= POLICY.fewest_runs_for_spread
+    if problem.variations and enough and not problem.drive.uneven:
         found = run_variation(own)
         if found.sd.any() or own.noise.spread.any():
             # The fit moves them, run by run, as far as that helps.

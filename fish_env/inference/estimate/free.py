@@ -14,7 +14,7 @@ import numpy as np
 
 from fish_env.arrays import FloatArray, IntArray
 from fish_env.inference.estimate.bounds import LinearBounds, parameter_bounds
-from fish_env.inference.estimate.information import prior_precision
+from fish_env.inference.estimate.information import gradient, information, prior_precision
 from fish_env.inference.estimate.run_variation import Marginal
 from fish_env.inference.problem import Evaluation, Point, Problem
 from fish_env.inference.vehicle import finite_values
@@ -191,6 +191,16 @@ def linearise(
     return Linearised(residuals, rows.T, *problem.groups(), marginal)
 
 
+def quadratic(free: Free, vector: FloatArray, lin: Linearised) -> tuple[FloatArray, FloatArray]:
+    """Half the Hessian (n, n) and half the gradient (n,) of the objective, for Gauss-Newton.
+
+    The steps of later slopes are suited to this Hessian.
+    """
+    hessian = information(lin.slopes, free.prior)
+    free.suit_steps(hessian)
+    return hessian, gradient(lin.slopes, lin.residuals, free.prior, vector)
+
+
 def spread_of(problem: Problem, noise: Any) -> FloatArray:
     """Standard deviation (K,) over runs of what differs between them.
 
@@ -199,6 +209,16 @@ def spread_of(problem: Problem, noise: Any) -> FloatArray:
         noise: noise model.
     """
     return np.asarray(noise.spread) if problem.variations else np.zeros(0)
+
+
+def least_of(problem: Problem, which: IntArray) -> FloatArray:
+    """Smallest value (K,) of some of the numbers that runs differ in.
+
+    Args:
+        problem: says which cannot be negative.
+        which: (K,) their numbers.
+    """
+    return np.array([0.0 if problem.variations[i].positive else -np.inf for i in which])
 
 
 def marginal_of(
@@ -244,10 +264,10 @@ def predicted_variation(
     assert marginal is not None
     residuals = np.concatenate([f.residuals for f in filtered])
     numbers, before = problem.variation.copy(), _own_objectives(problem, filtered, noise)
-    worse = list(range(problem.run_count))
+    worse, least = list(range(problem.run_count)), least_of(problem, active)
     for damping in DAMPING:
         trial = problem.variation.copy()
-        trial[:, active] = marginal.predicted(residuals, damping) * spreads[active]
+        trial[:, active] = marginal.predicted(residuals, damping, least) * spreads[active]
         part = problem.some(worse).with_variation(trial[worse], point, noise)
         near = [filtered[i] for i in worse]
         after = _own_objectives(part, part.filtered(point, noise, near), noise)
@@ -313,12 +333,29 @@ def objective(
     if not problem.baseline.possible(vector[: free.count]):
         return np.inf, []
     results = problem.filtered(free.unpack(vector), noise, near)
+    return objective_with(free, vector, results, marginal), results
+
+
+def objective_with(
+    free: Free,
+    vector: FloatArray,
+    results: Sequence[Evaluation],
+    marginal: Marginal | None = None,
+) -> float:
+    """-2 log likelihood + prior, from an evaluation.
+
+    Args:
+        free: the free parameters.
+        vector: (n,) where the runs were evaluated.
+        results: of every run.
+        marginal: integrates out what the runs differ in.
+    """
     value = -2.0 * sum(r.log_likelihood for r in results) + free.prior @ (vector * vector)
     if marginal is not None:
         residuals = np.concatenate([r.residuals for r in results])
         whitened = marginal.residuals(residuals)
         value += whitened @ whitened - residuals @ residuals + marginal.log_det
-    return float(value), results
+    return float(value)
 
 
 def objectives_with_gains(

@@ -19,6 +19,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from fish_env.arrays import BoolArray, FloatArray, IntArray
+from fish_env.inference.estimate.box_qp import minimise_in_box
 from fish_env.inference.estimate.products import inner
 from fish_env.inference.policy import POLICY
 
@@ -109,21 +110,28 @@ class Marginal:
         """What integrating costs in -2 log likelihood."""
         return float(sum(np.log1p(variance).sum() for _, _, variance in self.parts))
 
-    def predicted(self, residuals: FloatArray, damping: float = 0.0) -> FloatArray:
+    def predicted(
+        self, residuals: FloatArray, damping: float = 0.0, least: FloatArray | None = None
+    ) -> FloatArray:
         """Best prediction (R, K) of the runs' own numbers, in units of their spread.
 
         Args:
             residuals: (D,) whitened, at the numbers where the slopes were taken.
             damping: by how much more information than there is each number is held where it is
                 (Marquardt, 1963, J. SIAM 11, 431).
+            least: (K,) smallest value that each may have; default: any.
         """
         found = []
         for own, at in zip(self._slices, self.at, strict=True):
             mine = self.slopes[own]
             information = mine.T @ mine + np.eye(mine.shape[1])
-            held = damping * np.diag(np.diag(information))
+            held = information + damping * np.diag(np.diag(information))
             pull = mine.T @ residuals[own] + at
-            found.append(at - np.linalg.solve(information + held, pull))
+            step = -np.linalg.solve(held, pull)
+            if least is not None and np.any(at + step < least):
+                low = np.minimum(least - at, 0.0)
+                step = minimise_in_box(held, pull, low, np.full(len(at), np.inf)).step
+            found.append(at + step)
         return np.array(found)
 
     def some(self, runs: Sequence[int]) -> Marginal:

@@ -1,0 +1,186 @@
+"""Gauss-Newton on what all runs share and on each run's own numbers, in the same steps.
+
+Taken in turns, either would first explain what belongs to the other: a coefficient that is off
+looks like trim in every run, and a late sensor like a clock. So each step is that of one linear
+model of both. Its equations have an arrow's shape: a run's own numbers are eliminated run by run,
+the shared ones are solved for within their bounds, and the own ones follow. Both then go the same
+part of the way, as far as the joint likelihood rises. Source: Lindstrom and Bates (1990),
+Biometrics 46, 673; the elimination is the Schur complement of bundle adjustment (Triggs and
+others, 2000).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from fish_env.arrays import FloatArray
+from fish_env.inference.estimate.free import (
+    Free,
+    least_of,
+    linearise,
+    marginal_of,
+    objective_with,
+    quadratic,
+    spread_of,
+)
+from fish_env.inference.estimate.run_variation import Marginal
+from fish_env.inference.problem import Evaluation, Problem
+
+SHARES = (1.0, 0.4)
+DAMPINGS = (0.03, 0.3, 3.0, 30.0)
+"""Of a step that is too long: parts of it first, then damped ones (Marquardt, 1963)."""
+ENOUGH = 1.0
+"""Decrease of -2 log likelihood below which steps follow its roughness."""
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """Shared parameters and the runs' own numbers, and what they leave.
+
+    Attributes:
+        problem: with the runs' own numbers in place.
+        vector: (n,) shared parameters.
+        filtered: evaluation there.
+        value: -2 log likelihood + both priors.
+    """
+
+    problem: Problem
+    vector: FloatArray
+    filtered: Sequence[Evaluation]
+    value: float
+
+    @property
+    def residuals(self) -> FloatArray:
+        """(D,) whitened."""
+        return np.concatenate([run.residuals for run in self.filtered])
+
+
+def descend_jointly(
+    problem: Problem,
+    free: Free,
+    vector: FloatArray,
+    noise: Any,
+    iterations: int,
+    tolerance: float,
+    give_up_above: float = np.inf,
+) -> tuple[Problem, FloatArray, float, Sequence[Evaluation], Marginal]:
+    """Estimate shared parameters together with the numbers of every run.
+
+    Args:
+        problem: the runs, with the numbers to begin from.
+        free: the shared parameters.
+        vector: (n,) where they begin.
+        noise: noise model, with the spreads of the runs' numbers.
+        iterations: most steps.
+        tolerance: stop when no combination of parameters would move by more of its standard
+            deviation.
+        give_up_above: stop where the objective will not get below this.
+
+    Returns:
+        The problem with the runs' numbers, the vector, the objective with these integrated out, the
+        evaluation, and how to integrate them out.
+
+    Raises:
+        LinAlgError: the simulation diverges where the steps begin.
+    """
+    at = _evaluated(problem, free, vector, noise)
+    if not np.isfinite(at.value):
+        raise np.linalg.LinAlgError("the simulation diverges at the start of the fit")
+    for left in range(iterations, 0, -1):
+        model = _Model(free, noise, at)
+        predicted = at.value - model.foreseen(*model.step(0.0))
+        if predicted < tolerance**2 or at.value - left * predicted > give_up_above:
+            break
+        better = next(_descending(model, free, noise, at), None)
+        if better is None:
+            break
+        gained, at = at.value - better.value, better
+        if gained < ENOUGH:
+            break
+    marginal = marginal_of(at.problem, free.unpack(at.vector), noise, at.filtered)
+    assert marginal is not None
+    value = objective_with(free, at.vector, at.filtered, marginal)
+    return at.problem, at.vector, value, at.filtered, marginal
+
+
+def _evaluated(problem: Problem, free: Free, vector: FloatArray, noise: Any) -> Joint:
+    """Everything at a point; infinite where no vehicle can be so, or the simulation diverges."""
+    if not problem.baseline.possible(vector[: free.count]):
+        return Joint(problem, vector, (), np.inf)
+    filtered = problem.filtered(free.unpack(vector), noise)
+    spreads = spread_of(problem, noise)
+    active = np.flatnonzero(spreads)
+    own = problem.variation[:, active] / spreads[active]
+    value = objective_with(free, vector, filtered) + float(np.sum(own * own))
+    return Joint(problem, vector, filtered, value if np.isfinite(value) else np.inf)
+
+
+class _Model:
+    """The linear model of residuals about a point, by shared parameters and by own numbers."""
+
+    def __init__(self, free: Free, noise: Any, at: Joint) -> None:
+        problem = at.problem
+        self.free, self.at = free, at
+        self.active = np.flatnonzero(spread_of(problem, noise))
+        self.spread = spread_of(problem, noise)[self.active]
+        self.least = least_of(problem, self.active)
+        own = marginal_of(problem, free.unpack(at.vector), noise, at.filtered)
+        assert own is not None
+        self.own = own
+        self.lin = linearise(problem, free, at.vector, noise, at.filtered)
+        # A number that is held at zero is none that the shared parameters can count on.
+        held = (own.at <= self.least) & (own.predicted(self.lin.residuals, 0.0, self.least) <= 0.0)
+        movable = replace(own, slopes=np.where(held[own.run_of], 0.0, own.slopes))
+        whitened = movable.rows(self.lin.slopes.T.copy())
+        left = movable.residuals(self.lin.residuals.copy())
+        reduced = replace(self.lin, residuals=left, slopes=whitened.T)
+        self.hessian, self.gradient = quadratic(free, at.vector, reduced)
+
+    def step(self, damping: float, share: float = 1.0) -> tuple[FloatArray, FloatArray]:
+        """A vector (n,), and the own numbers (R, K) that suit it best, in units of their spread.
+
+        Args:
+            damping: by how much more curvature than there is both are held where they are.
+            share: how much of the way both go.
+        """
+        bounds, vector = self.free.bounds, self.at.vector
+        stiff = self.hessian + damping * np.diag(np.diag(self.hessian))
+        moved = bounds.clip(vector + bounds.step(stiff, self.gradient, vector))
+        left = self.lin.residuals + self.lin.slopes @ (moved - vector)
+        own = self.own.predicted(left, damping, self.least)
+        begun = self.own.at
+        return bounds.clip(vector + share * (moved - vector)), begun + share * (own - begun)
+
+    def foreseen(self, vector: FloatArray, own: FloatArray) -> float:
+        """The value that the linear model foresees of a step."""
+        before, at = self.lin.residuals, self.at.vector
+        shift = np.einsum("dk,dk->d", self.own.slopes, (own - self.own.at)[self.own.run_of])
+        after = before + self.lin.slopes @ (vector - at) + shift
+        prior = self.free.prior @ (vector * vector - at * at) + np.sum(own**2 - self.own.at**2)
+        return float(self.at.value + after @ after - before @ before + prior)
+
+    def numbers(self, own: FloatArray) -> FloatArray:
+        """The runs' own numbers (R, all) with those that vary (R, K) in their place."""
+        found = self.at.problem.variation.copy()
+        found[:, self.active] = own * self.spread
+        return found
+
+
+def _descending(model: _Model, free: Free, noise: Any, at: Joint) -> Iterator[Joint]:
+    """Points with a lower value, the boldest first."""
+    for damping, share in (*((0.0, s) for s in SHARES), *((d, 1.0) for d in DAMPINGS)):
+        vector, own = model.step(damping, share)
+        point = free.unpack(vector)
+        if not at.problem.baseline.possible(vector[: free.count]):
+            continue
+        try:
+            moved = at.problem.with_variation(model.numbers(own), point, noise)
+            tried = _evaluated(moved, free, vector, noise)
+        except np.linalg.LinAlgError:
+            continue
+        if tried.value < at.value:
+            yield tried

@@ -1,0 +1,158 @@
+"""Shared parameters and the runs' own numbers in one step: exact where the model is linear."""
+
+from copy import copy
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from fish_env.inference.estimate.fit import fit
+from fish_env.inference.estimate.free import Free, predicted_variation
+from fish_env.inference.estimate.joint import descend_jointly
+from fish_env.inference.estimate.run_variation import RunVariation
+from fish_env.inference.problem import Point
+from tests.inference.stated import Evaluated, Stated, White
+
+RUNS, SAMPLES = 5, 80
+
+
+@dataclass(frozen=True)
+class Spreading(White):
+    spread: tuple[float, ...] = (1.0, 1.0)
+
+
+class Differing(Stated):
+    """Runs with two numbers of their own: ``(1 + bend) * (z x + own . y)`` against a record.
+
+    ``bend`` makes the model curved. The second number cannot be negative if ``positive``.
+    """
+
+    def __init__(self, seed=0, bend=0.0, positive=False, truth=(2.0, 1.5, 1.0)):
+        rng = np.random.default_rng(seed)
+        self.bend = bend
+        self.x = rng.standard_normal((RUNS, SAMPLES))
+        # Alike to the shared column: in turns, the one would explain the other.
+        self.y = rng.standard_normal((RUNS, SAMPLES, 2)) + 2.0 * self.x[:, :, None]
+        self.own = np.zeros((RUNS, 2))
+        self.true = np.asarray(truth[1:]) * rng.standard_normal((RUNS, 2))
+        self.data = self.model(truth[0], self.true) + rng.standard_normal((RUNS, SAMPLES))
+        self.variations = (
+            RunVariation("first", "1", 1.0),
+            RunVariation("second", "1", 1.0, positive=positive),
+        )
+        super().__init__(lambda z, effects: self.data - self.model(z[0], self.own))
+
+    def model(self, shared, own):
+        linear = shared * self.x + np.einsum("rsk,rk->rs", self.y, own)
+        return linear + self.bend * np.sin(linear)
+
+    @property
+    def variation(self):
+        return self.own[self.which]
+
+    def with_variation(self, values, point, noise):
+        moved = copy(self)
+        moved.own = self.own.copy()
+        moved.own[self.which] = values
+        moved.residuals = lambda z, effects: moved.data - moved.model(z[0], moved.own)
+        return moved
+
+    def variation_slopes(self, point, noise, filtered, steps):
+        columns = []
+        for k, step in enumerate(steps):
+            further = self.own.copy()
+            further[:, k] += step
+            moved = self.model(point.z[0], further) - self.model(point.z[0], self.own)
+            columns.append(-moved[self.which].ravel() / step)
+        return np.column_stack(columns)
+
+    def filtered(self, point, noise, near=()):
+        rows = self._rows(point.z, point.effects, noise)
+        return [Evaluated(float(-0.5 * row @ row), row) for row in rows]
+
+
+def descended(problem, iterations=8, start=0.0):
+    free = Free(problem, (), ())
+    return descend_jointly(problem, free, np.array([start]), Spreading(), iterations, 0.01)
+
+
+def likelihood_of(problem, vector):
+    """-2 log density of a linear record, all random numbers in its covariance, but for a constant.
+
+    Args:
+        problem: the runs.
+        vector: (1,) the shared coefficient.
+    """
+    value = float(vector @ vector)
+    for x, y, data in zip(problem.x, problem.y, problem.data, strict=True):
+        covariance = np.eye(SAMPLES) + y @ y.T
+        left = data - vector[0] * x
+        value += left @ np.linalg.solve(covariance, left) + np.linalg.slogdet(covariance)[1]
+    return value
+
+
+def test_one_step_solves_a_linear_model():
+    """The minimum is that of the likelihood with the numbers in the covariance; so is its value."""
+    problem = Differing()
+    _, vector, value, _, _ = descended(problem, iterations=1)
+    assert value == pytest.approx(likelihood_of(problem, vector), rel=1e-9)
+    for off in (-1e-3, 1e-3):
+        assert likelihood_of(problem, vector + off) > value
+
+
+def test_own_numbers_are_the_best_predictions():
+    problem = Differing()
+    moved, vector, _, _, _ = descended(problem, iterations=1)
+    for r in range(RUNS):
+        y, left = problem.y[r], problem.data[r] - vector[0] * problem.x[r]
+        exact = np.linalg.solve(y.T @ y + np.eye(2), y.T @ left)
+        assert moved.own[r] == pytest.approx(exact, rel=1e-6, abs=1e-9)
+
+
+def test_turns_explain_the_one_by_the_other():
+    """What joint steps are for: numbers predicted first take what is shared."""
+    problem = Differing(truth=(2.0, 0.2, 0.2))
+    first, _ = predicted_variation(problem, Point(np.zeros(1), {}), Spreading())
+    joint, vector, _, _, _ = descended(problem, iterations=1)
+    assert np.abs(first.own - problem.true).mean() > 3.0 * np.abs(joint.own - problem.true).mean()
+    assert vector[0] == pytest.approx(2.0, abs=0.6)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_curved_model_ends_where_nothing_is_gained(seed):
+    problem = Differing(seed, bend=0.5)
+
+    def worth(one, shared):
+        left = one.data - one.model(shared, one.own)
+        return np.sum(left**2) + np.sum(one.own**2) + shared**2
+
+    moved, vector, _, _, _ = descended(problem, iterations=30)
+    assert worth(moved, vector[0]) < worth(problem, 0.0)
+    again, further, _, _, _ = descended(moved, iterations=5, start=vector[0])
+    assert worth(again, further[0]) <= worth(moved, vector[0])
+    assert worth(again, further[0]) > worth(moved, vector[0]) - 2.0
+
+
+def test_no_number_is_negative_that_cannot_be():
+    problem = Differing(positive=True)
+    assert (problem.true[:, 1] < -0.5).any()
+    moved, _, value, _, _ = descended(problem)
+    free, _, anywhere, _, _ = descended(Differing())
+    assert (free.own[:, 1] < -0.1).any()
+    assert np.all(moved.own[:, 1] >= 0.0)
+    assert value > anywhere
+
+
+def test_a_fit_takes_joint_steps_where_runs_differ():
+    problem = Differing()
+    found = fit(problem, noise=Spreading(), rounds=1, iterations=3)
+    _, vector, value, _, _ = descended(problem)
+    assert found.estimates[0] == pytest.approx(vector[0], rel=1e-4)
+    assert found.objective == pytest.approx(value, abs=1e-3)
+
+
+def test_what_diverges_at_the_start_is_refused():
+    problem = Differing()
+    problem.data = np.full_like(problem.data, np.nan)
+    with pytest.raises(np.linalg.LinAlgError, match="start of the fit"):
+        descended(problem)

@@ -64,8 +64,10 @@ def pursue(
         more = pursued(current, kept, report, least, relaxed_log_p, most=1)
         if more is current:
             break
-        current = _against_likes(more, screen(more.fit, causes, rng), report)
-        shown = screen(current.fit, causes, rng)
+        shown = screen(more.fit, causes, rng)
+        current = _against_likes(more, shown, report)
+        if current is not more:
+            shown = screen(current.fit, causes, rng)
     for _ in range(POLICY.pursuits):
         more = pursued(current, _beside_drive(current, shown), report, least, relaxed_log_p)
         if more is current:

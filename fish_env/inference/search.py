@@ -27,6 +27,9 @@ NamedCoarseFit = tuple[str, CoarseFit]
 Way = Callable[[float, Signal], list[NamedCoarseFit]]
 """Coarse fits of a cause, given up where they will not get below an objective."""
 
+MOST_TURNS = 6
+"""Sizes from which a coarse fit is tried in turn."""
+
 
 def refits(
     current: Explanation,
@@ -189,7 +192,8 @@ def _swapped(fitter: CoarseFitter, own: Fit, name: str, signal: Signal) -> Coars
     begin = [Point(z, {**kept, **values}) for z in baselines(own) for values in sizes]
     coarse = [reached(partial(fitter.coarse_fit, effects, own.released, begin))]
     if coarse[0] is None or _off(own.problem, coarse[0].point, signal.cause.name):
-        coarse += [reached(partial(fitter.coarse_fit, effects, own.released, [b])) for b in begin]
+        turns = fitter.promising(effects, own.released, begin, MOST_TURNS)
+        coarse += [reached(partial(fitter.coarse_fit, effects, own.released, [b])) for b in turns]
     return min((s for s in coarse if s), key=lambda s: s.objective, default=None)
 
 

@@ -23,6 +23,8 @@ from fish_env.inference.problem import Point, Problem
 STEPS = 5
 TOLERANCE = 0.5
 """A coarse fit ends when no parameter moves by more of its standard deviation."""
+MOST_SETTLED = 12
+"""Starts at which the runs' own starts are settled: to settle one takes as long as many lanes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +111,31 @@ class CoarseFitter:
         )
         return CoarseFit(tuple(effects), tuple(released), free.unpack(vector), value)
 
+    def promising(
+        self, effects: Sequence[str], released: Sequence[str], starts: Sequence[Point], most: int
+    ) -> list[Point]:
+        """The likeliest starts, best first, as the runs' own starts have been settled so far.
+
+        Args:
+            effects: names of effects that are free.
+            released: baseline coefficients whose prior is lifted.
+            starts: values of all effects' parameters.
+            most: how many to return.
+        """
+        few = self._problem_for(effects)
+        free = Free(few, effects, released)
+        vectors = [free.bounds.clip(free.pack(start)) for start in starts]
+        return [free.unpack(v) for v in self._likeliest(few, free, vectors, most)]
+
+    def _likeliest(
+        self, few: Problem, free: Free, vectors: Sequence[FloatArray], most: int
+    ) -> list[FloatArray]:
+        """At most so many of some vectors, the likeliest first where there are more."""
+        if len(vectors) <= most:
+            return list(vectors)
+        order = np.argsort(self._objectives(few, free, vectors), kind="stable")
+        return [vectors[i] for i in order[:most].tolist()]
+
     def _best(
         self, few: Problem, free: Free, vectors: Sequence[FloatArray]
     ) -> tuple[Problem, FloatArray]:
@@ -117,6 +144,7 @@ class CoarseFitter:
         if few.starts_known:
             values = self._objectives(few, free, vectors)
             return few, vectors[int(np.argmin(values))]
+        vectors = self._likeliest(few, free, vectors, MOST_SETTLED)
         settled = [few.settled(free.unpack(v), noise, nearby=True) for v in vectors]
         pairs = zip(settled, vectors, strict=True)
         return min(pairs, key=lambda pair: self._objectives(pair[0], free, [pair[1]])[0])

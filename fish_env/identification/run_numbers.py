@@ -44,7 +44,11 @@ class Numbered(Protocol):
 
 
 def renumbered(
-    problem: Numbered, values: FloatArray, point: Point, noise: NoiseModel
+    problem: Numbered,
+    values: FloatArray,
+    point: Point,
+    noise: NoiseModel,
+    near: Sequence[Filtered] = (),
 ) -> list[RunData]:
     """The runs with other numbers. A run that keeps its numbers stays as it is.
 
@@ -53,9 +57,14 @@ def renumbered(
         values: (R, K) the numbers.
         point: values of the shared parameters.
         noise: noise model.
+        near: the runs filtered at numbers close by, with their slopes; what errors do to samples
+            then follows from that motion, also where a run keeps its numbers.
     """
     runs = list(problem.runs)
     own, errors = np.split(values, [len(VARIATIONS)], axis=1)
+    if near:
+        every = zip(runs, own, errors, near, strict=True)
+        return [_undone(r.with_numbers(o, e), f, problem.channels) for r, o, e, f in every]
     changed = []
     for i, run in enumerate(runs):
         if not np.array_equal(np.r_[run.variation, run.sensor_errors], values[i]):

@@ -80,6 +80,7 @@ class RunData:
         variation: (K,) what this run differs in from the others, see ``variation.VARIATIONS``.
         sensor_errors: (K,) errors of its sensors, see ``variation.SENSOR_ERRORS``.
         distortion: (T, C) what they do to its samples; None for nothing.
+        usual_substeps: (T,) of published estimates, where ``substeps`` are fewer; else None.
     """
 
     id: str
@@ -101,6 +102,7 @@ class RunData:
     variation: FloatArray = field(default_factory=lambda: np.zeros(COUNT))
     sensor_errors: FloatArray = field(default_factory=lambda: np.zeros(len(SENSOR_ERRORS)))
     distortion: FloatArray | None = None
+    usual_substeps: IntArray | None = None
 
     @property
     def known_wrench(self) -> FloatArray:
@@ -141,7 +143,15 @@ class RunData:
         """
         long = min(long, fastest)
         longest = np.where(self.fresh, long / FINER, long)
-        return replace(self, substeps=np.minimum(self.substeps, _steps(self.clock, longest)))
+        fewer = np.minimum(self.substeps, _steps(self.clock, longest))
+        usual = self.substeps if self.usual_substeps is None else self.usual_substeps
+        return replace(self, substeps=fewer, usual_substeps=usual)
+
+    def in_usual_steps(self) -> RunData:
+        """The same run in the steps of published estimates."""
+        if self.usual_substeps is None:
+            return self
+        return replace(self, substeps=self.usual_substeps, usual_substeps=None)
 
     def in_finer_steps(self) -> RunData:
         """The same run in finer steps."""
@@ -190,6 +200,7 @@ class RunData:
             self,
             clock=np.ascontiguousarray(self.clock[own]),
             substeps=np.ascontiguousarray(self.substeps[own]),
+            usual_substeps=None if self.usual_substeps is None else self.usual_substeps[own],
             fresh=self.fresh[own],
             measured=np.ascontiguousarray(self.measured[own]),
             wrench=None if self.wrench is None else np.ascontiguousarray(self.wrench[own]),

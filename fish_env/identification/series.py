@@ -90,9 +90,9 @@ class SeriesProblem(Problem):
         self.sensor_sd = np.array(
             [dataset.noise.get(n) or white_noise_sd(dataset, n) for n in self.channels]
         )
-        chosen = dataset.ids if run_ids is None else tuple(run_ids)
         self.runs = tuple(
-            prepare_run(dataset.run(i), self.channels, self.sensor_sd, dt) for i in chosen
+            prepare_run(dataset.run(i), self.channels, self.sensor_sd, dt)
+            for i in (dataset.ids if run_ids is None else run_ids)
         )
         self.baseline = Baseline(self.fish, paths)
         self.effects = tuple(effects)
@@ -261,9 +261,11 @@ class SeriesProblem(Problem):
         """(R, K) what each run differs in."""
         return np.array([np.r_[run.variation, run.sensor_errors] for run in self.runs])
 
-    def with_variation(self, values: FloatArray, point: Point, noise: NoiseModel) -> SeriesProblem:
+    def with_variation(
+        self, values: FloatArray, point: Point, noise: NoiseModel, near: Sequence[Filtered] = ()
+    ) -> SeriesProblem:
         """The same problem with other numbers (R, K) of the runs (see the protocol)."""
-        return self.with_runs(renumbered(self, values, point, noise))
+        return self.with_runs(renumbered(self, values, point, noise, near))
 
     def variation_slopes(
         self, point: Point, noise: NoiseModel, filtered: Sequence[Filtered], steps: FloatArray
@@ -273,8 +275,9 @@ class SeriesProblem(Problem):
         By differences (K,) where the fish has to swim again, else through the filter's slopes.
         """
         swum = swum_slopes(self, point, noise, filtered, steps[: len(VARIATIONS)])
-        again = self.filtered(point, noise, keep_slopes=True)
-        seen = slopes_of_runs(self.runs, again, self.channels, noise.correlation_s)
+        if any(one.slopes is None for one in filtered):
+            filtered = self.filtered(point, noise, keep_slopes=True)
+        seen = slopes_of_runs(self.runs, filtered, self.channels, noise.correlation_s)
         return np.hstack([swum, -seen])  # the data hold the errors, and not the model
 
     def generic_terms(self, fit: Any) -> BoundForces:
@@ -303,8 +306,9 @@ class SeriesProblem(Problem):
             filtered: gains to use.
             pushes: a prescribed wrench for each point.
         """
-        lanes = self.lanes(z, effects)
-        return self.filter_for(effects).innovations(*lanes, noise, filtered, pushes)
+        return self.filter_for(effects).innovations(
+            *self.lanes(z, effects), noise, filtered, pushes
+        )
 
     def changes(
         self,
@@ -332,19 +336,25 @@ class SeriesProblem(Problem):
             point: values of the parameters.
             noise: noise model.
             near: not needed, a filter begins where its run does.
-            keep_slopes: whether to keep what :meth:`RunFilter.replay` needs.
+            keep_slopes: whether to keep what :meth:`RunFilter.replay` needs; kept where runs
+                differ, whose numbers are estimated by them.
         """
         record, measurement = self.lane(point)
-        corners = self.refines_steps(point.effects)
-        return self.filter_for(point.effects).run(record, measurement, noise, keep_slopes, corners)
+        corners, keep = self.refines_steps(point.effects), keep_slopes or bool(noise.spread.any())
+        return self.filter_for(point.effects).run(record, measurement, noise, keep, corners)
 
     def without_refinement(self) -> SeriesProblem:
         """The same problem without finer steps for effects that make the tail's rate jump."""
         return self._but(unrefined=True)
 
     def with_refinement(self) -> SeriesProblem:
-        """The same problem with finer steps for effects that make the tail's rate jump."""
-        return self._but(unrefined=False)
+        """The same problem in usual steps, finer for effects that make the tail's rate jump."""
+        return self.with_runs([run.in_usual_steps() for run in self.runs])._but(unrefined=False)
+
+    def is_coarse(self, effects: Iterable[str]) -> bool:
+        """Whether steps are longer than these effect parameters need (see the protocol)."""
+        finer = self.unrefined and self.is_nonsmooth({*effects_of(effects), *self.model.effects})
+        return finer or any(run.usual_substeps is not None for run in self.runs)
 
     def _but(self, **changes: Any) -> SeriesProblem:
         other = copy(self)

@@ -14,10 +14,10 @@ import numpy as np
 
 from fish_env.inference.effects import EffectParameter
 from fish_env.inference.estimate.fit import Fit
+from fish_env.inference.evaluation import GenericTerms, LackOfFit
 from fish_env.inference.hypotheses import PREFIX
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause
-from fish_env.inference.problem import GenericTerms, LackOfFit
 from fish_env.inference.projection import Projector, Signal
 from fish_env.inference.screening import SETTINGS_AT_ONCE, null_threshold
 

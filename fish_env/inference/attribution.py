@@ -14,7 +14,8 @@ from fish_env.inference.adequacy import disturbance_at_limit, implausible_estima
 from fish_env.inference.drive import beside_drive, measured
 from fish_env.inference.effort import FULL, Effort
 from fish_env.inference.elimination import backward_elimination
-from fish_env.inference.estimate.fit import Fit, finished, refined
+from fish_env.inference.estimate.again import finished, refined
+from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.left_out import left_out_scores
 from fish_env.inference.many_causes import challenged, pursue

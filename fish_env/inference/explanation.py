@@ -11,7 +11,8 @@ import numpy as np
 
 from fish_env.arrays import FloatArray
 from fish_env.inference.adequacy import disturbance_at_limit
-from fish_env.inference.estimate.fit import Fit, fit, with_run_variation
+from fish_env.inference.estimate.again import with_run_variation
+from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.estimate.information import information, prior_precision
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Problem

@@ -21,7 +21,8 @@ from fish_env.inference.adequacy import (
 from fish_env.inference.attribution import Attribution, attribute, extended
 from fish_env.inference.budget import Budget, error_budget
 from fish_env.inference.effort import FULL, Effort
-from fish_env.inference.estimate.fit import Fit, finished, fit
+from fish_env.inference.estimate.again import finished
+from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.gain import gap_closed
 from fish_env.inference.parallel import both

@@ -16,6 +16,7 @@ import numpy as np
 from fish_env.arrays import BoolArray, FloatArray, IntArray
 from fish_env.inference.estimate.information import block_index
 from fish_env.inference.estimate.run_variation import RunVariation
+from fish_env.inference.evaluation import Evaluation, GenericTerms, LackOfFit
 from fish_env.inference.hypotheses import parameter_path
 from fish_env.inference.vehicle import (
     Coefficients,
@@ -38,62 +39,6 @@ class Point:
 
     z: FloatArray
     effects: Mapping[str, float]
-
-
-class Noise(Protocol):
-    """A noise model: the problem's own, with spreads (K,) over runs as ``spread`` if it has any."""
-
-    def is_close(self, other: Any, share: float) -> bool:
-        """Whether another noise model differs by less than a share of this one."""
-        ...
-
-
-class Evaluation(Protocol):
-    """What evaluating one run at a point has left: its likelihood, and the weighting to hold."""
-
-    @property
-    def log_likelihood(self) -> float:
-        """Without its constant."""
-        ...
-
-    @property
-    def residuals(self) -> FloatArray:
-        """(D_r,) whitened residuals of the run."""
-        ...
-
-
-@dataclass(frozen=True)
-class LackOfFit:
-    """What the model misses against what repeats of a run differ by.
-
-    Attributes:
-        ratio: mean square of the first over that of the second.
-        p_value: of so large a ratio by chance.
-    """
-
-    ratio: float
-    p_value: float
-
-
-class GenericTerms(Protocol):
-    """Forces of no particular origin that the adequacy test adds one at a time."""
-
-    @property
-    def columns(self) -> IntArray:
-        """(N,) numbers of the terms."""
-        ...
-
-    def words(self, column: int) -> tuple[str, str]:
-        """What a term depends on, and its direction."""
-        ...
-
-    def unit(self, column: int) -> float:
-        """Root mean square of a term (SI) for each unit of its change."""
-        ...
-
-    def changes(self, columns: IntArray) -> FloatArray:
-        """What small amounts of some terms change in the residuals, (D, N)."""
-        ...
 
 
 class Problem(Protocol):
@@ -297,13 +242,17 @@ class Problem(Protocol):
         """(R, K) what each run differs in."""
         return np.zeros((self.run_count, 0))
 
-    def with_variation(self, values: FloatArray, point: Point, noise: Any) -> Problem:
+    def with_variation(
+        self, values: FloatArray, point: Point, noise: Any, near: Sequence[Any] = ()
+    ) -> Problem:
         """The same problem with other numbers (R, K) of the runs.
 
         Args:
             values: the numbers.
             point: values of the shared parameters, close to theirs.
             noise: noise model.
+            near: evaluation at numbers close by; what follows from the motion is then taken from
+                it, and not from the motion that these numbers show.
         """
         return self
 
@@ -387,8 +336,12 @@ class Problem(Protocol):
         return self
 
     def with_refinement(self) -> Problem:
-        """The same problem with finer steps for effects that are not smooth."""
+        """The same problem in usual steps, finer for effects that are not smooth."""
         return self
+
+    def is_coarse(self, effects: Iterable[str]) -> bool:
+        """Whether steps are longer than published estimates of effect parameters ask for."""
+        return False
 
     def refined(self) -> tuple[Problem, int]:
         """The same problem in finer steps, and how many times finer."""

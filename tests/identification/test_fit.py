@@ -10,8 +10,8 @@ from fish_env.cli import app
 from fish_env.data import write_dataset
 from fish_env.errors import EffectError
 from fish_env.identification import SeriesProblem, fit, identified_fish
+from fish_env.inference.estimate.again import finished
 from fish_env.inference.estimate.covariance import sandwich
-from fish_env.inference.estimate.fit import finished
 from fish_env.inference.estimate.free import Linearised
 from fish_env.inference.estimate.products import inner
 from fish_env.inference.problem import Point

@@ -50,7 +50,7 @@ class Differing(Stated):
     def variation(self):
         return self.own[self.which]
 
-    def with_variation(self, values, point, noise):
+    def with_variation(self, values, point, noise, near=()):
         moved = copy(self)
         moved.own = self.own.copy()
         moved.own[self.which] = values

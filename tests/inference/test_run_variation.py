@@ -142,7 +142,7 @@ class Growing(Stated):
     def variation(self):
         return self.own
 
-    def with_variation(self, values, point, noise):
+    def with_variation(self, values, point, noise, near=()):
         moved = copy(self)
         moved.own = values
         return moved

@@ -29,7 +29,8 @@ from fish_env.identification.writing import identified_fish
 from fish_env.inference.adequacy import Adequacy
 from fish_env.inference.attribution import Attribution
 from fish_env.inference.effort import effort_of
-from fish_env.inference.estimate.fit import Fit, finished, fit
+from fish_env.inference.estimate.again import finished
+from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.estimate.profile import profiled
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.pipeline import investigate, refit_baseline

@@ -36,7 +36,8 @@ from fish_env.identification.tables.scatter import (
 )
 from fish_env.identification.tables.table import Table
 from fish_env.identification.tables.wrenches import HeldWrenches
-from fish_env.inference.problem import LackOfFit, Point, Problem
+from fish_env.inference.evaluation import LackOfFit
+from fish_env.inference.problem import Point, Problem
 from fish_env.model.effect import Effect
 from fish_env.params.schema import FishParams
 

@@ -33,8 +33,9 @@ from fish_env.identification.whole_runs.starts import (
     fit_own_numbers,
     likeliest,
 )
+from fish_env.inference.evaluation import GenericTerms
 from fish_env.inference.hypotheses import effect_of, parameter_path
-from fish_env.inference.problem import GenericTerms, Point, Problem
+from fish_env.inference.problem import Point, Problem
 from fish_env.inference.vehicle import EffectFreedom
 from fish_env.model.effect import Effect
 from fish_env.params.schema import FishParams

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any
@@ -14,7 +14,6 @@ from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.bounds import coefficients_at_bounds
 from fish_env.inference.estimate.covariance import sandwich
 from fish_env.inference.estimate.free import (
-    DIFFERENCE,
     Free,
     Linearised,
     linearise,
@@ -26,17 +25,16 @@ from fish_env.inference.estimate.free import (
     residuals_at,
     spread_of,
 )
-from fish_env.inference.estimate.gauss_newton import descend, predicted_decrease
+from fish_env.inference.estimate.gauss_newton import descend
 from fish_env.inference.estimate.information import gradient, information, leverage, prior_precision
 from fish_env.inference.estimate.joint import descend_jointly
-from fish_env.inference.estimate.run_variation import Likelihood, Marginal, Spread, fit_spread
-from fish_env.inference.hypotheses import of_effects
+from fish_env.inference.estimate.run_variation import Marginal
+from fish_env.inference.evaluation import Evaluation
 from fish_env.inference.policy import POLICY
-from fish_env.inference.problem import Evaluation, Point, Problem
+from fish_env.inference.problem import Point, Problem
 
 SAME = 0.01
 """Root mean square of the difference between whitened residuals below which they are the same."""
-MORE = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,10 +93,18 @@ class Fit:
         A vehicle that turns more quickly, or coefficients far off, may need the usual ones.
         """
         long = self.problem.with_long_steps()
+        return long if self.looks_alike(long) else self.problem
+
+    def looks_alike(self, other: Problem) -> bool:
+        """Whether this fit leaves the same residuals in other steps of the simulation.
+
+        Args:
+            other: the same problem in these.
+        """
         effects = {path: np.array([value]) for path, value in self.point.effects.items()}
-        (seen,) = long.innovations(self.point.z[:, None], effects, self.noise, self.filtered)
+        (seen,) = other.innovations(self.point.z[:, None], effects, self.noise, self.filtered)
         off = np.sqrt(np.mean((self.marginalised(seen) - self.linearised.residuals) ** 2))
-        return long if off < SAME else self.problem
+        return bool(off < SAME)
 
     @cached_property
     def extrapolated(self) -> Fit:
@@ -241,85 +247,6 @@ def _leverage(
 ) -> FloatArray:
     """Share of each residual that the free parameters follow (D,)."""
     return leverage(linearise(problem, free, vector, noise, filtered).slopes, free.prior)
-
-
-def finished(own: Fit) -> Fit:
-    """A fit, iterated to convergence.
-
-    A few steps under a few noise models are enough to screen causes by. Published estimates have
-    to be the minimum, for their intervals to be true.
-    """
-    for _ in range(MORE):
-        free = Free(own.problem, own.effects, own.released)
-        vector = free.pack(own.point)
-        lin = own.linearised
-        hessian = information(lin.slopes, free.prior)
-        pull = gradient(lin.slopes, lin.residuals, free.prior, vector)
-        if (
-            predicted_decrease(hessian, pull, free.bounds.step(hessian, pull, vector))
-            < POLICY.converged
-        ):
-            break
-        again = fit(own.problem, own.effects, own.point, own.noise, own.released, rounds=2)
-        if again.objective > own.objective:
-            break
-        own = again
-    return own
-
-
-def refined(own: Fit) -> Fit:
-    """The fit in finer steps where an effect asks for them, if it was made without."""
-    problem = own.problem.with_refinement()
-    if own.problem.refines_steps(own.point.effects) or not problem.refines_steps(own.point.effects):
-        return own
-    return fit(problem, own.effects, own.point, own.noise, own.released, rounds=1, iterations=3)
-
-
-def run_variation(own: Fit) -> Spread:
-    """What the runs of a fit differ in, as far as it is strongly indicated.
-
-    Args:
-        own: the fit; its weighting is held.
-    """
-    problem, usual = own.problem, np.array([v.usual for v in own.problem.variations])
-    free = Free(problem, own.effects, own.released)
-    vector, lin = free.pack(own.point), own.linearised
-    if lin.marginal is not None:
-        lin = linearise(problem, free, vector, own.noise, own.filtered)
-    steps = DIFFERENCE * usual
-    slopes = problem.variation_slopes(own.point, own.noise, own.filtered, steps) * usual
-    likelihood = Likelihood(
-        lin.residuals, lin.slopes, slopes, problem.variation / usual, lin.run_of,
-        information(lin.slopes, free.prior), free.prior * vector,
-        np.array([not v.shared for v in problem.variations]),
-    )  # fmt: skip
-    return fit_spread(likelihood, problem.variations)
-
-
-def with_run_variation(own: Fit, dropped: Collection[str] = ()) -> Fit:
-    """The fit, made again where its runs differ by more, or less, than it allows for.
-
-    A few runs tell no spread. Runs whose drive is uneven differ in everything: every spread is then
-    the usual one from the first fit on, and fits move the runs' numbers themselves.
-
-    Args:
-        own: the fit.
-        dropped: effects that the new fit goes without.
-    """
-    problem, noise = own.problem, own.noise
-    enough = problem.run_count >= POLICY.fewest_runs_for_spread
-    if problem.variations and enough and not problem.drive.uneven:
-        found = run_variation(own)
-        if found.sd.any() or own.noise.spread.any():
-            # The fit moves them, run by run, as far as that helps.
-            numbers = np.where(found.sd > 0.0, problem.variation, 0.0)
-            problem = problem.with_variation(numbers, own.point, own.noise)
-            noise = replace(own.noise, spread=found.sd)
-    if problem is own.problem and not dropped:
-        return own
-    effects = [name for name in own.effects if name not in dropped]
-    start = Point(own.point.z, of_effects(own.point.effects, effects))
-    return fit(problem, effects, start, noise, own.released, rounds=2)
 
 
 def _extrapolated(own: Fit) -> Fit:

@@ -16,7 +16,8 @@ from fish_env.arrays import FloatArray, IntArray
 from fish_env.inference.estimate.bounds import LinearBounds, parameter_bounds
 from fish_env.inference.estimate.information import gradient, information, prior_precision
 from fish_env.inference.estimate.run_variation import Marginal
-from fish_env.inference.problem import Evaluation, Point, Problem
+from fish_env.inference.evaluation import Evaluation
+from fish_env.inference.problem import Point, Problem
 from fish_env.inference.vehicle import finite_values
 
 P = TypeVar("P", bound=Problem)

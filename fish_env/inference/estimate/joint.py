@@ -28,7 +28,8 @@ from fish_env.inference.estimate.free import (
     spread_of,
 )
 from fish_env.inference.estimate.run_variation import Marginal
-from fish_env.inference.problem import Evaluation, Problem
+from fish_env.inference.evaluation import Evaluation
+from fish_env.inference.problem import Problem
 
 SHARES = (1.0, 0.4)
 DAMPINGS = (0.03, 0.3, 3.0, 30.0)
@@ -101,7 +102,10 @@ def descend_jointly(
         gained, at = at.value - better.value, better
         if gained < ENOUGH:
             break
-    marginal = marginal_of(at.problem, free.unpack(at.vector), noise, at.filtered)
+    point = free.unpack(at.vector)
+    agreed = at.problem.with_variation(at.problem.variation, point, noise, at.filtered)
+    at = _evaluated(agreed, free, at.vector, noise)
+    marginal = marginal_of(at.problem, point, noise, at.filtered)
     assert marginal is not None
     value = objective_with(free, at.vector, at.filtered, marginal)
     return at.problem, at.vector, value, at.filtered, marginal
@@ -178,7 +182,7 @@ def _descending(model: _Model, free: Free, noise: Any, at: Joint) -> Iterator[Jo
         if not at.problem.baseline.possible(vector[: free.count]):
             continue
         try:
-            moved = at.problem.with_variation(model.numbers(own), point, noise)
+            moved = at.problem.with_variation(model.numbers(own), point, noise, at.filtered)
             tried = _evaluated(moved, free, vector, noise)
         except np.linalg.LinAlgError:
             continue

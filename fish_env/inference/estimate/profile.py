@@ -18,7 +18,8 @@ from scipy.special import chdtri
 from fish_env.inference.estimate.fit import Fit, fit, gauss_newton
 from fish_env.inference.estimate.free import Free
 from fish_env.inference.estimate.information import information
-from fish_env.inference.problem import Evaluation, Point
+from fish_env.inference.evaluation import Evaluation
+from fish_env.inference.problem import Point
 
 LEVEL = 0.95
 BETTER = 0.1

@@ -1,0 +1,99 @@
+"""A fit made again: to convergence, in finer steps, with what its runs differ in."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+
+import numpy as np
+
+from fish_env.inference.estimate.fit import Fit, fit
+from fish_env.inference.estimate.free import DIFFERENCE, Free, linearise
+from fish_env.inference.estimate.gauss_newton import predicted_decrease
+from fish_env.inference.estimate.information import gradient, information
+from fish_env.inference.estimate.run_variation import Likelihood, Spread, fit_spread
+from fish_env.inference.hypotheses import of_effects
+from fish_env.inference.policy import POLICY
+from fish_env.inference.problem import Point
+
+MORE = 3
+"""Most fits until one is converged."""
+
+
+def finished(own: Fit) -> Fit:
+    """A fit, iterated to convergence.
+
+    A few steps under a few noise models are enough to screen causes by. Published estimates have
+    to be the minimum, for their intervals to be true.
+    """
+    for _ in range(MORE):
+        free = Free(own.problem, own.effects, own.released)
+        vector = free.pack(own.point)
+        lin = own.linearised
+        hessian = information(lin.slopes, free.prior)
+        pull = gradient(lin.slopes, lin.residuals, free.prior, vector)
+        if (
+            predicted_decrease(hessian, pull, free.bounds.step(hessian, pull, vector))
+            < POLICY.converged
+        ):
+            break
+        again = fit(own.problem, own.effects, own.point, own.noise, own.released, rounds=2)
+        if again.objective > own.objective:
+            break
+        own = again
+    return own
+
+
+def refined(own: Fit) -> Fit:
+    """The fit in finer steps where an effect asks for them, if it was made without."""
+    if not own.problem.is_coarse(own.point.effects):
+        return own
+    problem = own.problem.with_refinement()
+    return fit(problem, own.effects, own.point, own.noise, own.released, rounds=1, iterations=3)
+
+
+def run_variation(own: Fit) -> Spread:
+    """What the runs of a fit differ in, as far as it is strongly indicated.
+
+    Args:
+        own: the fit; its weighting is held.
+    """
+    problem, usual = own.problem, np.array([v.usual for v in own.problem.variations])
+    free = Free(problem, own.effects, own.released)
+    vector, lin = free.pack(own.point), own.linearised
+    if lin.marginal is not None:
+        lin = linearise(problem, free, vector, own.noise, own.filtered)
+    steps = DIFFERENCE * usual
+    slopes = problem.variation_slopes(own.point, own.noise, own.filtered, steps) * usual
+    likelihood = Likelihood(
+        lin.residuals, lin.slopes, slopes, problem.variation / usual, lin.run_of,
+        information(lin.slopes, free.prior), free.prior * vector,
+        np.array([not v.shared for v in problem.variations]),
+    )  # fmt: skip
+    return fit_spread(likelihood, problem.variations)
+
+
+def with_run_variation(own: Fit, dropped: Collection[str] = ()) -> Fit:
+    """The fit, made again where its runs differ by more, or less, than it allows for.
+
+    A few runs tell no spread. Runs whose drive is uneven differ in everything: every spread is then
+    the usual one from the first fit on, and fits move the runs' numbers themselves.
+
+    Args:
+        own: the fit.
+        dropped: effects that the new fit goes without.
+    """
+    problem, noise = own.problem, own.noise
+    enough = problem.run_count >= POLICY.fewest_runs_for_spread
+    if problem.variations and enough and not problem.drive.uneven:
+        found = run_variation(own)
+        if found.sd.any() or own.noise.spread.any():
+            # The fit moves them, run by run, as far as that helps.
+            numbers = np.where(found.sd > 0.0, problem.variation, 0.0)
+            problem = problem.with_variation(numbers, own.point, own.noise)
+            noise = replace(own.noise, spread=found.sd)
+    if problem is own.problem and not dropped:
+        return own
+    effects = [name for name in own.effects if name not in dropped]
+    start = Point(own.point.z, of_effects(own.point.effects, effects))
+    return fit(problem, effects, start, noise, own.released, rounds=2)

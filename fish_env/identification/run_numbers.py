@@ -21,7 +21,7 @@ from fish_env.identification.sensor_errors import sensor_slopes
 from fish_env.identification.variation import VARIATIONS
 from fish_env.inference.problem import Point
 
-MOST_TURNS, AGREED = 4, 0.05
+MOST_TURNS, AGREED = 6, 0.05
 """In which errors and motion are worked out, and what they may differ by, in units of the noise."""
 
 
@@ -57,17 +57,20 @@ def renumbered(
         values: (R, K) the numbers.
         point: values of the shared parameters.
         noise: noise model.
-        near: the runs filtered at numbers close by, with their slopes; what errors do to samples
-            then follows from that motion, also where a run keeps its numbers.
+        near: the runs filtered at numbers close by, with their slopes; what other errors do to
+            samples then changes as that motion says, and where all runs keep their numbers it comes
+            nearer to what that motion says.
     """
     runs = list(problem.runs)
     own, errors = np.split(values, [len(VARIATIONS)], axis=1)
     if near:
-        every = zip(runs, own, errors, near, strict=True)
-        return [_undone(r.with_numbers(o, e), f, problem.channels) for r, o, e, f in every]
+        numbered = [run.with_numbers(*n) for run, *n in zip(runs, own, errors, strict=True)]
+        change = _undone if np.array_equal(values, _numbers(runs)) else _moved
+        pairs = zip(numbered, runs, near, strict=True)
+        return [change(run, before, f, problem.channels) for run, before, f in pairs]
     changed = []
     for i, run in enumerate(runs):
-        if not np.array_equal(np.r_[run.variation, run.sensor_errors], values[i]):
+        if not np.array_equal(_numbers([run])[0], values[i]):
             changed.append(i)
             runs[i] = run.with_numbers(own[i], errors[i])
     if not errors[changed].any():
@@ -75,8 +78,8 @@ def renumbered(
     moved, seen = [runs[i] for i in changed], [problem.runs[i] for i in changed]
     for _ in range(MOST_TURNS):
         filtered = problem.with_runs(seen).filtered(point, noise, (), True)
-        pairs = zip(moved, filtered, strict=True)
-        before, seen = seen, [_undone(run, one, problem.channels) for run, one in pairs]
+        turn = zip(moved, seen, filtered, strict=True)
+        before, seen = seen, [_undone(run, s, f, problem.channels) for run, s, f in turn]
         apart = [_apart(*p, problem.sensor_sd) for p in zip(before, seen, strict=True)]
         if max(apart) < AGREED:
             break
@@ -85,10 +88,40 @@ def renumbered(
     return runs
 
 
-def _undone(run: RunData, filtered: Filtered, channels: Sequence[str]) -> RunData:
-    """A run with what its errors do to its samples, at its filtered motion."""
+def _undone(run: RunData, seen: RunData, filtered: Filtered, channels: Sequence[str]) -> RunData:
+    """A run with what its errors do to its samples.
+
+    A motion that is late by a quarter of its period shows errors of the other sign, and turns that
+    went the whole way would swing for ever. So each goes half the way.
+
+    Args:
+        run: with its errors.
+        seen: the run with the errors that its motion was filtered with.
+        filtered: that motion, with its slopes.
+        channels: names of its channels.
+    """
+    moved = _moved(run, seen, filtered, channels).distortion
     slopes = sensor_slopes(run.clock, filtered, channels)
-    return replace(run, distortion=slopes @ run.sensor_errors)
+    return replace(run, distortion=0.5 * (moved + slopes @ run.sensor_errors))
+
+
+def _moved(run: RunData, seen: RunData, filtered: Filtered, channels: Sequence[str]) -> RunData:
+    """A run with what its errors do to its samples, by the change from other errors alone.
+
+    Args:
+        run: with its errors.
+        seen: the run with other errors, and what they do to its samples.
+        filtered: its motion, with its slopes.
+        channels: names of its channels.
+    """
+    slopes = sensor_slopes(run.clock, filtered, channels)
+    change = slopes @ (run.sensor_errors - seen.sensor_errors)
+    return replace(run, distortion=change if seen.distortion is None else seen.distortion + change)
+
+
+def _numbers(runs: Sequence[RunData]) -> FloatArray:
+    """(R, K) numbers of runs."""
+    return np.array([np.r_[run.variation, run.sensor_errors] for run in runs])
 
 
 def _apart(before: RunData, after: RunData, sensor_sd: FloatArray) -> float:

@@ -32,6 +32,7 @@ from fish_env.inference.preconditions import preconditions
 from fish_env.inference.probes import Cause, causes_of
 from fish_env.inference.problem import Problem
 from fish_env.inference.result import ResidualModel, Result
+from fish_env.inference.screening import screen
 from fish_env.inference.verdict import EXTENDING, Verdict, decide
 
 Report = Callable[[str], None]
@@ -264,7 +265,10 @@ def with_weaker_causes(
         rng: for null distributions.
         report: told what is being done.
     """
-    more = extended(attribution, causes, rng, FULL, report, POLICY.relaxed_log_p)
+    # Some of the causes that the last screen was made beside may have been dropped since.
+    shown = screen(attribution.accepted.fit, causes, rng)
+    begun = replace(attribution, screens=(*attribution.screens, shown))
+    more = extended(begun, causes, rng, FULL, report, POLICY.relaxed_log_p)
     if more.accepted.causes == attribution.accepted.causes:
         return attribution, left
     report("testing what is left")

@@ -61,6 +61,17 @@ def test_the_phase_behind_a_soft_tail_is_found(swum):
     assert np.sqrt(np.nanmean(errors**2)) == pytest.approx(1.0, abs=0.15)
 
 
+@pytest.mark.parametrize("away", [0.0, 0.5, 2.5])
+def test_a_phase_nearby_is_found_as_all_round(swum, away):
+    """Also from so far that it is not among the phases tried near: then all are tried."""
+    problem, (truth, _) = swum
+    state = problem.runs[0].state0.copy()
+    state[13] = truth + away
+    begun = problem.with_runs([replace(problem.runs[0], state0=state)])
+    near = settle_phases(begun, TRUTH, noise_of(problem), nearby=True)
+    assert off(near.runs[0].state0[13], truth) < 0.15
+
+
 def test_a_tail_that_beat_before_its_run_does_not_begin_unbent(swum):
     """It stands where the simulated one stood, a hundredth of a radian from its root."""
     problem, (phase, bent) = swum

@@ -62,6 +62,23 @@ def test_samples_put_right_do_not_depend_on_the_way_there(filtered):
     assert at_once.with_variation(numbers, point, noise).runs == at_once.runs
 
 
+def test_samples_put_right_by_a_motion_nearby_come_to_the_same(filtered):
+    """Each time from the motion that the last ones show: one filter a time, not up to four."""
+    problem, point, noise, _ = filtered
+    numbers = np.zeros_like(problem.variation)
+    own = {"camera_delay": 0.03, "inertial_smoothing": 1.0, "gyro_gain_r": 0.05}
+    for i, variation in enumerate(problem.variations):
+        numbers[:, i] = own.get(variation.name, 0.0)
+    exact = problem.with_variation(numbers, point, noise)
+    apart, moved = [], problem
+    for _ in range(7):
+        near = moved.filtered(point, noise, keep_slopes=True)
+        moved = moved.with_variation(numbers, point, noise, near)
+        off = (moved.runs[0].corrected - exact.runs[0].corrected) / problem.sensor_sd
+        apart.append(float(np.sqrt(np.nanmean(off**2))))
+    assert apart[-1] < 0.1 < 0.5 * apart[0]
+
+
 def test_a_late_camera_is_what_its_regressor_says(filtered):
     problem, _, _, (result,) = filtered
     (run,) = problem.runs

@@ -10,10 +10,12 @@ from fish_env.identification.open_loop import errors
 from fish_env.identification.runs import FINER, SWITCH_S
 from fish_env.identification.series import SeriesProblem
 from fish_env.inference.effort import QUICK
+from fish_env.inference.estimate.again import refined
+from fish_env.inference.estimate.fit import fit
 from fish_env.inference.estimate.free import Free, linearise
 from fish_env.inference.probes import causes_of, effect_values
 from fish_env.inference.problem import Point
-from tests.identification.synthetic import Setup, simulate
+from tests.identification.synthetic import PATHS, Setup, simulate
 
 LAG = {"effects.servo_lag.time_constant": 0.013}
 LIMIT = {"effects.servo_rate_limit.rate": 2.0}
@@ -131,6 +133,30 @@ def test_long_steps_are_those_of_the_usual_freedoms_and_never_finer(dataset):
     assert long.freedoms(["servo_lag"]) == usual.freedoms(["servo_lag"])
     pairs = zip(coarse.with_long_steps().runs, coarse.runs, strict=True)
     assert all((a.substeps <= b.substeps).all() for a, b in pairs)
+
+
+def test_estimates_to_be_published_are_made_in_the_usual_steps(dataset):
+    """However often a fit went to long steps, and on a part of its runs."""
+    usual = SeriesProblem(dataset)
+    long = usual.with_long_steps().with_long_steps().until(2.0)
+    assert long.is_coarse(())
+    assert not usual.is_coarse(())
+    again = long.with_refinement()
+    assert not again.is_coarse(())
+    assert again.runs[0].substeps.tolist() == usual.until(2.0).runs[0].substeps.tolist()
+    assert usual.without_refinement().is_coarse(LIMIT)
+    assert not usual.without_refinement().is_coarse(())
+
+
+def test_a_fit_in_long_steps_is_refined(dataset):
+    problem = SeriesProblem(dataset, paths=(PATHS[0],)).with_long_steps()
+    quick = fit(problem, rounds=1)
+    found = refined(quick)
+    exact = fit(SeriesProblem(dataset, paths=(PATHS[0],)), noise=quick.noise, rounds=1)
+    sd = np.sqrt(exact.covariance[0, 0])
+    assert found.problem.longest_step == pytest.approx(0.5 * problem.longest_step)
+    assert found.estimates[0] == pytest.approx(exact.estimates[0], abs=0.05 * sd)
+    assert refined(found) is found
 
 
 def gliding(dataset):

@@ -11,7 +11,7 @@ from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.estimate.free import DIFFERENCE, Free, linearise
 from fish_env.inference.estimate.gauss_newton import predicted_decrease
 from fish_env.inference.estimate.information import gradient, information
-from fish_env.inference.estimate.run_variation import Likelihood, Spread, fit_spread
+from fish_env.inference.estimate.spread import Likelihood, Spread, fit_spread
 from fish_env.inference.hypotheses import of_effects
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point

@@ -217,7 +217,7 @@ def least_of(problem: Problem, which: IntArray) -> FloatArray:
 
     Args:
         problem: says which cannot be negative.
-        which: (K,) their numbers.
+        which: (K,) which of them.
     """
     return np.array([0.0 if problem.variations[i].positive else -np.inf for i in which])
 

@@ -92,6 +92,7 @@ def descend_jointly(
     if not np.isfinite(at.value):
         raise np.linalg.LinAlgError("the simulation diverges at the start of the fit")
     for left in range(iterations, 0, -1):
+        at = _agreed(at, free, noise)
         model = _Model(free, noise, at)
         predicted = at.value - model.foreseen(*model.step(0.0))
         if predicted < tolerance**2 or at.value - left * predicted > give_up_above:
@@ -102,10 +103,8 @@ def descend_jointly(
         gained, at = at.value - better.value, better
         if gained < ENOUGH:
             break
-    point = free.unpack(at.vector)
-    agreed = at.problem.with_variation(at.problem.variation, point, noise, at.filtered)
-    at = _evaluated(agreed, free, at.vector, noise)
-    marginal = marginal_of(at.problem, point, noise, at.filtered)
+    at = _agreed(at, free, noise)
+    marginal = marginal_of(at.problem, free.unpack(at.vector), noise, at.filtered)
     assert marginal is not None
     value = objective_with(free, at.vector, at.filtered, marginal)
     return at.problem, at.vector, value, at.filtered, marginal
@@ -121,6 +120,19 @@ def _evaluated(problem: Problem, free: Free, vector: FloatArray, noise: Any) -> 
     own = problem.variation[:, active] / spreads[active]
     value = objective_with(free, vector, filtered) + float(np.sum(own * own))
     return Joint(problem, vector, filtered, value if np.isfinite(value) else np.inf)
+
+
+def _agreed(at: Joint, free: Free, noise: Any) -> Joint:
+    """The same numbers, with what follows from the motion nearer to that motion.
+
+    Steps are then compared with what they begin from: the value may have risen.
+    """
+    problem = at.problem
+    if not problem.variation.any():
+        return at
+    moved = problem.with_variation(problem.variation, free.unpack(at.vector), noise, at.filtered)
+    agreed = _evaluated(moved, free, at.vector, noise)
+    return agreed if np.isfinite(agreed.value) else at
 
 
 class _Model:

@@ -101,6 +101,7 @@ def _undone(run: RunData, seen: RunData, filtered: Filtered, channels: Sequence[
         channels: names of its channels.
     """
     moved = _moved(run, seen, filtered, channels).distortion
+    assert moved is not None
     slopes = sensor_slopes(run.clock, filtered, channels)
     return replace(run, distortion=0.5 * (moved + slopes @ run.sensor_errors))
 

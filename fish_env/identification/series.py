@@ -36,7 +36,7 @@ from fish_env.identification.run_numbers import renumbered
 from fish_env.identification.runs import FINER, RunData, prepare_run
 from fish_env.identification.sensor_errors import slopes_of_runs
 from fish_env.identification.sensors import largest_jitter_of, largest_noise
-from fish_env.identification.tail_drive import TailDrive
+from fish_env.identification.tail_drive import LATE, TailDrive
 from fish_env.identification.variation import EVERY, VARIATIONS
 from fish_env.identification.variation_slopes import swum_slopes
 from fish_env.inference.estimate.fit import Fit
@@ -66,6 +66,7 @@ class SeriesProblem(Problem):
 
     known: dict[str, Effect]
     out_of_step = ("frequency_scale", "battery_sag", "clock_scale", "clock_skew")
+    hidden_by_drive = LATE
     interchangeable = ALIKE
     variations = EVERY
 
@@ -81,23 +82,19 @@ class SeriesProblem(Problem):
     ) -> None:
         self.dataset, self.fish = dataset, fish or load_fish(dataset.fish)
         self.known = {**catalogue(), **{e.name: e for e in user_effects}}
-        own = tuple(effect for effect in self.known.values() if effect.name not in catalogue())
-        self.model: ExtendedModel = build_model(
-            self.fish, user_effects=(*own, APPLIED_WRENCH), whole_catalogue=True
-        )
+        own = (*(e for e in self.known.values() if e.name not in catalogue()), APPLIED_WRENCH)
+        self.model: ExtendedModel = build_model(self.fish, user_effects=own, whole_catalogue=True)
         self.dt = dt = dt / self.model.substeps(dt)
         self.channels = usable_channels(dataset.channels)
-        self.sensor_sd = np.array(
-            [dataset.noise.get(n) or white_noise_sd(dataset, n) for n in self.channels]
-        )
+        given = dataset.noise.get
+        self.sensor_sd = np.array([given(n) or white_noise_sd(dataset, n) for n in self.channels])
         self.runs = tuple(
             prepare_run(dataset.run(i), self.channels, self.sensor_sd, dt)
             for i in (dataset.ids if run_ids is None else run_ids)
         )
         self.baseline = Baseline(self.fish, paths)
         self.effects = tuple(effects)
-        self.unrefined = False
-        self.drive: TailDrive = TailDrive()
+        self.unrefined, self.drive = False, TailDrive()
         self._filters: dict[frozenset[str], RunFilter] = {}
         unknown = [name for name in self.effects if name not in self.known]
         if unknown:

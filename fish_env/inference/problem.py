@@ -56,6 +56,7 @@ class Problem(Protocol):
         run_count: number of runs.
         out_of_step: effects that put a periodic drive out of step by more and more; after whole
             periods no small change tells which way to go.
+        hidden_by_drive: effects that no slope shows while the phase of an uneven drive walks.
         interchangeable: sets of coefficients that act alike.
         variations: what runs may differ in, K of them.
         drive: what was measured of a periodic drive.
@@ -66,6 +67,7 @@ class Problem(Protocol):
     baseline: Coefficients
     effects: tuple[str, ...] = ()
     out_of_step: tuple[str, ...] = ()
+    hidden_by_drive: tuple[str, ...] = ()
     interchangeable: tuple[frozenset[str], ...] = ()
     variations: tuple[RunVariation, ...] = ()
     drive: Drive = Drive()

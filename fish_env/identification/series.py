@@ -94,10 +94,10 @@ class SeriesProblem(Problem):
         )
         self.baseline = Baseline(self.fish, paths)
         self.effects = tuple(effects)
-        self.unrefined, self.drive = False, TailDrive()
+        self.unrefined = False
+        self.drive: TailDrive = TailDrive()
         self._filters: dict[frozenset[str], RunFilter] = {}
-        unknown = [name for name in self.effects if name not in self.known]
-        if unknown:
+        if unknown := [name for name in self.effects if name not in self.known]:
             raise EffectError(f"unknown effects {unknown}; known: {', '.join(self.known)}")
 
     @property

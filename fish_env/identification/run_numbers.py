@@ -17,7 +17,7 @@ from fish_env.arrays import FloatArray
 from fish_env.identification.filtering import Filtered
 from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.runs import RunData
-from fish_env.identification.sensor_errors import sensor_slopes
+from fish_env.identification.sensor_errors import sensor_distortion, sensor_slopes
 from fish_env.identification.variation import VARIATIONS
 from fish_env.inference.problem import Point
 
@@ -102,8 +102,8 @@ def _undone(run: RunData, seen: RunData, filtered: Filtered, channels: Sequence[
     """
     moved = _moved(run, seen, filtered, channels).distortion
     assert moved is not None
-    slopes = sensor_slopes(run.clock, filtered, channels)
-    return replace(run, distortion=0.5 * (moved + slopes @ run.sensor_errors))
+    whole = sensor_distortion(run.clock, filtered, channels, run.sensor_errors)
+    return replace(run, distortion=0.5 * (moved + whole))
 
 
 def _moved(run: RunData, seen: RunData, filtered: Filtered, channels: Sequence[str]) -> RunData:
@@ -115,7 +115,7 @@ def _moved(run: RunData, seen: RunData, filtered: Filtered, channels: Sequence[s
         filtered: its motion, with its slopes.
         channels: names of its channels.
     """
-    slopes = sensor_slopes(run.clock, filtered, channels)
+    slopes = sensor_slopes(run.clock, filtered, channels, seen.sensor_errors)
     change = slopes @ (run.sensor_errors - seen.sensor_errors)
     return replace(run, distortion=change if seen.distortion is None else seen.distortion + change)
 

@@ -11,8 +11,10 @@ regressors are then those of the corrected motion.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfilt
 
 from fish_env.arrays import FloatArray
@@ -34,34 +36,42 @@ _DEVICE = {
     "z": "depth_delay",
 }
 _ROWS = {"velocity": [BY_NAME[n].index for n in "uvw"], "rate": [BY_NAME[n].index for n in "pqr"]}
+_DELAYS = ("camera_delay", "inertial_delay", "depth_delay")
+_SMOOTHED = ("roll", "pitch", "yaw", "p", "q", "r")
 _INERTIAL = ("roll", "pitch", "p", "q", "r")
 """Channels of which one at least says that there is an inertial unit. Without one a camera reads
 the heading too."""
 _ATTITUDE, _RATES, _PLACE = ("roll", "pitch", "yaw"), ("p", "q", "r"), ("x", "y", "z")
 
 
-def sensor_slopes(clock: FloatArray, filtered: Filtered, channels: Sequence[str]) -> FloatArray:
+def sensor_slopes(
+    clock: FloatArray,
+    filtered: Filtered,
+    channels: Sequence[str],
+    errors: FloatArray | None = None,
+) -> FloatArray:
     """Change of every sample by every sensor error, at the filtered motion, shape (T, C, K).
 
     Args:
         clock: (T,) times of the samples (s).
         filtered: the run filtered, with its slopes.
         channels: names of its C channels.
+        errors: (K,) where the slopes are taken; default: no errors.
 
     Raises:
         ValueError: the filter kept no slopes.
     """
-    states, euler, change = _predicted(clock, filtered)
-    rates = states[:, [BY_NAME[name].index for name in _RATES]]
+    errors = np.zeros(len(SENSOR_ERRORS)) if errors is None else errors
+    motion = _predicted(clock, filtered)
+    states, euler = motion.states, motion.euler
+    rates = states[:, _ROWS["rate"]]
     place = states[:, :3] - states[0, :3]
     found = np.zeros((len(clock), len(channels), len(SENSOR_ERRORS)))
     at = {name: i for i, name in enumerate(channels)}
-    device = _DEVICE if _has_inertial_unit(channels) else {**_DEVICE, "yaw": "camera_delay"}
-    for name, i in at.items():
-        if name in device:
-            found[:, i, _INDEX[device[name]]] = -change[name]
-    for name, values in (*zip(_ATTITUDE, euler.T, strict=True), *zip(_RATES, rates.T, strict=True)):
-        _put(found, at, name, "inertial_smoothing", _smoothed(clock, values) - values)
+    for late in _late(clock, motion, channels, errors):
+        _put(found, at, late.name, late.delay, late.by_delay)
+        if late.by_smoothing is not None:
+            _put(found, at, late.name, "inertial_smoothing", late.by_smoothing)
     turns, kinematics = rotations(euler), euler_rates(euler)
     for k, axis in enumerate(_PLACE):
         for j, name in enumerate(_PLACE):
@@ -87,6 +97,80 @@ def sensor_slopes(clock: FloatArray, filtered: Filtered, channels: Sequence[str]
     return found
 
 
+def sensor_distortion(
+    clock: FloatArray, filtered: Filtered, channels: Sequence[str], errors: FloatArray
+) -> FloatArray:
+    """What sensor errors do to every sample, at the filtered motion, shape (T, C).
+
+    All are linear in it but delays: of a signal that is late by a tenth of its period, its slope
+    with time tells only four fifths.
+
+    Args:
+        clock: (T,) times of the samples (s).
+        filtered: the run filtered, with its slopes.
+        channels: names of its C channels.
+        errors: (K,) of the sensors.
+
+    Raises:
+        ValueError: the filter kept no slopes.
+    """
+    linear = errors.copy()
+    linear[[_INDEX[name] for name in (*_DELAYS, "inertial_smoothing")]] = 0.0
+    found = np.asarray(sensor_slopes(clock, filtered, channels) @ linear)
+    motion, absent = _predicted(clock, filtered), _absent(channels)
+    at = {name: i for i, name in enumerate(channels)}
+    for late in _late(clock, motion, channels, errors):
+        if late.delay not in absent:
+            found[:, at[late.name]] += late.change
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Late:
+    """A channel that a device smooths and passes on late.
+
+    Attributes:
+        name: the channel.
+        delay: the error that says how late.
+        change: (T,) of its samples.
+        by_delay: (T,) slope of that.
+        by_smoothing: (T,) likewise; None where the device smooths nothing.
+    """
+
+    name: str
+    delay: str
+    change: FloatArray
+    by_delay: FloatArray
+    by_smoothing: FloatArray | None = None
+
+
+def _late(
+    clock: FloatArray, motion: _Motion, channels: Sequence[str], errors: FloatArray
+) -> list[_Late]:
+    """Every channel with what its device's filter and delay do to it.
+
+    What a delay does is the integral of the predicted rate of change: the channel itself jumps at
+    each sample by what that corrects.
+    """
+    inertial = _has_inertial_unit(channels)
+    device = _DEVICE if inertial else {**_DEVICE, "yaw": "camera_delay"}
+    size, found = errors[_INDEX["inertial_smoothing"]], []
+    for name in channels:
+        if name not in device:
+            continue
+        seen = np.maximum(clock - float(errors[_INDEX[device[name]]]), clock[0])
+        rate = CubicSpline(clock, motion.change[name])
+        path = rate.antiderivative()
+        change, by_delay, by_smoothing = path(seen) - path(clock), -rate(seen), None
+        if inertial and name in _SMOOTHED:
+            values = motion.of(name)
+            taken = CubicSpline(clock, _smoothed(clock, values) - values)
+            by_smoothing = taken(seen)
+            change, by_delay = change + size * by_smoothing, by_delay - size * taken(seen, 1)
+        found.append(_Late(name, device[name], change, by_delay, by_smoothing))
+    return found
+
+
 def _has_inertial_unit(channels: Sequence[str]) -> bool:
     return not set(_INERTIAL).isdisjoint(channels)
 
@@ -107,15 +191,35 @@ def _smoothed(clock: FloatArray, values: FloatArray) -> FloatArray:
     The delay of such a filter is a good part of a beat: no slope with time says what it does.
     """
     even = np.arange(clock[0], clock[-1] + FINE_S, FINE_S)
-    along = np.interp(even, clock, values) - values[0]
+    # Straight lines between samples would take a fiftieth off a beat of 2 Hz seen at 25 Hz.
+    along = CubicSpline(clock, values)(np.minimum(even, clock[-1])) - values[0]
     filtered = np.asarray(sosfilt(_LOW_PASS, along))
     return np.asarray(np.interp(clock, even, filtered) + values[0], float)
 
 
-def _predicted(
-    clock: FloatArray, filtered: Filtered
-) -> tuple[FloatArray, FloatArray, dict[str, FloatArray]]:
-    """States (T, states) and Euler angles (T, 3) as predicted, and each channel's rate of change.
+@dataclass(frozen=True, eq=False)
+class _Motion:
+    """A run as predicted, one sample ahead.
+
+    Attributes:
+        states: (T, states).
+        euler: (T, 3) angles.
+        change: rate of change (T,) of each channel.
+    """
+
+    states: FloatArray
+    euler: FloatArray
+    change: dict[str, FloatArray]
+
+    def of(self, channel: str) -> FloatArray:
+        """An angle or rate (T,)."""
+        if channel in _ATTITUDE:
+            return self.euler[:, _ATTITUDE.index(channel)]
+        return self.states[:, BY_NAME[channel].index]
+
+
+def _predicted(clock: FloatArray, filtered: Filtered) -> _Motion:
+    """The motion as predicted.
 
     A sample's own noise is in the filtered state, and would make its regressor follow its
     innovation. The prediction from the samples before is free of it.
@@ -139,7 +243,7 @@ def _predicted(
     drift = np.einsum("tij,tj->ti", rotations(euler), states[:, _ROWS["velocity"]])
     turn = np.einsum("tij,tj->ti", kinematics, states[:, _ROWS["rate"]])
     change |= dict(zip(_PLACE, drift.T, strict=True)) | dict(zip(_ATTITUDE, turn.T, strict=True))
-    return states, euler, change
+    return _Motion(states, euler, change)
 
 
 def _slopes(filtered: Filtered) -> Slopes:
@@ -164,10 +268,11 @@ def slopes_of_runs(
     """
     parts = [
         innovation_slopes(
-            run.clock, run.measured, one, correlation_s, sensor_slopes(run.clock, one, channels)
+            run.clock, run.measured, one, correlation_s,
+            sensor_slopes(run.clock, one, channels, run.sensor_errors),
         )
         for run, one in zip(runs, filtered, strict=True)
-    ]
+    ]  # fmt: skip
     return np.concatenate(parts)
 
 

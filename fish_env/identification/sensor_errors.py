@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import BSpline, CubicHermiteSpline, make_interp_spline
 from scipy.signal import butter, sosfilt
 
 from fish_env.arrays import FloatArray
@@ -159,14 +159,13 @@ def _late(
         if name not in device:
             continue
         seen = np.maximum(clock - float(errors[_INDEX[device[name]]]), clock[0])
-        rate = CubicSpline(clock, motion.change[name])
+        rate = make_interp_spline(clock, motion.change[name], k=1)
         path = rate.antiderivative()
         change, by_delay, by_smoothing = path(seen) - path(clock), -rate(seen), None
         if inertial and name in _SMOOTHED:
-            values = motion.of(name)
-            taken = CubicSpline(clock, _smoothed(clock, values) - values)
+            taken = _taken(clock, motion.of(name), motion.change[name])
             by_smoothing = taken(seen)
-            change, by_delay = change + size * by_smoothing, by_delay - size * taken(seen, 1)
+            change, by_delay = change + size * by_smoothing, by_delay - size * taken(seen, nu=1)
         found.append(_Late(name, device[name], change, by_delay, by_smoothing))
     return found
 
@@ -185,16 +184,18 @@ def _absent(channels: Sequence[str]) -> list[str]:
     return [name for name in _INDEX if name.startswith(absent)] if absent else []
 
 
-def _smoothed(clock: FloatArray, values: FloatArray) -> FloatArray:
-    """Samples (T,) as an inertial unit passes them on that has settled on the first of them.
+def _taken(clock: FloatArray, values: FloatArray, rate: FloatArray) -> BSpline:
+    """What an inertial unit's filter takes from samples (T,), settled on the first of them.
 
     The delay of such a filter is a good part of a beat: no slope with time says what it does.
+    Between two samples the channel follows from both and its rates there, and from none after: with
+    that the regressor would follow its innovation. Straight lines would take a fiftieth off a beat
+    of 2 Hz seen at 25 Hz.
     """
     even = np.arange(clock[0], clock[-1] + FINE_S, FINE_S)
-    # Straight lines between samples would take a fiftieth off a beat of 2 Hz seen at 25 Hz.
-    along = CubicSpline(clock, values)(np.minimum(even, clock[-1])) - values[0]
-    filtered = np.asarray(sosfilt(_LOW_PASS, along))
-    return np.asarray(np.interp(clock, even, filtered) + values[0], float)
+    path = CubicHermiteSpline(clock, values, rate)(np.minimum(even, clock[-1]))
+    filtered = np.asarray(sosfilt(_LOW_PASS, path - values[0])) + values[0]
+    return make_interp_spline(even, filtered - path, k=1)
 
 
 @dataclass(frozen=True, eq=False)

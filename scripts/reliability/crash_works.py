@@ -14,7 +14,7 @@ import numpy as np
 from fish_env.diagnosis import diagnose
 from fish_env.files import write_bytes
 from robofish_agents.policies import read_policy
-from robofish_agents.training.callback import Quiet
+from robofish_agents.training.books import Quiet
 from robofish_agents.training.config import Evaluation, Ppo, TrainConfig
 from robofish_agents.training.run import CHECKPOINT, CONFIG, POLICY, train
 from scripts import benchmark_diagnosis

@@ -193,7 +193,9 @@ def descendants(process: int) -> list[int]:
 
 def kill_while_writing(work: Work, folder: Path, writes: int, rng: np.random.Generator) -> bool:
     """As :func:`kill_at_random`, for a kill after one of the openings and renamings of files."""
-    kill_at = int(rng.integers(1, max(2, writes // 2)))
+    # A work that goes on where it stopped writes less the next time.
+    last = writes if work.begins_anew else writes // 2
+    kill_at = int(rng.integers(1, max(2, last + 1)))
     return _killed(work, folder, start(work, folder, kill_at, rng.uniform(0.0, AFTER_EVENT_S)))
 
 

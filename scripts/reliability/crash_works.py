@@ -34,12 +34,14 @@ class Work(ABC):
         name: short name.
         promise: what is promised to be equal, in words.
         kills_each: kills in one folder before it may end.
+        begins_anew: whether each start does all of it again.
         elsewhere: whether other processes than the one that is started do the work and write.
     """
 
     name: str
     promise: str
     kills_each = 3
+    begins_anew = False
     elsewhere = False
 
     @abstractmethod
@@ -98,6 +100,7 @@ class Diagnosis(Work):
 
     name = "diagnose"
     kills_each = 6
+    begins_anew = True
     promise = "every file whole, old or new, after each kill; the answer equal but for its runtime"
     picture = b"a picture that the user put there"
 

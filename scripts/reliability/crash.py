@@ -244,6 +244,7 @@ def torment(
                 _check(work, folder, ended(start(work, folder), block=True))
                 break
             moment, started = MOMENTS[done % 2], time.monotonic()
+            fresh = work.begins_anew or not folder.exists()
             try:
                 if moment == MOMENTS[0]:
                     killed = kill_at_random(work, folder, usual_s, rng)
@@ -252,7 +253,7 @@ def torment(
                 else:
                     killed = kill_while_writing(work, folder, writes, rng)
                 if not killed:
-                    if work.begins_anew:  # the first time also reads and compiles
+                    if fresh:  # the first time also reads and compiles
                         usual_s = min(usual_s, time.monotonic() - started)
                     break
             except RuntimeError as error:

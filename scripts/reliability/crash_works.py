@@ -177,6 +177,7 @@ class Sweep(Work):
     """`robofish sweep` over two seeds; each start continues what the last one left."""
 
     name = "sweep"
+    kills_each = 5
     promise = "every policy and evaluation, bit for bit, and the table"
     elsewhere = True
     config = replace(Training.config, name="crash", total_steps=6144)

@@ -31,6 +31,7 @@ class Sb3Engine:
     def __init__(self, config: TrainConfig, stack: Stack) -> None:
         self.config, self.stack = config, stack
         self.model = make_model(config, stack)
+        self._log: logger.Logger | None = None
 
     def imitate(self) -> None:
         """Fits policy and values to the configuration's teacher."""
@@ -45,8 +46,9 @@ class Sb3Engine:
 
     def log_to(self, folder: Path) -> Callable[[str, float], object]:
         """Opens a TensorBoard log in a folder; what it gives back records a name and a value."""
-        self.model.set_logger(logger.configure(str(folder), ["tensorboard"]))
-        return self.model.logger.record
+        self._log = logger.configure(str(folder), ["tensorboard"])
+        self.model.set_logger(self._log)
+        return self._log.record
 
     def policy(self, about: Mapping[str, Any]) -> PolicyFile:
         """The present deterministic policy, with a card."""
@@ -62,4 +64,6 @@ class Sb3Engine:
         restore_learner(self.model, state)
 
     def close(self) -> None:
-        """Nothing was started."""
+        """Ends the log, which has a thread."""
+        if self._log is not None:
+            self._log.close()

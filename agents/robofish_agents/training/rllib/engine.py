@@ -104,6 +104,7 @@ class RllibEngine:
     def log_to(self, folder: Path) -> Callable[[str, float], object]:
         """Opens a TensorBoard log in a folder; what it gives back records a name and a value."""
         self._log = logger.configure(str(folder), ["tensorboard"])
+        self._open.callback(self._log.close)
         return self._log.record
 
     def learn(self, books: Books) -> None:
@@ -169,5 +170,5 @@ class RllibEngine:
         restore_random(state["random"])
 
     def close(self) -> None:
-        """Ends what was started: the algorithm, and Ray if it was not running before."""
+        """Ends what was started: log, algorithm, and Ray if it was not running before."""
         self._open.close()

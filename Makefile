@@ -88,7 +88,7 @@ FUZZ_SECONDS ?= 600
 fuzz-guided: $(VENV)/.with-reliability  ## fuzz each reader, led by coverage, for FUZZ_SECONDS (600)
 	$(BIN)/python -m scripts.reliability.guided_fuzz --seconds $(FUZZ_SECONDS)
 
-crash: setup  ## test the rig, kill training, diagnosis and suite 30 times each, compare what comes of them
+crash: $(VENV)/.with-ray  ## test the rig, kill training, diagnosis, suite and sweep 30 times each, compare the ends
 	$(BIN)/python -m pytest tests/reliability/rig_crash.py
 	$(BIN)/python -m scripts.reliability.crash
 
@@ -96,7 +96,7 @@ SOAK_HOURS ?= 8
 soak: setup  ## 1e8 steps of the batch, then train, evaluate and diagnose for SOAK_HOURS (8)
 	$(BIN)/python -m scripts.reliability.soak --hours $(SOAK_HOURS)
 
-ray: $(VENV)/.with-ray  ## test campaigns and sweeps on a Ray cluster that loses a node, see docs/cluster.md
+ray: $(VENV)/.with-ray  ## test campaigns and sweeps on a Ray cluster that loses a node, and training with RLlib
 	$(BIN)/python -m pytest tests/cluster/ray_*.py
 
 versions: $(VENV)/.with-reliability  ## run tests on the oldest and newest supported versions

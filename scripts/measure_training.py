@@ -17,7 +17,7 @@ from typing import Any
 from rich.console import Console
 
 from robofish_agents.sweep.plan import plan
-from robofish_agents.training.callback import Quiet
+from robofish_agents.training.books import Quiet
 from robofish_agents.training.run import train
 from scripts.bench.harness import machine, versions
 from scripts.results import RESULTS, ROOT, kept, write_dated

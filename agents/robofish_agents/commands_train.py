@@ -23,8 +23,16 @@ def train(
         bool, typer.Option("--resume", help="Continue the training in the folder.")
     ] = False,
     trust_effects: TrustEffects = False,
+    engine: Annotated[
+        str | None,
+        typer.Option(
+            help="Library that learns, instead of the file's: sb3 (Stable-Baselines3) or rllib "
+            "(Ray RLlib).",
+            show_default=False,
+        ),
+    ] = None,
 ) -> None:
-    """Train a policy with Stable-Baselines3.
+    """Train a policy with Stable-Baselines3 or Ray RLlib.
 
     Writes `policy.npz`, which runs without PyTorch, its `card.yaml`, checkpoints, evaluations and
     a TensorBoard log. After a stop, `--resume` continues to the same result.
@@ -36,7 +44,7 @@ def train(
 
     from robofish_agents.training.command import run
 
-    run(Console(), config, out, seed, steps, resume, trust_effects)
+    run(Console(), config, out, seed, steps, resume, trust_effects, engine)
 
 
 def register(app: typer.Typer) -> None:

@@ -21,7 +21,7 @@ from robofish_agents.evaluation.metrics import METRICS
 from robofish_agents.evaluation.record import swim_suite
 from robofish_agents.policies import PretrainedPolicy, shipped
 from robofish_agents.registry import Agent
-from robofish_agents.training.callback import Quiet
+from robofish_agents.training.books import Quiet
 from robofish_agents.training.config import TrainConfig
 from robofish_agents.training.run import train
 from scripts.loop.declaration import Declaration

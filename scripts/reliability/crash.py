@@ -1,4 +1,4 @@
-"""Kills trainings, diagnoses and suites over and over, and compares what comes of them.
+"""Kills trainings, diagnoses, suites and sweeps over and over, and compares what comes of them.
 
     python -m scripts.reliability.crash               # 30 kills of each; one file each in results/
     python -m scripts.reliability.crash --only train --kills 5
@@ -6,7 +6,10 @@
 Each work runs in a process of its own, which gets SIGKILL: at a random moment, or while a file is
 being written. It is then started again in the same folder, until it ends by itself. What it leaves
 must equal what a process leaves that nobody killed. A difference ends the rig with status 1.
-Sweeps and campaigns are killed by ``make ray``.
+
+A sweep trains in other processes, which Ray starts. At a random moment the process of the sweep
+alone is killed; while one of the others is writing, all of them are killed, as by a power cut.
+Campaigns are killed by ``make ray``.
 """
 
 from __future__ import annotations
@@ -21,6 +24,7 @@ import threading
 import time
 import traceback
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -147,9 +151,51 @@ def kill_at_random(work: Work, folder: Path, usual_s: float, rng: np.random.Gene
     return _killed(work, folder, process)
 
 
+def kill_all_while_writing(
+    work: Work, folder: Path, usual_s: float, rng: np.random.Generator
+) -> bool:
+    """As :func:`kill_at_random`, for a work whose other processes write.
+
+    After a random moment of the first three quarters of its usual time, the next unfinished file
+    that is seen in the folder gets the work and all processes that it started killed.
+    """
+    process = start(work, folder)
+    known, since = parts_in(folder), time.monotonic() + rng.uniform(0.0, 0.75 * usual_s)
+    while True:
+        status = ended(process, block=False)
+        if status is not None:
+            _check(work, folder, status)
+            return False
+        late = time.monotonic() >= since
+        present = parts_in(folder) if late else set()
+        if present - known:
+            break
+        time.sleep(0.0005 if late else 0.01)
+    time.sleep(rng.uniform(0.0, AFTER_EVENT_S))
+    for each in [*descendants(process), process]:
+        with suppress(ProcessLookupError):
+            os.kill(each, signal.SIGKILL)
+    return _killed(work, folder, process)
+
+
+def descendants(process: int) -> list[int]:
+    """The processes that a process started, and those that these started, as Linux lists them."""
+    parents: dict[int, int] = {}
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        with suppress(OSError):
+            parents[int(stat.parent.name)] = int(stat.read_text().rpartition(")")[2].split()[1])
+    found, new = [], {process}
+    while new:
+        new = {child for child, parent in parents.items() if parent in new}
+        found += sorted(new)
+    return found
+
+
 def kill_while_writing(work: Work, folder: Path, writes: int, rng: np.random.Generator) -> bool:
     """As :func:`kill_at_random`, for a kill after one of the openings and renamings of files."""
-    kill_at = int(rng.integers(1, max(2, writes // 2)))
+    # A work that goes on where it stopped writes less the next time.
+    last = writes if work.begins_anew else writes // 2
+    kill_at = int(rng.integers(1, max(2, last + 1)))
     return _killed(work, folder, start(work, folder, kill_at, rng.uniform(0.0, AFTER_EVENT_S)))
 
 
@@ -186,7 +232,7 @@ def torment(
     score.uninterrupted_s = round(time.monotonic() - begun, 2)
     writes = int((place / WRITES).read_text(encoding="utf-8"))
     wanted = work.outcome(place / "whole")
-    attempts, late = 0, begun + 60.0 * most_minutes
+    attempts, late, usual_s = 0, begun + 60.0 * most_minutes, score.uninterrupted_s
     while sum(score.kills.values()) < kills and time.monotonic() < late:
         folder = place / f"killed-{score.ends}"
         while True:
@@ -197,13 +243,18 @@ def torment(
             if enough or attempts % (work.kills_each + 1) == 0:
                 _check(work, folder, ended(start(work, folder), block=True))
                 break
-            moment = MOMENTS[done % 2]
+            moment, started = MOMENTS[done % 2], time.monotonic()
+            fresh = work.begins_anew or not folder.exists()
             try:
                 if moment == MOMENTS[0]:
-                    killed = kill_at_random(work, folder, score.uninterrupted_s, rng)
+                    killed = kill_at_random(work, folder, usual_s, rng)
+                elif work.elsewhere:
+                    killed = kill_all_while_writing(work, folder, usual_s, rng)
                 else:
                     killed = kill_while_writing(work, folder, writes, rng)
                 if not killed:
+                    if fresh:  # the first time also reads and compiles
+                        usual_s = min(usual_s, time.monotonic() - started)
                     break
             except RuntimeError as error:
                 score.different.append(f"after {done} kills: {error}")

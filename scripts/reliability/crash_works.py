@@ -1,4 +1,4 @@
-"""What the crash rig kills: a training, a diagnosis, a suite of hidden effects."""
+"""What the crash rig kills: a training, a diagnosis, a suite of hidden effects, a sweep."""
 
 from __future__ import annotations
 
@@ -6,17 +6,19 @@ import hashlib
 import json
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import yaml
 
 from fish_env.diagnosis import diagnose
-from fish_env.files import write_bytes
+from fish_env.files import write_bytes, write_text
 from robofish_agents.policies import read_policy
-from robofish_agents.training.callback import Quiet
+from robofish_agents.training.books import Quiet
 from robofish_agents.training.config import Evaluation, Ppo, TrainConfig
-from robofish_agents.training.run import CHECKPOINT, CONFIG, POLICY, train
+from robofish_agents.training.run import CHECKPOINT, CONFIG, EVALUATIONS, POLICY, train
 from scripts import benchmark_diagnosis
 from tests.diagnosis.small_cases import small_case
 from tests.hidden.stubs import all_knowing
@@ -32,11 +34,15 @@ class Work(ABC):
         name: short name.
         promise: what is promised to be equal, in words.
         kills_each: kills in one folder before it may end.
+        begins_anew: whether each start does all of it again.
+        elsewhere: whether other processes than the one that is started do the work and write.
     """
 
     name: str
     promise: str
     kills_each = 3
+    begins_anew = False
+    elsewhere = False
 
     @abstractmethod
     def run(self, folder: Path) -> None:
@@ -49,6 +55,23 @@ class Work(ABC):
     def damage(self, folder: Path, whole: Path) -> list[str]:
         """What is damaged in a folder right after a kill, in words."""
         return []
+
+
+def trained(folder: Path) -> Outcome:
+    """Checksums of the arrays of a run folder's policy, and its evaluations without times."""
+    network = read_policy(folder / POLICY).network
+    arrays = [network.mean, network.scale, *network.weights, *network.biases]
+    return {
+        "policy": [_sum(np.ascontiguousarray(array).tobytes()) for array in arrays],
+        "evaluations": timeless(folder / EVALUATIONS),
+    }
+
+
+def timeless(table: Path) -> list[list[str]]:
+    """The rows of a table, without the columns that hold times."""
+    rows = [row.split(",") for row in table.read_text(encoding="utf-8").splitlines()]
+    kept = [i for i, key in enumerate(rows[0]) if not key.endswith("_s")]
+    return [[row[i] for i in kept] for row in rows]
 
 
 class Training(Work):
@@ -69,16 +92,7 @@ class Training(Work):
 
     def outcome(self, folder: Path) -> Outcome:
         """Checksums of the policy's arrays, and the evaluations without times."""
-        network = read_policy(folder / POLICY).network
-        arrays = [network.mean, network.scale, *network.weights, *network.biases]
-        rows = (folder / "evaluations.csv").read_text(encoding="utf-8").splitlines()
-        timed = [i for i, key in enumerate(rows[0].split(",")) if key.endswith("_s")]
-        return {
-            "policy": [_sum(np.ascontiguousarray(array).tobytes()) for array in arrays],
-            "evaluations": [
-                [cell for i, cell in enumerate(row.split(",")) if i not in timed] for row in rows
-            ],
-        }
+        return trained(folder)
 
 
 class Diagnosis(Work):
@@ -86,6 +100,7 @@ class Diagnosis(Work):
 
     name = "diagnose"
     kills_each = 6
+    begins_anew = True
     promise = "every file whole, old or new, after each kill; the answer equal but for its runtime"
     picture = b"a picture that the user put there"
 
@@ -158,9 +173,39 @@ class Suite(Work):
         return rows | {k: v for k, v in content.items() if k not in ("date", "commit")}
 
 
+class Sweep(Work):
+    """`robofish sweep` over two seeds; each start continues what the last one left."""
+
+    name = "sweep"
+    kills_each = 5
+    promise = "every policy and evaluation, bit for bit, and the table"
+    elsewhere = True
+    config = replace(Training.config, name="crash", total_steps=6144)
+
+    def run(self, folder: Path) -> None:
+        """Trains what is not finished; Ray keeps its own files beside the folders."""
+        # Ray must not be imported before this process is forked.
+        from fish_env.cluster import ClusterSettings
+        from robofish_agents.sweep.plan import plan
+        from robofish_agents.sweep.run import run_sweep
+
+        file = folder / "crash.yaml"
+        if not file.exists():
+            write_text(file, yaml.safe_dump(self.config.tree()))
+        temp = folder.parent / "ray"
+        run_sweep(plan(file, "0,1"), folder / "out", ClusterSettings(cpus=1, temp=temp))
+
+    def outcome(self, folder: Path) -> Outcome:
+        """The run folders and the table."""
+        runs = {file.parent.name: trained(file.parent) for file in folder.glob("out/*/policy.npz")}
+        return runs | {"table": timeless(folder / "out" / "sweep.csv")}
+
+
 def _sum(content: bytes) -> str:
     return hashlib.sha256(content).hexdigest()
 
 
-WORKS: dict[str, Callable[[], Work]] = {work.name: work for work in (Training, Diagnosis, Suite)}
+WORKS: dict[str, Callable[[], Work]] = {
+    work.name: work for work in (Training, Diagnosis, Suite, Sweep)
+}
 """By name."""

@@ -13,7 +13,7 @@ from fish_env.diagnosis import diagnose
 from robofish_agents.evaluation.results import evaluate, write_results
 from robofish_agents.evaluation.suites import load_suite
 from robofish_agents.registry import load_agents
-from robofish_agents.training.callback import Quiet
+from robofish_agents.training.books import Quiet
 from robofish_agents.training.config import Evaluation, Ppo, TrainConfig
 from robofish_agents.training.run import train
 from scripts.reliability import watch

@@ -17,7 +17,7 @@ import torch
 from fish_env.errors import ConfigError
 from robofish_agents.training.checkpoint import FORMAT, Progress, load_checkpoint, save_checkpoint
 from robofish_agents.training.config import Ppo, Sac, TrainConfig
-from robofish_agents.training.learner_state import learner_state
+from robofish_agents.training.learner_state import learner_state, restore_learner
 from robofish_agents.training.model import make_model
 from robofish_agents.training.plain import read_plain, write_plain
 from robofish_agents.training.run import CHECKPOINT, train
@@ -71,10 +71,13 @@ def test_everything_is_put_back(config, tmp_path):
     model, stack = learnt(config)
     before = {"learner": learner_state(model), "stack": stack.state()}
     write_plain(before, tmp_path / "before")
-    save_checkpoint(tmp_path / CHECKPOINT, config, model, stack, Progress(320))
+    save_checkpoint(tmp_path / CHECKPOINT, config, learner_state(model), stack, Progress(320))
     random.seed(9), torch.manual_seed(9), np.random.seed(9)  # noqa: NPY002
     other = make_stack(config)
-    back, progress = load_checkpoint(tmp_path / CHECKPOINT, config, other)
+    back = make_model(config, other)
+    progress = load_checkpoint(
+        tmp_path / CHECKPOINT, config, other, lambda state: restore_learner(back, state)
+    )
     assert progress == Progress(320)
     after = {"learner": learner_state(back), "stack": other.state()}
     write_plain(after, tmp_path / "after")

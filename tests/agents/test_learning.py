@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from robofish_agents.policies import PretrainedPolicy
-from robofish_agents.training.callback import Quiet
+from robofish_agents.training.books import Quiet
 from robofish_agents.training.config import Evaluation, LearningRate, TrainConfig, load_train_config
 from robofish_agents.training.run import train
 from robofish_agents.training.stack import Shoal

@@ -3,6 +3,7 @@
 import signal
 import subprocess
 import sys
+import threading
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -92,6 +93,16 @@ def test_a_stopped_sac_keeps_its_replay_buffer(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         train(SAC, tmp_path / "stopped", Quiet(450))
     assert same(train(SAC, tmp_path / "stopped", Quiet(), resume=True), one)
+
+
+def test_a_training_leaves_no_thread_behind(tmp_path):
+    """The writer of the TensorBoard log has one."""
+    short = replace(PPO, total_steps=256, imitate=Imitation())
+    before = threading.active_count()
+    train(short, tmp_path / "finished", Quiet())
+    with pytest.raises(KeyboardInterrupt):
+        train(short, tmp_path / "stopped", Quiet(100))
+    assert threading.active_count() == before
 
 
 def test_a_finished_training_is_not_trained_further(whole, tmp_path):

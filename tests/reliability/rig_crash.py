@@ -68,7 +68,7 @@ def test_a_work_that_goes_on_otherwise_is_found_out(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("work", ["train", "suite"])
+@pytest.mark.parametrize("work", ["train", "suite", "sweep"])
 def test_two_kills(work, tmp_path):
     command = [sys.executable, "-m", "scripts.reliability.crash", "--only", work]
     done = subprocess.run(

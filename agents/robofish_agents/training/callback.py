@@ -1,116 +1,35 @@
-"""What happens between two rollouts: time is counted, policies are evaluated, checkpoints written.
-
-At the start of a rollout the learner has just finished its updates, so that what is saved there
-can go on with the same bits.
-"""
+"""Stable-Baselines3 tells a training's books when a rollout begins and ends."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
-from typing import Protocol
-
 from stable_baselines3.common.callbacks import BaseCallback
 
-from robofish_agents.training.checkpoint import Progress
-from robofish_agents.training.config import TrainConfig
-
-
-class Watcher(Protocol):
-    """What a training tells about itself."""
-
-    def stepped(self, steps: int) -> object:
-        """So many control steps are done."""
-
-    def evaluated(self, row: dict[str, float]) -> object:
-        """An evaluation on the side is done."""
-
-
-class Quiet:
-    """Watches a training and says nothing."""
-
-    def stepped(self, steps: int) -> None:
-        """Steps are not shown."""
-
-    def evaluated(self, row: dict[str, float]) -> None:
-        """Neither are evaluations."""
+from robofish_agents.training.books import Books
 
 
 class Between(BaseCallback):
-    """Keeps a training's books.
+    """Passes moments of the learner to the books.
 
     Args:
-        config: the training.
-        progress: what was done before; kept up to date.
-        watcher: told about steps and evaluations.
-        evaluate: evaluates the present policy and keeps it if it is the best.
-        save: writes a checkpoint.
+        books: of the training.
     """
 
-    def __init__(
-        self,
-        config: TrainConfig,
-        progress: Progress,
-        watcher: Watcher,
-        evaluate: Callable[[], dict[str, float]],
-        save: Callable[[], None],
-    ) -> None:
+    def __init__(self, books: Books) -> None:
         super().__init__()
-        self.config, self.progress, self.watcher = config, progress, watcher
-        self._evaluate, self._save = evaluate, save
-        self._saved_at = progress.steps
-        self._now()
-        self._rollout_from = self._cpu
+        self.books = books
 
     def _on_training_start(self) -> None:
-        if self.config.imitate.rounds and not self.progress.evaluations:
-            self.evaluate()
+        self.books.begin()
 
     def _on_rollout_start(self) -> None:
-        self._count()
-        self.progress.steps = self.num_timesteps
-        if self._due(self.config.evaluation.every, self._evaluated_at()):
-            self.evaluate()
-        if self._due(self.config.checkpoint_every, self._saved_at):
-            self._save()
-            self._saved_at = self.num_timesteps
-        self._rollout_from = time.process_time()
+        self.books.before_rollout(self.num_timesteps)
 
     def _on_rollout_end(self) -> None:
-        self.progress.rollout_cpu_s += time.process_time() - self._rollout_from
+        self.books.after_rollout()
 
     def _on_step(self) -> bool:
-        self.watcher.stepped(self.num_timesteps)
+        self.books.stepped(self.num_timesteps)
         return True
 
     def _on_training_end(self) -> None:
-        self._count()
-        self.progress.steps = self.num_timesteps
-        if self._evaluated_at() < self.num_timesteps:
-            self.evaluate()
-        self._save()
-
-    def evaluate(self) -> None:
-        """Evaluates on the side; the time that takes is not counted as training."""
-        row = {"steps": float(self.num_timesteps), "cpu_s": self.progress.cpu_s} | self._evaluate()
-        self.progress.evaluations += (row,)
-        for name, value in row.items():
-            self.logger.record(f"evaluation/{name}", value)
-        self.watcher.evaluated(row)
-        self._now()
-
-    def _due(self, every: int, last: float) -> bool:
-        return self.num_timesteps // every > last // every
-
-    def _evaluated_at(self) -> float:
-        rows = self.progress.evaluations
-        return rows[-1]["steps"] if rows else 0.0
-
-    def _now(self) -> None:
-        self._cpu, self._wall = time.process_time(), time.perf_counter()
-
-    def _count(self) -> None:
-        cpu, wall = self._cpu, self._wall
-        self._now()
-        self.progress.cpu_s += self._cpu - cpu
-        self.progress.wall_s += self._wall - wall
+        self.books.end(self.num_timesteps)

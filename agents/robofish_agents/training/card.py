@@ -22,6 +22,7 @@ def card(config: TrainConfig, progress: Progress, row: dict[str, float]) -> dict
         progress: its steps and times when the policy was taken.
         row: the evaluation on the side of this policy.
     """
+    made_with = (*MADE_WITH, "ray") if config.engine == "rllib" else MADE_WITH
     return {
         "environment": ENV_ID,
         "task": config.task,
@@ -33,7 +34,7 @@ def card(config: TrainConfig, progress: Progress, row: dict[str, float]) -> dict
             "processor": processor(),
         },
         "evaluation_on_the_side": {name: round(value, 5) for name, value in row.items()},
-        "made_with": {name: version(name) for name in MADE_WITH},
+        "made_with": {name: version(name) for name in made_with},
         "configuration": config.tree(),
     }
 

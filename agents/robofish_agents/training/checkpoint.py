@@ -7,15 +7,14 @@ a whole file. It holds arrays and JSON and no pickles, so that reading one can r
 from __future__ import annotations
 
 import zipfile
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from fish_env.archives import UNREADABLE
 from fish_env.errors import ConfigError
-from robofish_agents.training.config import TrainConfig
-from robofish_agents.training.learner_state import learner_state, restore_learner
-from robofish_agents.training.model import Model, make_model
+from robofish_agents.training.config import DEFAULT_ENGINE, TrainConfig
 from robofish_agents.training.plain import read_plain, write_plain
 from robofish_agents.training.stack import Stack
 
@@ -46,14 +45,14 @@ class Progress:
 
 
 def save_checkpoint(
-    path: Path, config: TrainConfig, model: Model, stack: Stack, progress: Progress
+    path: Path, config: TrainConfig, learner: dict[str, Any], stack: Stack, progress: Progress
 ) -> None:
     """Writes a checkpoint; a kill leaves the last one.
 
     Args:
         path: the file.
         config: of the training.
-        model: the learner.
+        learner: state of the learner, plain values.
         stack: its fish.
         progress: what was done so far.
 
@@ -63,20 +62,23 @@ def save_checkpoint(
     tree = {
         "format": FORMAT,
         "config": config.tree(),
-        "learner": learner_state(model),
+        "learner": learner,
         "stack": stack.state(),
         "progress": asdict(progress),
     }
     write_plain(tree, path)
 
 
-def load_checkpoint(path: Path, config: TrainConfig, stack: Stack) -> tuple[Model, Progress]:
-    """The learner and its progress; the stack and all random generators are put back.
+def load_checkpoint(
+    path: Path, config: TrainConfig, stack: Stack, restore: Callable[[dict[str, Any]], None]
+) -> Progress:
+    """The progress; fish, learner and all random generators are put back.
 
     Args:
         path: the file. Reading it runs no code, whatever it holds.
         config: of the training that goes on.
         stack: fish of that configuration.
+        restore: puts the state of the learner back, once the fish have theirs.
 
     Raises:
         ConfigError: not a checkpoint, a damaged one, or one of another configuration or version.
@@ -87,9 +89,8 @@ def load_checkpoint(path: Path, config: TrainConfig, stack: Stack) -> tuple[Mode
             raise ValueError(f"its format is {tree['format']!r}, not {FORMAT!r}")
         saved = tree["config"]
         _check_same(path, saved, config.tree())
-        model = make_model(config, stack)
         stack.restore(tree["stack"])
-        restore_learner(model, tree["learner"])
+        restore(tree["learner"])
         rows = tuple(tree["progress"].pop("evaluations"))
         progress = Progress(**tree["progress"], evaluations=rows)
     except (*UNREADABLE, TypeError, AttributeError, IndexError) as error:
@@ -97,7 +98,7 @@ def load_checkpoint(path: Path, config: TrainConfig, stack: Stack) -> tuple[Mode
         raise ConfigError(
             f"{path}: {reason}; move it away to start afresh, or train into another folder"
         ) from None
-    return model, progress
+    return progress
 
 
 def _earlier(path: Path) -> str | None:
@@ -113,9 +114,10 @@ def _earlier(path: Path) -> str | None:
 
 
 def _check_same(path: Path, saved: dict[str, Any], now: dict[str, Any]) -> None:
-    changed = [key for key in now if saved.get(key) != now[key]]
+    was, now = {"engine": DEFAULT_ENGINE} | saved, {"engine": DEFAULT_ENGINE} | now
+    changed = [key for key in now if was.get(key) != now[key]]
     if changed:
-        words = "; ".join(f"{key} was {saved.get(key)!r}, is {now[key]!r}" for key in changed)
+        words = "; ".join(f"{key} was {was.get(key)!r}, is {now[key]!r}" for key in changed)
         raise ConfigError(
             f"{path}: of another configuration ({words}); resume with the same one, or train into "
             "another folder"

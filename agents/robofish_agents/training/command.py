@@ -11,7 +11,12 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from fish_env.errors import Interrupted
 from fish_env.files import check_outputs
 from robofish_agents.training.card import shares
-from robofish_agents.training.config import TrainConfig, files_behind, load_train_config
+from robofish_agents.training.config import (
+    DEFAULT_ENGINE,
+    TrainConfig,
+    files_behind,
+    load_train_config,
+)
 from robofish_agents.training.run import CHECKPOINT, CONFIG, Outcome, outputs, train
 
 
@@ -56,6 +61,7 @@ def run(
     steps: int | None,
     resume: bool,
     trust_effects: bool = False,
+    engine: str | None = None,
 ) -> None:
     """Trains as the command line asks.
 
@@ -67,8 +73,9 @@ def run(
         steps: instead of the configuration's.
         resume: go on with what is in the folder.
         trust_effects: run the effect files that the fish's file names.
+        engine: library that learns, instead of the configuration's.
     """
-    config = load_train_config(source, trust_effects, seed=seed, total_steps=steps)
+    config = load_train_config(source, trust_effects, seed=seed, total_steps=steps, engine=engine)
     folder = out or Path("out/train") / f"{config.name}-seed-{config.seed}"
     written = [file for file in outputs(folder) if not (resume and file.name == CONFIG)]
     check_outputs(written, files_behind(source, config))
@@ -92,6 +99,8 @@ def run(
 def _stopped(source: str, folder: Path, config: TrainConfig) -> str:
     """What was kept of a training that a person stopped, and how to go on."""
     options = f"--out {folder} --seed {config.seed} --steps {config.total_steps}"
+    if config.engine != DEFAULT_ENGINE:
+        options += f" --engine {config.engine}"
     if not (folder / CHECKPOINT).exists():
         return f"stopped before the first checkpoint; start anew: robofish train {source} {options}"
     return (

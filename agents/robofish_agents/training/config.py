@@ -22,6 +22,8 @@ from robofish_agents.training.schema import build
 from robofish_agents.training.teacher_gains import TEACHER_GAIN_NAMES
 
 SCHEDULES = ("constant", "linear")
+ENGINES = ("sb3", "rllib")
+DEFAULT_ENGINE = "sb3"
 NOT_BY_FILE = "no file can say that it is trusted; remove the key and give --trust-effects"
 MOST_FISH = 1000
 """Fish of one batch are seeded one after the other; a seed of a training leaves room for these."""
@@ -204,6 +206,7 @@ class TrainConfig:
         evaluation: see :class:`Evaluation`.
         checkpoint_every: steps between two checkpoints.
         threads: see :class:`Threads`.
+        engine: the library that learns, ``sb3`` (Stable-Baselines3) or ``rllib`` (Ray).
         trust_effects: run the effect files that the fish's file names, see ``load_fish``; only a
             caller says so, never a file.
     """
@@ -226,6 +229,7 @@ class TrainConfig:
     evaluation: Evaluation = field(default_factory=Evaluation)
     checkpoint_every: int = 100_000
     threads: Threads = field(default_factory=Threads)
+    engine: str = DEFAULT_ENGINE
     trust_effects: bool = field(default=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -235,6 +239,9 @@ class TrainConfig:
             ConfigError: says which.
         """
         _check(self.algorithm in ("ppo", "sac"), "algorithm: ppo or sac")
+        _check(self.engine in ENGINES, f"engine: one of {', '.join(ENGINES)}")
+        if self.engine == "rllib":
+            self._check_rllib()
         _check(0 <= self.seed < 1_000_000, "seed: 0 to 999999")
         _check(1 <= self.num_envs <= MOST_FISH, f"num_envs: 1 to {MOST_FISH}")
         _check(min(self.total_steps, self.checkpoint_every) > 0, "steps must be positive")
@@ -273,13 +280,22 @@ class TrainConfig:
             options["config"] = dict(self.settings)
         return options | {TRUST: self.trust_effects}
 
+    def _check_rllib(self) -> None:
+        """Refuses what RLlib's PPO has no equal of."""
+        without = "engine rllib has no equal; {}, or train with --engine sb3"
+        _check(self.algorithm == "ppo", "algorithm: " + without.format("choose ppo"))
+        _check(self.ppo.target_kl is None, "ppo.target_kl: " + without.format("remove it"))
+        _check(not self.ppo.use_sde, "ppo.use_sde: " + without.format("remove it"))
+
     def history_spec(self, period_s: float) -> HistorySpec:
         """What the policy sees of the past, for a control period (s)."""
         return HistorySpec(self.history.frames, self.history.low_pass_s, period_s)
 
     def tree(self) -> dict[str, Any]:
         """As a YAML file could say it, with every default spelled out."""
-        left_out = ("sac" if self.algorithm == "ppo" else "ppo", TRUST)
+        left_out = ["sac" if self.algorithm == "ppo" else "ppo", TRUST]
+        if self.engine == DEFAULT_ENGINE:
+            left_out.append("engine")  # configurations of before there was a choice stay the same
         tree = {key: value for key, value in asdict(self).items() if key not in left_out}
         return dict(yaml.safe_load(yaml.safe_dump(_plain(tree))))
 

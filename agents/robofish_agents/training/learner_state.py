@@ -25,15 +25,15 @@ def learner_state(model: Model) -> Plain:
     """Weights, optimisers, counters, latest observations, replay buffer, random generators."""
     entropy = _entropy(model)
     return {
-        "weights": _arrays(model.policy.state_dict()),
-        "optimisers": {name: _optimiser(item) for name, item in _optimisers(model).items()},
+        "weights": weights_state(model.policy.state_dict()),
+        "optimisers": {name: optimiser_state(item) for name, item in _optimisers(model).items()},
         "entropy": None if entropy is None else entropy.detach().numpy(),
         "counts": {name: getattr(model, name) for name in COUNTS},
         "latest": {name: getattr(model, name) for name in LATEST},
         "episodes": {name: [*(getattr(model, name) or ())] for name in EPISODES},
         "replay": _replay(model.replay_buffer) if isinstance(model, SAC) else None,
         "actions": model.action_space.np_random.bit_generator.state,
-        "random": _random(),
+        "random": random_state(),
     }
 
 
@@ -47,9 +47,9 @@ def restore_learner(model: Model, state: Plain) -> None:
     Raises:
         KeyError, ValueError, RuntimeError: the state is not that of such a learner.
     """
-    model.policy.load_state_dict(_tensors(state["weights"]))
+    model.policy.load_state_dict(weights_tensors(state["weights"]))
     for name, optimiser in _optimisers(model).items():
-        _restore_optimiser(optimiser, state["optimisers"][name])
+        restore_optimiser(optimiser, state["optimisers"][name])
     entropy = _entropy(model)
     if entropy is not None:
         entropy.data.copy_(torch.as_tensor(state["entropy"]))
@@ -62,7 +62,7 @@ def restore_learner(model: Model, state: Plain) -> None:
     if isinstance(model, SAC):
         _restore_replay(model.replay_buffer, state["replay"])
     model.action_space.np_random.bit_generator.state = state["actions"]
-    _restore_random(state["random"])
+    restore_random(state["random"])
 
 
 def _optimisers(model: Model) -> dict[str, torch.optim.Optimizer]:
@@ -83,17 +83,27 @@ def _entropy(model: Model) -> torch.Tensor | None:
     return weight
 
 
-def _optimiser(optimiser: torch.optim.Optimizer) -> Plain:
+def optimiser_state(optimiser: torch.optim.Optimizer) -> Plain:
+    """Moments and step sizes of an optimiser."""
     saved = optimiser.state_dict()
     return {
-        "state": {str(key): _arrays(values) for key, values in saved["state"].items()},
+        "state": {str(key): weights_state(values) for key, values in saved["state"].items()},
         "rates": [group["lr"] for group in saved["param_groups"]],
     }
 
 
-def _restore_optimiser(optimiser: torch.optim.Optimizer, state: Plain) -> None:
+def restore_optimiser(optimiser: torch.optim.Optimizer, state: Plain) -> None:
+    """Puts moments and step sizes back.
+
+    Args:
+        optimiser: of the same parameters.
+        state: what :func:`optimiser_state` gave.
+
+    Raises:
+        KeyError, ValueError: the state is not that of such an optimiser.
+    """
     whole = optimiser.state_dict()
-    whole["state"] = {int(key): _tensors(values) for key, values in state["state"].items()}
+    whole["state"] = {int(key): weights_tensors(values) for key, values in state["state"].items()}
     for group, rate in zip(whole["param_groups"], state["rates"], strict=True):
         group["lr"] = rate
     optimiser.load_state_dict(whole)
@@ -114,7 +124,8 @@ def _restore_replay(buffer: ReplayBuffer | None, state: Plain) -> None:
         getattr(buffer, name)[:rows] = state["stored"][name]
 
 
-def _random() -> Plain:
+def random_state() -> Plain:
+    """The global generators of PyTorch, NumPy and Python."""
     kind, keys, position, has_gauss, gauss = np.random.get_state()  # noqa: NPY002
     return {
         "torch": torch.get_rng_state().numpy(),
@@ -123,7 +134,8 @@ def _random() -> Plain:
     }
 
 
-def _restore_random(state: Plain) -> None:
+def restore_random(state: Plain) -> None:
+    """Sets the global generators, see :func:`random_state`."""
     kind, *rest = state["numpy"]["rest"]
     torch.set_rng_state(torch.as_tensor(state["torch"]))
     np.random.set_state((kind, state["numpy"]["keys"], *rest))  # noqa: NPY002
@@ -131,14 +143,16 @@ def _restore_random(state: Plain) -> None:
     random.setstate((version, tuple(numbers), gauss))
 
 
-def _arrays(values: Mapping[str, Any]) -> Plain:
+def weights_state(values: Mapping[str, Any]) -> Plain:
+    """Tensors as arrays; other values as they are."""
     return {
         key: value.detach().cpu().numpy() if isinstance(value, torch.Tensor) else value
         for key, value in values.items()
     }
 
 
-def _tensors(values: Mapping[str, Any]) -> Plain:
+def weights_tensors(values: Mapping[str, Any]) -> Plain:
+    """Arrays as tensors; other values as they are."""
     return {
         key: torch.from_numpy(np.array(value)) if isinstance(value, np.ndarray) else value
         for key, value in values.items()

@@ -10,21 +10,17 @@ from pathlib import Path
 
 import torch
 import yaml
-from stable_baselines3 import PPO
-from stable_baselines3.common import logger
 
 from fish_env.errors import ConfigError
 from fish_env.files import write_bytes, write_rows
-from robofish_agents.policies.export import export_policy
-from robofish_agents.policies.files import PolicyFile, write_policy
+from robofish_agents.policies.files import write_policy
 from robofish_agents.policies.pretrained import PretrainedPolicy
-from robofish_agents.training.callback import Between, Watcher
+from robofish_agents.training.books import Books, Watcher
 from robofish_agents.training.card import card, shares
 from robofish_agents.training.checkpoint import Progress, load_checkpoint, save_checkpoint
 from robofish_agents.training.config import TrainConfig
-from robofish_agents.training.imitation import imitate
+from robofish_agents.training.engines import Engine, make_engine
 from robofish_agents.training.lock import locked
-from robofish_agents.training.model import Model, make_model
 from robofish_agents.training.stack import Stack, make_stack, seed_episodes
 from robofish_agents.training.trial import try_policy
 
@@ -71,7 +67,10 @@ def train(config: TrainConfig, folder: Path, watcher: Watcher, resume: bool = Fa
     with locked(folder), _torch_threads(config.threads.torch):
         _check_folder(config, folder, resume)
         run = _Run(config, folder)
-        return run.finish(watcher)
+        try:
+            return run.finish(watcher)
+        finally:
+            run.engine.close()
 
 
 def outputs(folder: Path) -> list[Path]:
@@ -113,21 +112,20 @@ class _Run:
     def __init__(self, config: TrainConfig, folder: Path) -> None:
         self.config, self.folder = config, folder
         self.stack: Stack = make_stack(config)
-        self.model: Model
+        self.engine: Engine = make_engine(config, self.stack)
         checkpoint = folder / CHECKPOINT
         if checkpoint.exists():
-            self.model, self.progress = load_checkpoint(checkpoint, config, self.stack)
+            self.progress = load_checkpoint(checkpoint, config, self.stack, self.engine.restore)
         else:
             write_bytes(folder / CONFIG, config_bytes(config))
-            self.model, self.progress = make_model(config, self.stack), Progress()
+            self.progress = Progress()
             seed_episodes(self.stack, config)
             if config.imitate.rounds:
                 self._imitate()
 
     def _imitate(self) -> None:
-        assert isinstance(self.model, PPO)
         cpu, wall = time.process_time(), time.perf_counter()
-        imitate(self.model, self.stack, self.config, self.config.imitate)
+        self.engine.imitate()
         self.progress.imitation_cpu_s = time.process_time() - cpu
         self.progress.cpu_s += self.progress.imitation_cpu_s
         self.progress.wall_s += time.perf_counter() - wall
@@ -135,38 +133,29 @@ class _Run:
 
     def finish(self, watcher: Watcher) -> Outcome:
         config, progress = self.config, self.progress
-        left = config.total_steps - progress.steps
-        if left > 0:
-            books = Between(config, progress, watcher, self._evaluate, self._save)
-            self.model.set_logger(
-                logger.configure(str(self.folder / "tensorboard"), ["tensorboard"])
-            )
-            self.model.learn(left, callback=books, reset_num_timesteps=progress.steps == 0)
+        if progress.steps < config.total_steps:
+            self.record = self.engine.log_to(self.folder / "tensorboard")
+            evaluate, save = self._evaluate, self._save
+            self.engine.learn(Books(config, progress, watcher, evaluate, save, self.record))
         return Outcome(self.folder / POLICY, best_of(progress.evaluations), progress)
 
     def _evaluate(self) -> dict[str, float]:
-        policy = self._policy({})
-        row = try_policy(self.config, PretrainedPolicy(policy))
+        row = try_policy(self.config, PretrainedPolicy(self.engine.policy({})))
         if all(_merit(row) > _merit(other) for other in self.progress.evaluations):
             self._keep(row)
         return row
 
-    def _policy(self, about: dict[str, object]) -> PolicyFile:
-        spec = self.stack.past.history.spec
-        return export_policy(self.model, self.stack.outside, spec, self.config.task, about)
-
     def _keep(self, row: dict[str, float]) -> None:
         about = card(self.config, self.progress, row)
-        write_policy(self._policy(about), self.folder / POLICY)
+        write_policy(self.engine.policy(about), self.folder / POLICY)
         write_bytes(self.folder / CARD, _yaml(about))
 
     def _save(self) -> None:
         for name, share in shares(self.progress, self.stack.fish.cpu_s).items():
-            self.model.logger.record(f"time/share_{name}", share)
+            self.record(f"time/share_{name}", share)
         self.progress.env_cpu_s = self.stack.fish.cpu_s
-        save_checkpoint(
-            self.folder / CHECKPOINT, self.config, self.model, self.stack, self.progress
-        )
+        learner = self.engine.state()
+        save_checkpoint(self.folder / CHECKPOINT, self.config, learner, self.stack, self.progress)
         rows = self.progress.evaluations
         if rows:
             write_rows(self.folder / EVALUATIONS, list(rows[0]), rows)

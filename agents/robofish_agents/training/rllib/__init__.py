@@ -1,0 +1,1 @@
+"""Ray RLlib as the library that learns, on its new API stack."""

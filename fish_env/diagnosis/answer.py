@@ -31,6 +31,7 @@ from fish_env.identification.series import series_of
 from fish_env.inference.attribution import Ranked
 from fish_env.inference.effort import effort_of
 from fish_env.inference.estimate.fit import Fit
+from fish_env.inference.estimate.run_variation import shown_spread
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import coefficient_sizes
 from fish_env.inference.screening import smallest_detectable
@@ -123,9 +124,9 @@ def _floors(diagnosis: Diagnosis) -> list[Plain]:
 
 def run_variation_entry(fit: Fit) -> list[Plain]:
     """What the runs differ in, and errors of sensors: spread beside the usual one, and values."""
-    problem, predicted, entries = fit.problem, _predicted(fit), []
+    problem, (predicted, spread), entries = fit.problem, _predicted(fit), []
     for i, known in enumerate(problem.variations):
-        sd = float(fit.noise.spread[i])
+        sd = float(spread[i])
         if sd > 0.0:
             entries.append(
                 {"name": known.name, "unit": known.unit, "sd": sd, "usual_sd": known.usual,
@@ -135,14 +136,21 @@ def run_variation_entry(fit: Fit) -> list[Plain]:
     return [*_own_beats(fit), *entries]
 
 
-def _predicted(fit: Fit) -> FloatArray:
-    """(R, K) best prediction of what each run differs in, those integrated out too."""
+def _predicted(fit: Fit) -> tuple[FloatArray, FloatArray]:
+    """(R, K) best prediction of what each run differs in, those integrated out too, and spreads.
+
+    Runs whose drive is uneven are fitted with the usual spreads; told are those that data show.
+    """
     values, marginal = fit.problem.variation.copy(), fit.linearised.marginal
+    spread = np.asarray(fit.noise.spread).copy()
     if marginal is not None:
-        active = np.flatnonzero(fit.noise.spread)
+        active = np.flatnonzero(spread)
         residuals = np.concatenate([run.residuals for run in fit.filtered])
-        values[:, active] = marginal.predicted(residuals) * fit.noise.spread[active]
-    return values
+        numbers = marginal.predicted(residuals)
+        values[:, active] = numbers * spread[active]
+        if fit.problem.drive.uneven:
+            spread[active] *= shown_spread(numbers, marginal.uncertainty())
+    return values, spread
 
 
 def _own_beats(fit: Fit) -> list[Plain]:

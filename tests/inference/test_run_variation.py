@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fish_env.inference.estimate.free import predicted_variation
-from fish_env.inference.estimate.run_variation import Marginal, RunVariation
+from fish_env.inference.estimate.run_variation import Marginal, RunVariation, shown_spread
 from fish_env.inference.estimate.spread import Likelihood, fit_spread
 from fish_env.inference.problem import Point
 from tests.inference.stated import Evaluated, Stated, White
@@ -173,3 +173,28 @@ def test_a_prediction_of_a_runs_numbers_never_lowers_its_likelihood():
     assert np.all(worth(moved) >= worth(problem))
     assert moved.own[0, 0] == pytest.approx(0.02, abs=0.002)
     assert np.all(moved.own[1:, 0] > 0.0)
+
+
+def shown(seed, spread):
+    """Spreads shown of numbers that scatter so, seen with half a usual spread of noise."""
+    rng = np.random.default_rng(seed)
+    variance = 1.0 / (1.0 + 1.0 / 0.5**2)
+    seen = spread * rng.standard_normal((RUNS, 4)) + 0.5 * rng.standard_normal((RUNS, 4))
+    return shown_spread((1.0 - variance) * seen, np.full((RUNS, 4), variance))
+
+
+def test_spreads_are_told_where_the_data_show_them():
+    """And hardly ever where runs do not differ; where the data say nothing, never."""
+    assert np.mean([shown(seed, 0.0).any() for seed in range(400)]) <= 0.08
+    found = np.array([shown(seed, 2.0) for seed in range(50)])
+    assert (found > 0.0).mean() > 0.97
+    assert np.sqrt(np.mean(found**2)) == pytest.approx(2.0, rel=0.15)
+    assert not shown_spread(np.full((RUNS, 2), 3.0), np.full((RUNS, 2), 0.9)).any()
+
+
+def test_the_uncertainty_of_own_numbers_is_that_of_their_posterior():
+    _, _, own, run_of, _ = record(3)
+    marginal = Marginal(0.1 * own, np.zeros((RUNS, 2)), run_of)
+    mine = 0.1 * own[run_of == 2]
+    exact = np.linalg.inv(mine.T @ mine + np.eye(2))
+    assert marginal.uncertainty()[2] == pytest.approx(np.diag(exact))

@@ -16,11 +16,15 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+from scipy.special import chdtrc
 
 from fish_env.arrays import FloatArray, IntArray
 from fish_env.inference.estimate.box_qp import minimise_in_box
 from fish_env.inference.policy import POLICY
 
+CHANCE, UNTOLD = 0.05, 0.5
+"""Of a spread that is shown: how often chance shows one or more, and the share of its variance that
+the data must not leave open."""
 LARGEST = 30.0
 """Largest spread that is looked for, in units of the usual one."""
 
@@ -49,6 +53,25 @@ class RunVariation:
     def largest(self) -> float:
         """Largest spread, in usual ones, that is taken for variation."""
         return POLICY.beyond_usual if self.shared else LARGEST
+
+
+def shown_spread(values: FloatArray, variance: FloatArray) -> FloatArray:
+    """Spreads (K,) over runs as the data show them, in usual ones; zero where chance would do.
+
+    A prediction is what a run shows, with noise of variance v / (1 - v), times 1 - v, where v is its
+    posterior variance. The spread follows from the mean square (method of moments).
+
+    Args:
+        values: (R, K) predictions of the runs' own numbers, in usual spreads.
+        variance: (R, K) their posterior variances, likewise.
+    """
+    noise = np.maximum(variance * (1.0 - variance), 1e-12)
+    statistic = np.sum(values**2 / noise, axis=0)
+    shown = chdtrc(len(values), statistic) < CHANCE / values.shape[1]
+    told = variance.mean(axis=0) < UNTOLD
+    unsure = np.minimum(variance, 1.0 - 1e-9)
+    squares = np.mean((values / (1.0 - unsure)) ** 2 - unsure / (1.0 - unsure), axis=0)
+    return np.asarray(np.where(shown & told, np.sqrt(np.maximum(squares, 0.0)), 0.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +146,11 @@ class Marginal:
                 step = minimise_in_box(held, pull, low, np.full(len(at), np.inf)).step
             found.append(at + step)
         return np.array(found)
+
+    def uncertainty(self) -> FloatArray:
+        """Posterior variance (R, K) of the runs' own numbers, in units of that of their spread."""
+        grams = [self.slopes[own].T @ self.slopes[own] for own in self._slices]
+        return np.array([np.diag(np.linalg.inv(gram + np.eye(len(gram)))) for gram in grams])
 
     def some(self, runs: Sequence[int]) -> Marginal:
         """The same on some of the runs."""

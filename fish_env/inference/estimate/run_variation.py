@@ -58,8 +58,8 @@ class RunVariation:
 def shown_spread(values: FloatArray, variance: FloatArray) -> FloatArray:
     """Spreads (K,) over runs as the data show them, in usual ones; zero where chance would do.
 
-    A prediction is what a run shows, with noise of variance v / (1 - v), times 1 - v, where v is its
-    posterior variance. The spread follows from the mean square (method of moments).
+    A prediction is what a run shows, with noise of variance v / (1 - v), times 1 - v, where v is
+    its posterior variance. The spread follows from the mean square (method of moments).
 
     Args:
         values: (R, K) predictions of the runs' own numbers, in usual spreads.

@@ -16,7 +16,7 @@ LATE, OTHER = "late", "other"
 
 
 def problem(late=0.5, uneven=True):
-    """Runs of a vehicle whose effect ``late`` acts by its square: no slope leads to it from zero."""
+    """Runs of a vehicle whose effect ``late`` acts by its square: none leads from zero."""
     rng = np.random.default_rng(1)
     x, y = rng.standard_normal((2, RUNS, SAMPLES))
     noise = rng.standard_normal((RUNS, SAMPLES))

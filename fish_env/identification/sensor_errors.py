@@ -224,6 +224,9 @@ def _predicted(clock: FloatArray, filtered: Filtered) -> _Motion:
 
     A sample's own noise is in the filtered state, and would make its regressor follow its
     innovation. The prediction from the samples before is free of it.
+
+    Raises:
+        LinAlgError: the simulation has diverged.
     """
     slopes = _slopes(filtered)
     moved = np.einsum("tec,tc->te", filtered.gains, np.nan_to_num(slopes.raw))
@@ -244,6 +247,8 @@ def _predicted(clock: FloatArray, filtered: Filtered) -> _Motion:
     drift = np.einsum("tij,tj->ti", rotations(euler), states[:, _ROWS["velocity"]])
     turn = np.einsum("tij,tj->ti", kinematics, states[:, _ROWS["rate"]])
     change |= dict(zip(_PLACE, drift.T, strict=True)) | dict(zip(_ATTITUDE, turn.T, strict=True))
+    if not all(np.isfinite(rate).all() for rate in change.values()):
+        raise np.linalg.LinAlgError("the simulation diverges, and shows no sensor errors")
     return _Motion(states, euler, change)
 
 

@@ -62,6 +62,14 @@ def test_samples_put_right_do_not_depend_on_the_way_there(filtered):
     assert at_once.with_variation(numbers, point, noise).runs == at_once.runs
 
 
+def test_a_motion_that_diverged_is_refused_by_name(filtered):
+    problem, _, _, (result,) = filtered
+    states = result.states.copy()
+    states[100:] = np.nan
+    with pytest.raises(np.linalg.LinAlgError, match="diverges"):
+        sensor_slopes(problem.runs[0].clock, replace(result, states=states), problem.channels)
+
+
 def test_samples_put_right_by_a_motion_nearby_come_to_the_same(filtered):
     """Each time from the motion that the last ones show: one filter a time, not up to four."""
     problem, point, noise, _ = filtered

@@ -269,9 +269,12 @@ def predicted_variation(
     for damping in DAMPING:
         trial = problem.variation.copy()
         trial[:, active] = marginal.predicted(residuals, damping, least) * spreads[active]
-        part = problem.some(worse).with_variation(trial[worse], point, noise)
-        near = [filtered[i] for i in worse]
-        after = _own_objectives(part, part.filtered(point, noise, near), noise)
+        better, near = [], [filtered[i] for i in worse]
+        try:
+            part = problem.some(worse).with_variation(trial[worse], point, noise)
+            after = _own_objectives(part, part.filtered(point, noise, near), noise)
+        except np.linalg.LinAlgError:
+            continue
         better = [i for i, value in zip(worse, after, strict=True) if value <= before[i]]
         numbers[better] = trial[better]
         worse = [i for i in worse if i not in better]

@@ -130,8 +130,12 @@ def _agreed(at: Joint, free: Free, noise: Any) -> Joint:
     problem = at.problem
     if not problem.variation.any():
         return at
-    moved = problem.with_variation(problem.variation, free.unpack(at.vector), noise, at.filtered)
-    agreed = _evaluated(moved, free, at.vector, noise)
+    point = free.unpack(at.vector)
+    try:
+        moved = problem.with_variation(problem.variation, point, noise, at.filtered)
+        agreed = _evaluated(moved, free, at.vector, noise)
+    except np.linalg.LinAlgError:
+        return at
     return agreed if np.isfinite(agreed.value) else at
 
 

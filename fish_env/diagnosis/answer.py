@@ -31,6 +31,7 @@ from fish_env.identification.series import series_of
 from fish_env.inference.attribution import Ranked
 from fish_env.inference.effort import effort_of
 from fish_env.inference.estimate.fit import Fit
+from fish_env.inference.estimate.free import spread_of
 from fish_env.inference.estimate.run_variation import shown_spread
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import coefficient_sizes
@@ -142,7 +143,7 @@ def _predicted(fit: Fit) -> tuple[FloatArray, FloatArray]:
     Runs whose drive is uneven are fitted with the usual spreads; told are those that data show.
     """
     values, marginal = fit.problem.variation.copy(), fit.linearised.marginal
-    spread = np.asarray(fit.noise.spread).copy()
+    spread = spread_of(fit.problem, fit.noise).copy()
     if marginal is not None:
         active = np.flatnonzero(spread)
         residuals = np.concatenate([run.residuals for run in fit.filtered])

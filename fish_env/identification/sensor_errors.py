@@ -36,12 +36,12 @@ _DEVICE = {
     "z": "depth_delay",
 }
 _ROWS = {"velocity": [BY_NAME[n].index for n in "uvw"], "rate": [BY_NAME[n].index for n in "pqr"]}
-_DELAYS = ("camera_delay", "inertial_delay", "depth_delay")
-_SMOOTHED = ("roll", "pitch", "yaw", "p", "q", "r")
 _INERTIAL = ("roll", "pitch", "p", "q", "r")
 """Channels of which one at least says that there is an inertial unit. Without one a camera reads
 the heading too."""
 _ATTITUDE, _RATES, _PLACE = ("roll", "pitch", "yaw"), ("p", "q", "r"), ("x", "y", "z")
+_CURVED = ("inertial_smoothing", *dict.fromkeys(_DEVICE.values()))
+"""Errors whose change of the samples is not linear in them, or not in all of them together."""
 
 
 def sensor_slopes(
@@ -63,12 +63,17 @@ def sensor_slopes(
     """
     errors = np.zeros(len(SENSOR_ERRORS)) if errors is None else errors
     motion = _predicted(clock, filtered)
+    return _by_errors(motion, channels, _late(clock, motion, channels, errors))
+
+
+def _by_errors(motion: _Motion, channels: Sequence[str], delayed: Sequence[_Late]) -> FloatArray:
+    """The slopes (T, C, K), those of late channels among them."""
     states, euler = motion.states, motion.euler
     rates = states[:, _ROWS["rate"]]
     place = states[:, :3] - states[0, :3]
-    found = np.zeros((len(clock), len(channels), len(SENSOR_ERRORS)))
+    found = np.zeros((len(euler), len(channels), len(SENSOR_ERRORS)))
     at = {name: i for i, name in enumerate(channels)}
-    for late in _late(clock, motion, channels, errors):
+    for late in delayed:
         _put(found, at, late.name, late.delay, late.by_delay)
         if late.by_smoothing is not None:
             _put(found, at, late.name, "inertial_smoothing", late.by_smoothing)
@@ -115,11 +120,12 @@ def sensor_distortion(
         ValueError: the filter kept no slopes.
     """
     linear = errors.copy()
-    linear[[_INDEX[name] for name in (*_DELAYS, "inertial_smoothing")]] = 0.0
-    found = np.asarray(sensor_slopes(clock, filtered, channels) @ linear)
+    linear[[_INDEX[name] for name in _CURVED]] = 0.0
     motion, absent = _predicted(clock, filtered), _absent(channels)
+    delayed = _late(clock, motion, channels, errors)
+    found = np.asarray(_by_errors(motion, channels, delayed) @ linear)
     at = {name: i for i, name in enumerate(channels)}
-    for late in _late(clock, motion, channels, errors):
+    for late in delayed:
         if late.delay not in absent:
             found[:, at[late.name]] += late.change
     return found
@@ -162,7 +168,7 @@ def _late(
         rate = make_interp_spline(clock, motion.change[name], k=1)
         path = rate.antiderivative()
         change, by_delay, by_smoothing = path(seen) - path(clock), -rate(seen), None
-        if inertial and name in _SMOOTHED:
+        if inertial and name in (*_ATTITUDE, *_RATES):
             taken = _taken(clock, motion.of(name), motion.change[name])
             by_smoothing = taken(seen)
             change, by_delay = change + size * by_smoothing, by_delay - size * taken(seen, nu=1)

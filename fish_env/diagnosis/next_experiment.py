@@ -195,9 +195,9 @@ def _blank(problem: SeriesProblem, manoeuvre: Manoeuvre) -> RunData:
     state = np.zeros_like(pattern.state0)
     state[3] = 1.0
     state[2] = np.median([run.state0[2] for run in problem.runs])
-    return replace(
-        pattern,
+    return RunData(
         id=manoeuvre.name,
+        condition=None,
         clock=clock,
         substeps=substeps,
         fresh=np.zeros(len(clock), bool),
@@ -205,6 +205,7 @@ def _blank(problem: SeriesProblem, manoeuvre: Manoeuvre) -> RunData:
         command_values=manoeuvre.values,
         measured=np.zeros((len(clock), len(problem.channels))),
         state0=state,
+        covariance0=pattern.covariance0,
         phase_known=True,
         as_measured=False,
     )

@@ -1,11 +1,18 @@
 """The next experiment: manoeuvres within limits, and separation that no refit can close."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from fish_env.diagnosis.manoeuvres import DURATION_S, MENU, Manoeuvre
-from fish_env.diagnosis.next_experiment import best_of, unfollowed
+from fish_env.diagnosis.next_experiment import best_of, flown, unfollowed
+from fish_env.identification.series import SeriesProblem
+from fish_env.identification.variation import SENSOR_ERRORS
+from fish_env.inference.estimate.fit import fit
+from fish_env.inference.problem import Point
 from fish_env.inference.verdict import Verdict
+from tests.identification.synthetic import PATHS, Setup, simulate
 
 LIMITS = {"tail_offset": 0.6, "tail_amplitude": 0.6, "tail_frequency": 2.6,
           "block_displacement": 0.01, "block_angle": 0.6}  # fmt: skip
@@ -60,3 +67,23 @@ def test_separation_is_what_no_coefficient_follows():
     held = unfollowed(slopes, difference, 1e9 * np.eye(2))
     assert free[0] == pytest.approx(rest @ rest, rel=1e-6)
     assert held[0] == pytest.approx(difference[:, 0] @ difference[:, 0], rel=1e-4)
+
+
+@pytest.mark.parametrize("manoeuvre", MENU[:1], ids=lambda m: m.name)
+def test_a_proposed_run_has_no_errors_of_an_old_one(manoeuvre):
+    """However many samples the old ones have, and whatever their sensors did."""
+    setup = Setup(runs=1)
+    problem = SeriesProblem(simulate(setup), paths=PATHS)
+    found = fit(problem, (), Point(np.zeros(len(PATHS)), {}), setup.noise, rounds=0)
+    plain = flown(found, manoeuvre).runs[0]
+    spoilt = [
+        replace(
+            run, distortion=np.ones_like(run.measured), sensor_errors=np.ones(len(SENSOR_ERRORS))
+        )
+        for run in problem.runs
+    ]
+    new = flown(replace(found, problem=problem.with_runs(spoilt)), manoeuvre).runs[0]
+    assert len(new.clock) != len(problem.runs[0].clock)
+    assert np.array_equal(new.corrected, plain.corrected)
+    assert not new.sensor_errors.any()
+    assert np.ptp(new.corrected[:, 0]) > 0.0

@@ -26,6 +26,7 @@ from fish_env.inference.probes import effect_values
 from fish_env.inference.problem import Point, Problem
 from fish_env.inference.vehicle import Effect
 from fish_env.inference.verdict import Verdict
+from fish_env.model.state import BASE_STATES
 
 RATE_HZ = 25.0
 STEP_S = 0.02
@@ -191,8 +192,7 @@ def _blank(problem: SeriesProblem, manoeuvre: Manoeuvre) -> RunData:
     """A run of zeros: prediction errors on it are the prediction, negative."""
     clock = np.arange(0.0, DURATION_S, 1.0 / RATE_HZ)
     substeps = np.full(len(clock), int(np.ceil(1.0 / RATE_HZ / STEP_S - 1e-9)), np.int64)
-    pattern = problem.runs[0]
-    state = np.zeros_like(pattern.state0)
+    state = np.zeros(len(BASE_STATES))
     state[3] = 1.0
     state[2] = np.median([run.state0[2] for run in problem.runs])
     return RunData(
@@ -205,7 +205,7 @@ def _blank(problem: SeriesProblem, manoeuvre: Manoeuvre) -> RunData:
         command_values=manoeuvre.values,
         measured=np.zeros((len(clock), len(problem.channels))),
         state0=state,
-        covariance0=pattern.covariance0,
+        covariance0=problem.runs[0].covariance0,
         phase_known=True,
         as_measured=False,
     )

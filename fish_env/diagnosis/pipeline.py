@@ -28,6 +28,7 @@ from fish_env.errors import DatasetError
 from fish_env.files import check_outputs
 from fish_env.identification.beats import with_measured_beats
 from fish_env.identification.copies import without_copies
+from fish_env.identification.model_outliers import without_model_outliers
 from fish_env.identification.own_beats import own_beats, with_own_beats
 from fish_env.identification.recorded import recorded
 from fish_env.identification.sensors import with_noise_shown, without_outliers
@@ -164,6 +165,7 @@ def _diagnose_runs(
     every = SeriesProblem(dataset, fish, dt=effort.step_s)
     every = every.with_drive(tail_drive(inputs.drive, inputs.drive_certain))
     if effort.retries:
+        every, outliers = without_model_outliers(every, outliers)
         every = with_own_beats(every, own_beats(every, inputs.beats_corrected))
     chosen = _named(every, fitted)
     problem = chosen.some(chosen.spread(effort.runs)).until(effort.seconds)

@@ -6,7 +6,7 @@ where its value is, and the column of the error state that it shows.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -28,6 +28,16 @@ class Kind(IntEnum):
     """The tail's angle, which follows from its phase, the commands and the servo's effects."""
 
 
+class Device(IntEnum):
+    """What records a channel. All channels of a device are equally late."""
+
+    CAMERA = 0
+    INERTIAL = 1
+    DEPTH = 2
+    DRIVE = 3
+    """The servo's own sensor, on the commands' clock."""
+
+
 @dataclass(frozen=True)
 class Channel:
     """One channel of a record.
@@ -38,39 +48,37 @@ class Channel:
         kind: how it follows from the state.
         index: row of the state, or which Euler angle.
         column: column of the error state that it shows, or the first of several.
+        device: what usually records it.
         turns: whether it is an angle that goes round.
     """
 
     name: str
     unit: str
     kind: Kind
-    index: int = 0
-    column: int = 0
+    index: int
+    column: int
+    device: Device
     turns: bool = False
 
-    @property
-    def code(self) -> tuple[int, int, int]:
-        """What kernels know it by."""
-        return int(self.kind), self.index, self.column
 
-
-def _rows(names: str, unit: str, block: str) -> tuple[Channel, ...]:
+def _rows(names: str, unit: str, block: str, device: Device) -> tuple[Channel, ...]:
     first = first_column(block)
     return tuple(
-        Channel(name, unit, Kind.STATE, BASE_STATES.index(name), first + i)
+        Channel(name, unit, Kind.STATE, BASE_STATES.index(name), first + i, device)
         for i, name in enumerate(names)
     )
 
 
 _ROTATION = first_column("rotation")
 TABLE = (
-    *_rows("xyz", "m", "position"),
-    Channel("roll", "rad", Kind.EULER, 0, _ROTATION, turns=True),
-    Channel("pitch", "rad", Kind.EULER, 1, _ROTATION),
-    Channel("yaw", "rad", Kind.EULER, 2, _ROTATION, turns=True),
-    *_rows("uvw", "m/s", "velocity"),
-    *_rows("pqr", "rad/s", "rate"),
-    Channel("tail_angle", "rad", Kind.DRIVE, 0, first_column("tail_phase")),
+    *_rows("xy", "m", "position", Device.CAMERA),
+    Channel("z", "m", Kind.STATE, 2, first_column("position") + 2, Device.DEPTH),
+    Channel("roll", "rad", Kind.EULER, 0, _ROTATION, Device.INERTIAL, turns=True),
+    Channel("pitch", "rad", Kind.EULER, 1, _ROTATION, Device.INERTIAL),
+    Channel("yaw", "rad", Kind.EULER, 2, _ROTATION, Device.INERTIAL, turns=True),
+    *_rows("uvw", "m/s", "velocity", Device.CAMERA),
+    *_rows("pqr", "rad/s", "rate", Device.INERTIAL),
+    Channel("tail_angle", "rad", Kind.DRIVE, 0, first_column("tail_phase"), Device.DRIVE),
 )
 BY_NAME = {channel.name: channel for channel in TABLE}
 
@@ -86,6 +94,24 @@ def body_channels(names: Iterable[str]) -> tuple[str, ...]:
     return tuple(name for name in usable_channels(names) if BY_NAME[name].kind != Kind.DRIVE)
 
 
-def codes_of(names: Iterable[str]) -> IntArray:
-    """(C, 3) kind, index and column of each channel, for kernels."""
-    return np.array([BY_NAME[name].code for name in names], np.int64).reshape(-1, 3)
+_SAYS_INERTIAL = ("roll", "pitch", "p", "q", "r")
+"""Channels of which one at least says that there is an inertial unit."""
+
+
+def has_inertial_unit(names: Iterable[str]) -> bool:
+    """Whether an inertial unit is among what recorded these channels."""
+    return not set(_SAYS_INERTIAL).isdisjoint(names)
+
+
+def devices_of(names: Sequence[str]) -> tuple[Device, ...]:
+    """What recorded each of these channels. Without an inertial unit a camera reads the heading."""
+    inertial = has_inertial_unit(names)
+    found = (BY_NAME[name].device for name in names)
+    return tuple(Device.CAMERA if d == Device.INERTIAL and not inertial else d for d in found)
+
+
+def codes_of(names: Sequence[str]) -> IntArray:
+    """(C, 4) kind, index, column and device of each channel, for kernels."""
+    channels = zip((BY_NAME[name] for name in names), devices_of(names), strict=True)
+    codes = [(int(c.kind), c.index, c.column, int(device)) for c, device in channels]
+    return np.array(codes, np.int64).reshape(-1, 4)

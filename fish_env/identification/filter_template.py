@@ -34,10 +34,12 @@ from fish_env.model.composed import (
     difference,
     entry_point,
     innovations_of,
+    keep_step,
     kernel,
     load_lane,
     move,
     observation_rows,
+    room_for_path,
     set_commands,
     share_told,
     start_effects,
@@ -53,7 +55,7 @@ EKF_LANES = 24  # the estimate and 19 neighbours, rounded up to whole vector reg
 @kernel
 def slopes_of_interval(
     work, width, steps, h, begin, times, values, at, pace, skew, delay, late, history, tables,
-    error, gap, f,
+    error, gap, path, f,
 ):  # fmt: skip
     """Advance the estimate by one sample interval; f (12, 19) becomes its slopes."""
     for j in range(N_STATES):
@@ -73,6 +75,7 @@ def slopes_of_interval(
         start = begin + i * h
         set_commands(work, width, times, values, at, start, h, skew, delay, True)
         step_lanes_once(work, width, start, h, pace, late, history, tables)
+        keep_step(work, width, path, i)
     difference(work, width, gap)
     for j in range(N_MOVING):
         for k in range(N_ERROR):
@@ -90,8 +93,8 @@ def carry(work, width, known, sample, sign, count):
 
 @entry_point
 def ekf_run(
-    state0, swimming, par, pace_one, skew_one, delay_one, gain, bias, lens_one, clock, substeps,
-    times, values, measured, codes, noise_variance, smear, covariance0, wrench_variance,
+    state0, swimming, par, pace_one, skew_one, delay_one, gain, bias, ages_one, lens_one, clock,
+    substeps, times, values, measured, codes, noise_variance, smear, covariance0, wrench_variance,
     wrench_decay_s, phase_walk, reach, history_rows, known, tables, k_out, w_out, e_out, share_out,
     x_out, d_out, f_out, h_out, raw_out,
 ):  # fmt: skip
@@ -106,13 +109,14 @@ def ekf_run(
         delay_one: age of the measurements, on the commands' clock (s).
         gain: (C,) factor of each measured channel.
         bias: (C,) offset of each measured channel.
+        ages_one: (devices,) how much older than its row a sample of each device is (s).
         lens_one: (rows, 1) how sensors sit and look (see ``sensing.geometry``).
         clock: (T,) recorded sample times, the first is 0 (s).
         substeps: (T,) RK4 steps up to each sample.
         times: (m,) command times (s).
         values: (m, 5) commands.
         measured: (T, C), NaN where missing.
-        codes: (C, 3) kind, index and column of each channel.
+        codes: (C, 4) kind, index, column and device of each channel.
         noise_variance: (C,).
         smear: (T, C) standard deviations that the channels of a sample have together.
         covariance0: (19, 19) of the initial error state.
@@ -143,6 +147,9 @@ def ekf_run(
     lens = np.zeros((lens_one.shape[0], width))
     for i in range(lens.shape[0]):
         lens[i, :] = lens_one[i, 0]
+    ages = np.zeros((ages_one.shape[0], width))
+    for i in range(ages.shape[0]):
+        ages[i, :] = ages_one[i]
     at = np.zeros(width, np.int64)
     for k in range(width):
         load_lane(work, width, k, state0, par, 0, values[0])
@@ -161,23 +168,30 @@ def ekf_run(
     for i in range(channels):
         gains[i, :] = gain[i]
         biases[i, :] = bias[i]
-    log_likelihood = 0.0
+    path = room_for_path(ages, substeps)
+    log_likelihood, h, steps = 0.0, 0.0, 0
     for sample in range(clock.shape[0]):
         if sample > 0:
             begin = clock[sample - 1]
             span = clock[sample] - begin
+            steps = substeps[sample]
+            h = span / steps
             carry(work, width, known, sample - 1, 1.0, 1)
             slopes_of_interval(
-                work, width, substeps[sample], span / substeps[sample], begin, times, values, at,
-                pace, skew, delay, late, history, tables, error, gap, f,
+                work, width, steps, h, begin, times, values, at,
+                pace, skew, delay, late, history, tables, error, gap, path, f,
             )  # fmt: skip
             carry(work, width, known, sample - 1, -1.0, 1)
             keep = math.exp(-span / wrench_decay_s)
             for j in range(6):
                 work[(WRENCH + j) * width] *= keep
             predict_covariance(p, f, keep, wrench_variance, phase_walk * span, scratch, turned)
-        observation_rows(work, width, codes, gain, lens, measured[sample], rows)
-        innovations_of(work, width, measured[sample], codes, gains, biases, lens, e)
+        observation_rows(
+            work, width, codes, gain, ages, h, steps, path, lens, measured[sample], rows
+        )
+        innovations_of(
+            work, width, measured[sample], codes, gains, biases, ages, h, steps, path, lens, e
+        )
         log_det = whitened_gain(
             p, rows, measured[sample], noise_variance, smear[sample], s, w, seen, k_gain
         )  # fmt: skip
@@ -220,11 +234,12 @@ def push(work, width, basis, sample, column, size, sign, first, count):
 
 @kernel
 def take_sample(
-    work, width, measured, codes, gain, bias, lens, k_in, w_in, e, error, white, late, history,
+    work, width, measured, codes, gain, bias, ages, h, steps, path, lens, k_in, w_in, e, error,
+    white, late, history,
 ):  # fmt: skip
     """Innovations of all lanes at one sample, whitened into white (C, width); states corrected."""
     channels = codes.shape[0]
-    innovations_of(work, width, measured, codes, gain, bias, lens, e)
+    innovations_of(work, width, measured, codes, gain, bias, ages, h, steps, path, lens, e)
     for i in range(channels):
         for k in range(width):
             white[i, k] = w_in[i, 0] * e[0, k]
@@ -244,8 +259,8 @@ def take_sample(
 
 @kernel
 def filter_block(
-    states0, swimming, par, pace_all, skew_all, delay_all, gain_all, bias_all, lens_all, clock,
-    substeps, times, values, measured, codes, k_in, w_in, wrench_decay_s, history_rows, known,
+    states0, swimming, par, pace_all, skew_all, delay_all, gain_all, bias_all, ages_all, lens_all,
+    clock, substeps, times, values, measured, codes, k_in, w_in, wrench_decay_s, history_rows, known,
     push_basis, push_column, push_size, tables, out, place, first, count,
 ):  # fmt: skip
     """Lanes first..first+count through a run with given gains (see :func:`filter_lanes`)."""
@@ -255,6 +270,7 @@ def filter_block(
     pace, skew, delay = np.ones(width), np.ones(width), np.zeros(width)
     lens = np.zeros((lens_all.shape[0], width))
     gain, bias = np.ones((channels, width)), np.zeros((channels, width))
+    ages = np.zeros((ages_all.shape[0], width))
     at = np.zeros(width, np.int64)
     shared = True
     for k in range(width):
@@ -264,6 +280,8 @@ def filter_block(
         shared &= (skew[k] == skew[0]) & (delay[k] == delay[0])
         for i in range(lens.shape[0]):
             lens[i, k] = lens_all[i, lane]
+        for i in range(ages.shape[0]):
+            ages[i, k] = ages_all[i, lane]
         for i in range(channels):
             gain[i, k], bias[i, k] = gain_all[i, lane], bias_all[i, lane]
     late = LATE_TAIL & (history_rows > 0)
@@ -273,17 +291,21 @@ def filter_block(
     e = np.zeros((channels, width))
     white = np.zeros((channels, width))
     error = np.zeros((N_ERROR, width))
+    path = room_for_path(ages, substeps)
+    h, steps = 0.0, 0
     for sample in range(clock.shape[0]):
         if sample > 0:
             span = clock[sample] - clock[sample - 1]
-            h = span / substeps[sample]
+            steps = substeps[sample]
+            h = span / steps
             carry(work, width, known, sample - 1, 1.0, width)
             if pushed:
                 push(work, width, push_basis, sample - 1, push_column, push_size, 1.0, first, count)
-            for i in range(substeps[sample]):
+            for i in range(steps):
                 begin = clock[sample - 1] + i * h
                 set_commands(work, width, times, values, at, begin, h, skew, delay, shared)
                 step_lanes_once(work, width, begin, h, pace, late, history, tables)
+                keep_step(work, width, path, i)
             if pushed:
                 push(
                     work, width, push_basis, sample - 1, push_column, push_size, -1.0, first, count
@@ -293,8 +315,8 @@ def filter_block(
             for n in range(WRENCH * width, (WRENCH + 6) * width):
                 work[n] *= keep
         take_sample(
-            work, width, measured[sample], codes, gain, bias, lens, k_in[sample], w_in[sample], e,
-            error, white, late, history,
+            work, width, measured[sample], codes, gain, bias, ages, h, steps, path, lens,
+            k_in[sample], w_in[sample], e, error, white, late, history,
         )  # fmt: skip
         for k in range(count):
             for i in range(channels):
@@ -303,8 +325,8 @@ def filter_block(
 
 @entry_point
 def filter_lanes(
-    states0, swimming, par, pace, skew, delay, gain, bias, lens, clock, substeps, times, values,
-    measured, codes, k_in, w_in, wrench_decay_s, history_rows, known, push_basis, push_column,
+    states0, swimming, par, pace, skew, delay, gain, bias, ages, lens, clock, substeps, times,
+    values, measured, codes, k_in, w_in, wrench_decay_s, history_rows, known, push_basis, push_column,
     push_size, tables, out, place, first, last,
 ):  # fmt: skip
     """Whitened innovations of many parameter sets on one run, with the gains of one of them.
@@ -318,13 +340,14 @@ def filter_lanes(
         delay: (N,) age of the measurements, on the commands' clock (s).
         gain: (C, N) factor of each measured channel.
         bias: (C, N) offset of each measured channel.
+        ages: (devices, N) how much older than its row a sample of each device is (s).
         lens: (rows, N) how sensors sit and look (see ``sensing.geometry``).
         clock: (T,) sample times.
         substeps: (T,) RK4 steps up to each sample.
         times: (m,) command times (s).
         values: (m, 5) commands.
         measured: (T, C), NaN where missing.
-        codes: (C, 3) kind, index and column of each channel.
+        codes: (C, 4) kind, index, column and device of each channel.
         k_in: (T, 19, C) gains.
         w_in: (T, C, C) whitening.
         wrench_decay_s: correlation time of the wrench.
@@ -342,8 +365,8 @@ def filter_lanes(
     """
     for block in range(first, last, FILTER_LANES):
         filter_block(
-            states0, swimming, par, pace, skew, delay, gain, bias, lens, clock, substeps, times,
-            values, measured, codes, k_in, w_in, wrench_decay_s, history_rows, known, push_basis,
+            states0, swimming, par, pace, skew, delay, gain, bias, ages, lens, clock, substeps,
+            times, values, measured, codes, k_in, w_in, wrench_decay_s, history_rows, known, push_basis,
             push_column, push_size, tables, out, place, block, min(FILTER_LANES, last - block),
         )  # fmt: skip
     return 0

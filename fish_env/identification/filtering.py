@@ -15,12 +15,17 @@ import numpy as np
 from fish_env.arrays import FloatArray, IntArray
 from fish_env.effects.extended import ExtendedModel
 from fish_env.identification.applied_wrench import EFFECT as APPLIED_WRENCH
-from fish_env.identification.channels import codes_of
+from fish_env.identification.channels import Device, codes_of
 from fish_env.identification.jitter import channel_rates
 from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.runs import RunData
 from fish_env.identification.state_blocks import N_ERROR, N_MOVING
-from fish_env.identification.variation import varied_bias, varied_delay, varied_records
+from fish_env.identification.variation import (
+    START,
+    varied_bias,
+    varied_delay,
+    varied_records,
+)
 from fish_env.model.history import history_rows
 from fish_env.model.runtime import Kernels, kernels
 from fish_env.model.state import BASE_STATES
@@ -30,6 +35,7 @@ from fish_env.sensing.geometry import lens_of, through_geometry
 from fish_env.threads import default_threads
 
 POSITIONS = {"x": 0, "y": 1, "z": 2}
+TAIL_PHASE = 13  # row of the state
 CORRECTIONS = 4
 """Each leaves a tenth or less of the error of a start."""
 TEMPLATES = tuple(
@@ -96,6 +102,7 @@ class Measurement:
         delay: (N,) age of the samples, in seconds of the commands' clock.
         gain: (C, N).
         bias: (C, N).
+        ages: (devices, N) how much older than its row a sample of each device is (s).
         geometry: fields of :mod:`fish_env.sensing.geometry`, each (N,); none for none.
     """
 
@@ -105,6 +112,13 @@ class Measurement:
     gain: FloatArray
     bias: FloatArray
     geometry: Mapping[str, FloatArray] = field(default_factory=dict)
+    ages: FloatArray | None = None
+
+    @cached_property
+    def device_ages(self) -> FloatArray:
+        """(devices, N) as kernels read them."""
+        none = np.zeros((len(Device), len(self.pace)))
+        return none if self.ages is None else np.ascontiguousarray(self.ages + none)
 
     @cached_property
     def lens(self) -> FloatArray:
@@ -120,12 +134,14 @@ class Measurement:
             np.ascontiguousarray(self.gain[:, lanes]),
             np.ascontiguousarray(self.bias[:, lanes]),
             {name: values[lanes] for name, values in self.geometry.items()},
+            None if self.ages is None else np.ascontiguousarray(self.ages[:, lanes]),
         )
 
-    def of_run(self, own: FloatArray, channels: Sequence[str]) -> Measurement:
+    def of_run(self, run: RunData, own: FloatArray, channels: Sequence[str]) -> Measurement:
         """The same for a run with numbers of its own (K, N or 1)."""
         bias = np.ascontiguousarray(varied_bias(self.bias, own, channels))
-        return replace(self, delay=varied_delay(self.delay, own), bias=bias)
+        delay = varied_delay(self.delay, own)
+        return replace(self, delay=delay, bias=bias, ages=run.ages(own))
 
 
 Job = tuple[RunData, "Filtered", int, FloatArray, FloatArray, Measurement, FloatArray, int, int]
@@ -158,14 +174,21 @@ class RunFilter:
         """Room for tail commands that come late."""
         return history_rows(self.kernels.longest_delay(records), data.shortest_step)
 
-    def _starts(self, data: RunData, measurement: Measurement) -> FloatArray:
+    def _starts(
+        self, data: RunData, measurement: Measurement, more: FloatArray | None = None
+    ) -> FloatArray:
         """Initial states (states, N): what the first samples say once their distortion is undone.
 
-        Positions and heading; the rest starts too widely spread for it to matter.
+        Positions and heading, and the tail's phase with the run's own numbers and more of them
+        (K, N); the rest starts too widely spread for it to matter.
         """
         count = measurement.gain.shape[1]
         states = np.zeros((len(self.kernels.state_names), count))
         states[: len(BASE_STATES)] = data.state0[:, None]
+        if data.as_measured:
+            states[TAIL_PHASE] += data.variation[START]
+            if more is not None:
+                states[TAIL_PHASE] += more[START]
         for i, name in enumerate(self.channels if data.as_measured else ()):
             gain, bias = measurement.gain[i], measurement.bias[i]
             if name in POSITIONS:
@@ -196,10 +219,10 @@ class RunFilter:
     ) -> tuple[FloatArray, Measurement]:
         """Records and sensors of all lanes as a run's own numbers, and more of them, make them."""
         own = data.variation[:, None] if more is None else data.variation[:, None] + more
-        if not own.any():
+        if not own.any() and not data.moved.any():
             return records, sensors
         varied = np.ascontiguousarray(varied_records(records, own))
-        return varied, sensors.of_run(own, self.channels)
+        return varied, sensors.of_run(data, own, self.channels)
 
     def run(
         self,
@@ -236,7 +259,7 @@ class RunFilter:
             value = entry(
                 state0, data.swimming, record, measurement.pace[0], measurement.skew[0],
                 measurement.delay[0], measurement.gain[:, 0], measurement.bias[:, 0],
-                measurement.lens, data.clock,
+                measurement.device_ages[:, 0], measurement.lens, data.clock,
                 data.steps(corners), *data.driven,
                 data.corrected, self.codes, noise.sensor_sd**2, noise.jitter_sd * rates,
                 data.covariance0, noise.wrench_variance, noise.correlation_s, noise.phase_sd**2,
@@ -311,7 +334,7 @@ class RunFilter:
         runs = zip(self.runs, filtered, places, bases, own, strict=True)
         for i, (data, gains, place, basis, lane) in enumerate(runs):
             record, sensors = self._of_run(data, lane, measurement, variation)
-            state0 = self._starts(data, sensors)
+            state0 = self._starts(data, sensors, variation)
             if starts is not None:
                 state0[: len(BASE_STATES)] = starts[i]
             step = lanes * max(1, -(-count // (4 * lanes)))
@@ -323,7 +346,7 @@ class RunFilter:
             data, gains, place, basis, record, sensors, state0, first, last = job
             entry(
                 state0, data.swimming, record, sensors.pace, sensors.skew, sensors.delay,
-                sensors.gain, sensors.bias, sensors.lens, data.clock,
+                sensors.gain, sensors.bias, sensors.device_ages, sensors.lens, data.clock,
                 data.steps(gains.corners), *data.driven,
                 data.corrected, self.codes, gains.gains, gains.whitening,
                 noise.correlation_s, self._history_rows(record, data), data.known_wrench, basis,

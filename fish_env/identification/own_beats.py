@@ -15,11 +15,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fish_env.arrays import FloatArray
+from fish_env.identification.channels import devices_of
+from fish_env.identification.in_step import nominal_point
 from fish_env.identification.runs import PHASE, RunData
 from fish_env.identification.series import SeriesProblem
 from fish_env.identification.tail_drive import RATE, SCALE
-from fish_env.inference.hypotheses import effects_of
-from fish_env.inference.problem import Point
 
 COARSE: FloatArray = np.asarray(1.0 + np.arange(-24, 25) * 5e-3)
 """Frequencies over the commanded one of all runs together, tried on their beginnings."""
@@ -139,7 +139,8 @@ def with_own_beats(problem: SeriesProblem, beats: OwnBeats) -> SeriesProblem:
     drive = problem.drive if beats.common is None else problem.drive.at(beats.common)
     if not beats.own:
         return problem.with_drive(drive)
-    runs = [_beating(run, beats) for run in problem.runs]
+    devices = devices_of(problem.channels)
+    runs = [_beating(run, beats).movable(devices) for run in problem.runs]
     return problem.with_runs(runs).with_drive(replace(drive, uneven=True))
 
 
@@ -162,9 +163,7 @@ def _left(problem: SeriesProblem, comb: Mapping[str, FloatArray]) -> FloatArray 
         comb: effect parameter -> (n,); a rate counts beside what is known of the drive.
     """
     noise = replace(problem.default_noise(), phase_sd=0.0)
-    own = {path: value for path, value in problem.drive.measured.items() if path != SCALE}
-    begin = Point(problem.start.z, {**problem.neutral(effects_of((*own, *comb))), **own})
-    begin = replace(begin, effects={**begin.effects, SCALE: problem.drive.scale})
+    begin = nominal_point(problem, comb)
     settled = problem.settled(begin, noise)
     try:
         filtered = settled.filtered(begin, noise)

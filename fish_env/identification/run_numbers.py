@@ -1,8 +1,7 @@
 """Runs with other numbers of their own, and what errors of sensors then do to their samples.
 
-An error that moves samples far, as a filter in an inertial unit, is not linear in the recorded
-motion. Taken off the samples it is, in the motion that they then show. The two follow from each
-other, and are worked out in turns until they agree.
+What an error does to the samples follows from the motion, and the estimated motion from the samples
+without it. The two are worked out in turns until they agree.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ from fish_env.arrays import FloatArray
 from fish_env.identification.filtering import Filtered
 from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.runs import RunData
-from fish_env.identification.sensor_errors import sensor_distortion, sensor_slopes
+from fish_env.identification.sensor_errors import sensor_slopes
 from fish_env.identification.variation import VARIATIONS
 from fish_env.inference.problem import Point
 
@@ -89,21 +88,16 @@ def renumbered(
 
 
 def _undone(run: RunData, seen: RunData, filtered: Filtered, channels: Sequence[str]) -> RunData:
-    """A run with what its errors do to its samples.
-
-    A motion that is late by a quarter of its period shows errors of the other sign, and turns that
-    went the whole way would swing for ever. So each goes half the way.
+    """A run with what its errors do to its samples, by the motion that these samples showed.
 
     Args:
         run: with its errors.
-        seen: the run with the errors that its motion was filtered with.
+        seen: the run as its motion was filtered.
         filtered: that motion, with its slopes.
         channels: names of its channels.
     """
-    moved = _moved(run, seen, filtered, channels).distortion
-    assert moved is not None
-    whole = sensor_distortion(run.clock, filtered, channels, run.sensor_errors)
-    return replace(run, distortion=0.5 * (moved + whole))
+    slopes = sensor_slopes(seen.clock, filtered, channels)
+    return replace(run, distortion=np.asarray(slopes @ run.sensor_errors))
 
 
 def _moved(run: RunData, seen: RunData, filtered: Filtered, channels: Sequence[str]) -> RunData:
@@ -115,7 +109,7 @@ def _moved(run: RunData, seen: RunData, filtered: Filtered, channels: Sequence[s
         filtered: its motion, with its slopes.
         channels: names of its channels.
     """
-    slopes = sensor_slopes(run.clock, filtered, channels, seen.sensor_errors)
+    slopes = sensor_slopes(run.clock, filtered, channels)
     change = slopes @ (run.sensor_errors - seen.sensor_errors)
     return replace(run, distortion=change if seen.distortion is None else seen.distortion + change)
 

@@ -12,9 +12,9 @@ from fish_env.arrays import BoolArray, FloatArray, IntArray
 from fish_env.data.schema import Run
 from fish_env.data.vocabulary import COMMANDS
 from fish_env.errors import DatasetError
-from fish_env.identification.channels import BY_NAME, Kind
+from fish_env.identification.channels import BY_NAME, Device, Kind
 from fish_env.identification.state_blocks import N_ERROR, PHASE_COLUMN, columns
-from fish_env.identification.variation import BEAT, COUNT, SAG, SENSOR_ERRORS
+from fish_env.identification.variation import BEAT, COUNT, SAG, SENSOR_ERRORS, device_ages
 from fish_env.model.frames import quaternion_from_euler
 from fish_env.model.state import BASE_STATES
 
@@ -26,6 +26,10 @@ UNTOLD_S = 0.15
 of a run from rest, the first samples judge nothing (s)."""
 
 
+LATEST_S = 0.1
+"""Largest delay of a device by which its samples are moved to earlier rows (s)."""
+UNEVEN = 0.02
+"""Share of the usual sample interval by which the others may differ for rows to be moved."""
 SAME_INSTANT_S = 1e-6
 BEFORE_S = 1e3
 FREQUENCY = 2  # column of the commands
@@ -80,6 +84,10 @@ class RunData:
         variation: (K,) what this run differs in from the others, see ``variation.VARIATIONS``.
         sensor_errors: (K,) errors of its sensors, see ``variation.SENSOR_ERRORS``.
         distortion: (T, C) what they do to its samples; None for nothing.
+        recorded: (T, C) samples in the rows that their stamps ask for, where rows may be moved with
+            what is known of the devices' delays; None where rows stay.
+        devices: (C,) device of each channel, where rows may be moved.
+        moved: (devices,) rows by which the samples of each device were moved to earlier ones.
         usual_substeps: (T,) of published estimates, where ``substeps`` are fewer; else None.
     """
 
@@ -102,6 +110,9 @@ class RunData:
     variation: FloatArray = field(default_factory=lambda: np.zeros(COUNT))
     sensor_errors: FloatArray = field(default_factory=lambda: np.zeros(len(SENSOR_ERRORS)))
     distortion: FloatArray | None = None
+    recorded: FloatArray | None = None
+    devices: IntArray | None = None
+    moved: IntArray = field(default_factory=lambda: np.zeros(len(Device), np.int64))
     usual_substeps: IntArray | None = None
 
     @property
@@ -117,8 +128,65 @@ class RunData:
         return np.ascontiguousarray(self.measured - self.distortion)
 
     def with_numbers(self, variation: FloatArray, sensor_errors: FloatArray) -> RunData:
-        """The same run with other numbers of its own, which do nothing to its samples as yet."""
-        return replace(self, variation=variation, sensor_errors=sensor_errors, distortion=None)
+        """The same run with other numbers of its own; sensor errors do nothing to samples as yet.
+
+        Samples are in the last rows before their devices took them: between two rows the motion is
+        known back to the first one, and after the second a command may have changed it.
+        """
+        numbered = replace(self, variation=variation, sensor_errors=sensor_errors, distortion=None)
+        if self.recorded is None:
+            return numbered
+        rows = np.floor(device_ages(variation) / self.step_s).astype(np.int64)
+        rows = np.clip(rows, 0, self.most_rows)
+        if np.array_equal(rows, self.moved):
+            return numbered
+        return replace(numbered, measured=self._in_rows(self.recorded, rows), moved=rows)
+
+    def movable(self, devices: Sequence[int]) -> RunData:
+        """The same run with rows that may be moved, where its samples are evenly spaced.
+
+        A device that is late shows what was. Moved by whole rows its samples are as they were, and
+        only part of a row is left to the equations of motion. The last rows count for nothing, so
+        that the same samples count however far they are moved.
+
+        Args:
+            devices: (C,) device of each channel.
+        """
+        spans = np.diff(self.clock)
+        if np.ptp(spans) > UNEVEN * float(np.median(spans)) or self.most_rows < 1:
+            return self
+        run = replace(self, devices=np.asarray(devices), recorded=self.measured)
+        return replace(run, measured=run._in_rows(self.measured, run.moved))
+
+    @cached_property
+    def step_s(self) -> float:
+        """Usual time from one sample to the next (s)."""
+        return float(np.median(np.diff(self.clock)))
+
+    @property
+    def most_rows(self) -> int:
+        """Rows by which samples may be moved."""
+        return min(int(LATEST_S / self.step_s), len(self.clock) // 4)
+
+    def _in_rows(self, recorded: FloatArray, rows: IntArray) -> FloatArray:
+        """Samples (T, C) moved to earlier rows, by as many as their devices (devices,) ask for."""
+        assert self.devices is not None
+        seen = recorded.copy()
+        for device in np.unique(self.devices[self.devices != Device.DRIVE]).tolist():
+            own = np.flatnonzero(self.devices == device)
+            kept = len(seen) - self.most_rows
+            first = int(rows[device])
+            seen[:kept, own] = recorded[first : first + kept, own]
+            seen[kept:, own] = np.nan
+        return np.ascontiguousarray(seen)
+
+    def ages(self, own: FloatArray) -> FloatArray:
+        """How much older than its row a sample of each device is (devices, N), s.
+
+        Args:
+            own: (K, N) the run's own numbers.
+        """
+        return device_ages(own) - self.step_s * self.moved[:, None]
 
     def steps(self, corners: bool) -> IntArray:
         """(T,) RK4 steps up to each sample, finer for motion with corners."""
@@ -203,6 +271,7 @@ class RunData:
             usual_substeps=None if self.usual_substeps is None else self.usual_substeps[own],
             fresh=self.fresh[own],
             measured=np.ascontiguousarray(self.measured[own]),
+            recorded=None,
             wrench=None if self.wrench is None else np.ascontiguousarray(self.wrench[own]),
             distortion=None if self.distortion is None else self.distortion[own],
         )

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fish_env.arrays import FloatArray
+from fish_env.identification.channels import Device, devices_of
 from fish_env.inference.estimate.run_variation import RunVariation
 from fish_env.params.packing import RECORD_FIELDS
 
@@ -27,11 +28,20 @@ VARIATIONS = (
     RunVariation("clock_offset", "s", 1e-2),
     RunVariation("beat", "1", 1e-3),
     RunVariation("beat_sag", "1/s", 1.5e-4),
+    RunVariation("camera_delay", "s", 0.02, shared=True, positive=True),
+    RunVariation("inertial_delay", "s", 0.03, shared=True, positive=True),
+    RunVariation("depth_delay", "s", 0.02, shared=True, positive=True),
+    RunVariation("start_phase", "rad", 0.2),
 )
 """Trim is how far the barycentre of the whole fish at rest is moved. The beat and its sag are what
-their combs may have got wrong, see ``own_beats``."""
+their combs may have got wrong, see ``own_beats``. Devices are late by a frame of a camera; a filter
+of 5 Hz inside an inertial unit makes that 0.045 s late. The phase is that of the tail at the first
+sample, beside what is declared or was found on a grid: it moves with the delays."""
 COUNT = len(VARIATIONS)
-BEAT, SAG = (i for i in range(COUNT) if VARIATIONS[i].name in ("beat", "beat_sag"))
+BEAT, SAG, START = (
+    next(i for i in range(COUNT) if VARIATIONS[i].name == name)
+    for name in ("beat", "beat_sag", "start_phase")
+)
 DEGREE = float(np.deg2rad(1.0))
 SENSOR_ERRORS = (
     RunVariation("marker_x", "m", 0.01, shared=True),
@@ -50,14 +60,11 @@ SENSOR_ERRORS = (
     RunVariation("camera_roll", "rad", DEGREE, shared=True),
     RunVariation("camera_pitch", "rad", DEGREE, shared=True),
     RunVariation("camera_scale_per_depth", "1/m", 0.15, shared=True),
-    RunVariation("camera_delay", "s", 0.02, shared=True, positive=True),
-    RunVariation("inertial_delay", "s", 0.02, shared=True, positive=True),
-    RunVariation("depth_delay", "s", 0.02, shared=True, positive=True),
     RunVariation("inertial_smoothing", "1", 1.0, shared=True, positive=True),
 )
-"""Usual sizes: a centimetre, a degree, one per cent, a frame of a camera, all that a low-pass of
-5 Hz inside an inertial unit takes away; the picture of a camera
-some metres above the water shrinks with depth, by the refractive index and its height."""
+"""Usual sizes: a centimetre, a degree, one per cent, all that a low-pass of 5 Hz inside an inertial
+unit takes away beside making it late; the picture of a camera some metres above the water shrinks
+with depth, by the refractive index and its height."""
 EVERY = (*VARIATIONS, *SENSOR_ERRORS)
 UPRIGHT = ("z", "roll", "pitch", "w", "p", "q")
 """Channels that show how a fish floats. A camera above the tank alone sees none of them."""
@@ -65,6 +72,11 @@ _MASS, _BUOYANCY = RECORD_FIELDS.index("mass_total"), RECORD_FIELDS.index("mass_
 _STATIC = {f"trim_{axis}": RECORD_FIELDS.index(f"static_{axis}") for axis in "xyz"}
 _GYROS = {"gyro_zero_p": "p", "gyro_zero_q": "q", "gyro_zero_r": "r"}
 _INDEX = {variation.name: i for i, variation in enumerate(VARIATIONS)}
+_DELAYS = {
+    Device.CAMERA: "camera_delay",
+    Device.INERTIAL: "inertial_delay",
+    Device.DEPTH: "depth_delay",
+}
 
 
 def varied_records(records: FloatArray, own: FloatArray) -> FloatArray:
@@ -78,9 +90,11 @@ def varied_records(records: FloatArray, own: FloatArray) -> FloatArray:
 
 def unseen(channels: Sequence[str]) -> list[int]:
     """Numbers of runs that none of the channels would show: they stay zero, and nobody is told."""
+    devices = devices_of(channels)
+    hidden = [_INDEX[_DELAYS[device]] for device in _DELAYS if device not in devices]
     if not set(UPRIGHT).isdisjoint(channels):
-        return []
-    return [i for name, i in _INDEX.items() if name.startswith(("trim_", "buoyancy"))]
+        return hidden
+    return [i for name, i in _INDEX.items() if name.startswith(("trim_", "buoyancy"))] + hidden
 
 
 def varied_bias(bias: FloatArray, own: FloatArray, channels: Sequence[str]) -> FloatArray:
@@ -90,6 +104,14 @@ def varied_bias(bias: FloatArray, own: FloatArray, channels: Sequence[str]) -> F
         if channel in channels:
             moved[list(channels).index(channel)] += own[_INDEX[name]]
     return moved
+
+
+def device_ages(own: FloatArray) -> FloatArray:
+    """How late each device is (devices, N) by a run's own numbers (K, N) (s)."""
+    ages = np.zeros((len(Device), *own.shape[1:]))
+    for device, name in _DELAYS.items():
+        ages[device] = own[_INDEX[name]]
+    return ages
 
 
 def varied_delay(delay: FloatArray, own: FloatArray) -> FloatArray:

@@ -1,0 +1,24 @@
+"""The nominal fish with its tail in step, as far as its beat was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from fish_env.identification.series import SeriesProblem
+from fish_env.identification.tail_drive import SCALE
+from fish_env.inference.hypotheses import effects_of
+from fish_env.inference.problem import Point
+
+
+def nominal_point(problem: SeriesProblem, more: Iterable[str] = ()) -> Point:
+    """Nominal coefficients, and the tail's frequency as it was measured.
+
+    Args:
+        problem: the runs, told the beat that they share.
+        more: effect parameters whose effects get their neutral values too.
+    """
+    own = {path: value for path, value in problem.drive.measured.items() if path != SCALE}
+    told = {**problem.neutral(effects_of((*own, SCALE, *more))), **own}
+    begin = Point(problem.start.z, told)
+    return replace(begin, effects={**begin.effects, SCALE: problem.drive.scale})

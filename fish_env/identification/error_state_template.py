@@ -96,7 +96,7 @@ def step_lanes_once(work, width, elapsed, h, pace, late, history, tables):
         work[(X + 4) * width + k] = qx * scale
         work[(X + 5) * width + k] = qy * scale
         work[(X + 6) * width + k] = qz * scale
-    for n in range(BODY * width):  # what the step has changed, for samples that show an earlier state
+    for n in range(BODY * width):  # what the step has changed, see keep_step
         work[SUM * width + n] = work[X * width + n] - work[X0 * width + n]
     for n in range(N_STATES * width):
         value = work[X * width + n]
@@ -105,7 +105,7 @@ def step_lanes_once(work, width, elapsed, h, pace, late, history, tables):
 
 @kernel
 def keep_step(work, width, path, step):
-    """Keep how the body's state changed in a step, and its slope at the end, for :func:`put_earlier`.
+    """Keep how the body's state changed in a step, and its slope at the end.
 
     Args:
         work: the lanes, just after the step.
@@ -122,7 +122,7 @@ def keep_step(work, width, path, step):
 
 @kernel
 def put_earlier(work, width, age, h, steps, path):
-    """Put the body's state of ``age`` (width,) seconds before the end of an interval into the X rows.
+    """Put the body's state ``age`` (width,) seconds before the end of an interval into the X rows.
 
     The steps of h seconds are gone back, the last one in part: to second order about its end, from
     its slope there and the change over it.

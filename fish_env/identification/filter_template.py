@@ -260,8 +260,8 @@ def take_sample(
 @kernel
 def filter_block(
     states0, swimming, par, pace_all, skew_all, delay_all, gain_all, bias_all, ages_all, lens_all,
-    clock, substeps, times, values, measured, codes, k_in, w_in, wrench_decay_s, history_rows, known,
-    push_basis, push_column, push_size, tables, out, place, first, count,
+    clock, substeps, times, values, measured, codes, k_in, w_in, wrench_decay_s, history_rows,
+    known, push_basis, push_column, push_size, tables, out, place, first, count,
 ):  # fmt: skip
     """Lanes first..first+count through a run with given gains (see :func:`filter_lanes`)."""
     width = FILTER_LANES
@@ -326,8 +326,8 @@ def filter_block(
 @entry_point
 def filter_lanes(
     states0, swimming, par, pace, skew, delay, gain, bias, ages, lens, clock, substeps, times,
-    values, measured, codes, k_in, w_in, wrench_decay_s, history_rows, known, push_basis, push_column,
-    push_size, tables, out, place, first, last,
+    values, measured, codes, k_in, w_in, wrench_decay_s, history_rows, known, push_basis,
+    push_column, push_size, tables, out, place, first, last,
 ):  # fmt: skip
     """Whitened innovations of many parameter sets on one run, with the gains of one of them.
 
@@ -366,7 +366,8 @@ def filter_lanes(
     for block in range(first, last, FILTER_LANES):
         filter_block(
             states0, swimming, par, pace, skew, delay, gain, bias, ages, lens, clock, substeps,
-            times, values, measured, codes, k_in, w_in, wrench_decay_s, history_rows, known, push_basis,
-            push_column, push_size, tables, out, place, block, min(FILTER_LANES, last - block),
+            times, values, measured, codes, k_in, w_in, wrench_decay_s, history_rows, known,
+            push_basis, push_column, push_size, tables, out, place, block,
+            min(FILTER_LANES, last - block),
         )  # fmt: skip
     return 0

@@ -71,7 +71,8 @@ def _near_jumps(run: RunData) -> BoolArray:
     """(T,) whether a command jumped so shortly before a sample that a spike may be motion."""
     steps = int(np.ceil(SETTLED))
     padded = np.r_[np.zeros(steps, bool), run.fresh]
-    return np.logical_or.reduce([padded[i : i + len(run.fresh)] for i in range(steps + 1)])
+    shifted = [padded[i : i + len(run.fresh)] for i in range(steps + 1)]
+    return np.asarray(np.logical_or.reduce(shifted))
 
 
 def _calm_shares(

@@ -59,7 +59,12 @@ def renumbered(
         near: the runs filtered at numbers close by, with their slopes; what other errors do to
             samples then changes as that motion says, and where all runs keep their numbers it comes
             nearer to what that motion says.
+
+    Raises:
+        LinAlgError: a number is not finite, or the simulation diverges.
     """
+    if not np.isfinite(values).all():
+        raise np.linalg.LinAlgError("numbers of runs have diverged")
     runs = list(problem.runs)
     own, errors = np.split(values, [len(VARIATIONS)], axis=1)
     if near:

@@ -178,6 +178,8 @@ class RunData:
             first = int(rows[device])
             seen[:kept, own] = recorded[first : first + kept, own]
             seen[kept:, own] = np.nan
+        if not self.swimming:
+            seen[self.clock < UNTOLD_S] = np.nan
         return np.ascontiguousarray(seen)
 
     def ages(self, own: FloatArray) -> FloatArray:

@@ -1,10 +1,10 @@
 """What mounting and calibration of sensors leave, as small errors that every record may have.
 
 A marker sits beside the origin, an inertial unit is screwed on a little askew, a compass bends with
-the heading, a camera looks down at an angle and into water. Each is linear in one number, with regressors that follow from the filtered motion. So no
-fish has to swim again to see what it does: the filter's own slopes carry a change of the
-measurements through to its innovations. Errors that are known are taken off the samples, and the
-regressors are then those of the corrected motion.
+the heading, a camera looks down at an angle and into water. Each is linear in one number, with
+regressors that follow from the filtered motion. So no fish has to swim again to see what it does:
+the filter's own slopes carry a change of the measurements through to its innovations. Errors that
+are known are taken off the samples, and the regressors are then those of the corrected motion.
 """
 
 from __future__ import annotations
@@ -74,6 +74,10 @@ def sensor_slopes(clock: FloatArray, filtered: Filtered, channels: Sequence[str]
     for turn, label in ((1.0, ""), (2.0, "2_")):
         _put(found, at, "yaw", f"compass_sin_{label}yaw", np.sin(turn * yaw))
         _put(found, at, "yaw", f"compass_cos_{label}yaw", np.cos(turn * yaw))
+    for k, (axis, name) in enumerate((("x", "current_north"), ("y", "current_east"))):
+        _put(found, at, axis, name, clock - clock[0])
+        for j, speed in enumerate("uvw"):
+            _put(found, at, speed, name, turns[:, k, j])
     depth = place[:, 2]
     _put(found, at, "x", "camera_pitch", depth)
     _put(found, at, "y", "camera_roll", -depth)
@@ -94,7 +98,7 @@ def _absent(channels: Sequence[str]) -> list[str]:
 
 
 def _reshaped(clock: FloatArray, values: FloatArray, rate: FloatArray) -> FloatArray:
-    """What an inertial unit's filter does to samples (T,) beside making them late, settled at first.
+    """What an inertial unit's filter does to samples (T,) beside making them late.
 
     How late the unit is the filter of the motion takes into account. Between two samples the
     channel follows from both and its rates there, and from none after: with that the regressor
@@ -104,7 +108,7 @@ def _reshaped(clock: FloatArray, values: FloatArray, rate: FloatArray) -> FloatA
     path = CubicHermiteSpline(clock, values, rate)(np.minimum(even, clock[-1]))
     filtered = np.asarray(sosfilt(_LOW_PASS, path - values[0])) + values[0]
     late = np.interp(even - LATE_S, even, path)
-    return np.interp(clock, even, filtered - late)
+    return np.asarray(np.interp(clock, even, filtered - late))
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,6 +21,7 @@ from fish_env.identification.filtering import Filtered, Measurement, Pushes, Run
 from fish_env.identification.generic_forces import BoundForces, generic_forces
 from fish_env.identification.kernel_kinds import LEAN, quickest, with_stages
 from fish_env.identification.noise import (
+    HIDING_PHASE_SD,
     UNEVEN_PHASE_SD,
     disturbance_range,
     fitted_noise,
@@ -211,6 +212,10 @@ class SeriesProblem(Problem):
     def swamped(self, noise: NoiseModel) -> bool:
         """Whether a disturbance is as strong as any that a noise model may have."""
         return bool(widest_disturbance(self.fish).left_by(noise))
+
+    def drive_hides(self, noise: NoiseModel) -> bool:
+        """Whether the tail's phase walks far enough to follow a late tail (see the protocol)."""
+        return self.drive.uneven and noise.phase_sd > HIDING_PHASE_SD
 
     def settled(self, point: Point, noise: NoiseModel, nearby: bool = False) -> SeriesProblem:
         """The same problem with the likeliest starting phase of every run that has none."""

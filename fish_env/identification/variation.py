@@ -61,10 +61,13 @@ SENSOR_ERRORS = (
     RunVariation("camera_pitch", "rad", DEGREE, shared=True),
     RunVariation("camera_scale_per_depth", "1/m", 0.15, shared=True),
     RunVariation("inertial_smoothing", "1", 1.0, shared=True, positive=True),
+    RunVariation("current_north", "m/s", 4e-3),
+    RunVariation("current_east", "m/s", 4e-3),
 )
 """Usual sizes: a centimetre, a degree, one per cent, all that a low-pass of 5 Hz inside an inertial
 unit takes away beside making it late; the picture of a camera some metres above the water shrinks
-with depth, by the refractive index and its height."""
+with depth, by the refractive index and its height. Water that drifts carries the fish along: to the
+sensors it is as if their frame moved."""
 EVERY = (*VARIATIONS, *SENSOR_ERRORS)
 UPRIGHT = ("z", "roll", "pitch", "w", "p", "q")
 """Channels that show how a fish floats. A camera above the tank alone sees none of them."""

@@ -10,8 +10,10 @@ import numpy as np
 from fish_env.arrays import FloatArray
 from fish_env.identification.filtering import Filtered, Measurement, RunFilter
 from fish_env.identification.noise_model import NoiseModel
+from fish_env.identification.runs import RunData
 from fish_env.identification.tail_drive import RATE, SCALE, TailDrive
 from fish_env.identification.variation import BEAT, SAG, unseen
+from fish_env.inference.estimate.free import LARGEST_SLOPE
 from fish_env.inference.hypotheses import effects_of
 from fish_env.inference.problem import Point
 
@@ -19,6 +21,7 @@ from fish_env.inference.problem import Point
 class Swimming(Protocol):
     """Runs and the filter on them."""
 
+    runs: tuple[RunData, ...]
     channels: tuple[str, ...]
     drive: TailDrive
 
@@ -68,5 +71,9 @@ def swum_slopes(
     lanes = problem.lanes(np.repeat(point.z[:, None], count, axis=1), effects)
     rows = problem.filter_for(effects).innovations(*lanes, noise, filtered, variation=more)
     slopes = np.asarray((rows[1:] - rows[0]).T / steps)
+    ends = np.cumsum([run.measured.size for run in problem.runs])[:-1]
+    for own in np.split(slopes, ends):
+        # A number by which the simulation of its run diverges stays where it is.
+        own[:, ~(np.abs(own).max(axis=0) < LARGEST_SLOPE)] = 0.0
     slopes[:, unseen(problem.channels)] = 0.0
     return slopes

@@ -294,6 +294,10 @@ class Problem(Protocol):
         """Whether a disturbance is as strong as any that a noise model may have."""
         return False
 
+    def drive_hides(self, noise: Any) -> bool:
+        """Whether an uneven drive hides ``hidden_by_drive`` under a noise model."""
+        return bool(self.drive.uneven)
+
     def settled(self, point: Point, noise: Any, nearby: bool = False) -> Problem:
         """The same problem with what is unknown of each run's start where it suits a point.
 

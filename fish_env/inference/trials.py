@@ -37,7 +37,7 @@ def tried_out(
     """
     problem = current.fit.problem
     hidden = [s for s in shown.best() if s.cause.name in problem.hidden_by_drive]
-    if not problem.drive.uneven or not hidden:
+    if not hidden or not problem.drive_hides(current.fit.noise):
         return None
     report(f"trying {', '.join(s.cause.name for s in hidden)} in fits of their own")
     tasks = [partial(_trial, current, "", {})]

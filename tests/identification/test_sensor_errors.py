@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfilt
 
-from fish_env.identification.sensor_errors import innovation_slopes, sensor_slopes
+from fish_env.identification.channels import devices_of
+from fish_env.identification.sensor_errors import LATE_S, innovation_slopes, sensor_slopes
 from fish_env.identification.series import SeriesProblem
 from fish_env.identification.variation import SENSOR_ERRORS
 from fish_env.inference.estimate.again import run_variation
@@ -49,7 +50,7 @@ def test_the_filter_takes_a_change_of_its_data_as_the_slopes_say(filtered, name)
 def test_samples_put_right_do_not_depend_on_the_way_there(filtered):
     problem, point, noise, _ = filtered
     numbers = np.zeros_like(problem.variation)
-    own = {"camera_delay": 0.03, "inertial_smoothing": 1.0, "gyro_gain_r": 0.05}
+    own = {"mounting_yaw": 0.05, "inertial_smoothing": 1.0, "gyro_gain_r": 0.05}
     for i, variation in enumerate(problem.variations):
         numbers[:, i] = own.get(variation.name, 0.0)
     at_once = problem.with_variation(numbers, point, noise)
@@ -74,7 +75,7 @@ def test_samples_put_right_by_a_motion_nearby_come_to_the_same(filtered):
     """Each time from the motion that the last ones show: one filter a time, not up to four."""
     problem, point, noise, _ = filtered
     numbers = np.zeros_like(problem.variation)
-    own = {"camera_delay": 0.03, "inertial_smoothing": 1.0, "gyro_gain_r": 0.05}
+    own = {"mounting_yaw": 0.05, "inertial_smoothing": 1.0, "gyro_gain_r": 0.05}
     for i, variation in enumerate(problem.variations):
         numbers[:, i] = own.get(variation.name, 0.0)
     exact = problem.with_variation(numbers, point, noise)
@@ -84,18 +85,7 @@ def test_samples_put_right_by_a_motion_nearby_come_to_the_same(filtered):
         moved = moved.with_variation(numbers, point, noise, near)
         off = (moved.runs[0].corrected - exact.runs[0].corrected) / problem.sensor_sd
         apart.append(float(np.sqrt(np.nanmean(off**2))))
-    assert apart[-1] < 0.1 < 0.5 * apart[0]
-
-
-def test_a_late_camera_is_what_its_regressor_says(filtered):
-    problem, _, _, (result,) = filtered
-    (run,) = problem.runs
-    changes = sensor_slopes(run.clock, result, problem.channels)
-    x = result.states[:, 0]
-    delay = 0.01
-    late = np.interp(run.clock - delay, run.clock, x) - x
-    own = delay * changes[:, problem.channels.index("x"), NAMES.index("camera_delay")]
-    assert np.linalg.norm((late - own)[1:]) < 0.15 * np.linalg.norm(late[1:])
+    assert apart[-1] < 0.3 * apart[0] < 0.1
 
 
 def test_slopes_need_a_filter_that_kept_them(filtered):
@@ -133,8 +123,15 @@ def test_a_camera_alone_has_no_inertial_unit_and_sees_no_depth():
     acting = {
         name for name, part in zip(NAMES, np.abs(changes).max(axis=(0, 1)), strict=True) if part
     }
-    assert acting == {"marker_x", "marker_y", "marker_z", "camera_delay"}
-    late = changes[:, channels.index("yaw"), NAMES.index("camera_delay")]
+    assert acting == {"marker_x", "marker_y", "marker_z", "current_north", "current_east"}
+    steps = np.array([0.3 * v.usual for v in problem.variations])
+    slopes = problem.variation_slopes(problem.start, noise, [result], steps)
+    named = {
+        v.name: np.abs(part).max() for v, part in zip(problem.variations, slopes.T, strict=True)
+    }
+    assert named["inertial_delay"] == named["depth_delay"] == 0.0 < named["camera_delay"]
+    by_channel = slopes.reshape(len(run.clock), len(channels), -1)
+    late = by_channel[:, channels.index("yaw"), list(named).index("camera_delay")]
     assert np.abs(late).max() > 0.0
 
 
@@ -152,8 +149,8 @@ def test_a_camera_above_tells_nothing_of_how_a_fish_floats(channels, floats):
     assert named["clock_offset"] > 0.0
 
 
-def test_a_filter_in_the_inertial_unit_is_undone():
-    """It delays by a good part of a beat: its first estimate, linear in the record, falls short."""
+def test_a_filter_in_the_inertial_unit_is_a_delay_and_a_little_smoothing():
+    """The delay is exact whatever its size, and what else the filter takes away is small."""
     data = simulate(Setup(runs=5, duration=16.0))
     low_pass = butter(2, 5.0, fs=250.0, output="sos")
     runs = []
@@ -166,20 +163,27 @@ def test_a_filter_in_the_inertial_unit_is_undone():
             seen[name] = np.interp(run.time_s, even, smooth)
         runs.append(replace(run, channels=seen))
     problem = SeriesProblem(replace(data, runs=tuple(runs)))
+    devices = devices_of(problem.channels)
+    problem = problem.with_runs([run.movable(devices) for run in problem.runs])
     at, plain = Point(np.zeros(len(problem.baseline)), {}), problem.default_noise()
-    k = [v.name for v in problem.variations].index("inertial_smoothing")
-    spread = np.zeros(len(problem.variations))
-    spread[k] = problem.variations[k].usual
+    names = [v.name for v in problem.variations]
+    late, smooth = names.index("inertial_delay"), names.index("inertial_smoothing")
+    spread = np.zeros(len(names))
+    spread[[late, smooth]] = [problem.variations[k].usual for k in (late, smooth)]
     noise = replace(plain, spread=spread)
 
     def misfit(one):
         return sum(-2.0 * f.log_likelihood for f in one.filtered(at, plain))
 
-    clean = misfit(SeriesProblem(data))
-    away = [misfit(problem) - clean]
-    for _ in range(4):
+    spoilt = misfit(problem)
+    for _ in range(6):
         problem, _ = predicted_variation(problem, at, noise)
-        away.append(misfit(problem) - clean)
-    assert problem.variation[:, k].mean() == pytest.approx(1.0, abs=0.1)
-    assert away[1] > 3.0 * away[-1]
-    assert away[-1] < 0.02 * away[0]
+    found = problem.variation
+    assert found[:, late].mean() == pytest.approx(LATE_S, abs=0.002)
+    assert found[:, smooth].mean() == pytest.approx(1.0, abs=0.25)
+    numbers = np.zeros_like(found)
+    clean = SeriesProblem(data)
+    clean = clean.with_runs([run.movable(devices) for run in clean.runs])
+    numbers[:, late] = found[:, late]
+    best = misfit(clean)
+    assert misfit(problem) - best < 0.02 * (spoilt - best)

@@ -1,0 +1,112 @@
+"""Devices that are late: what they show is the state that was, and no sample is interpolated."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fish_env.identification.channels import Device, devices_of
+from fish_env.identification.open_loop import without_feedback
+from fish_env.identification.series import SeriesProblem
+from fish_env.inference.problem import Point
+from tests.identification.synthetic import PATHS, Setup, simulate
+
+DELAYS = ("camera_delay", "inertial_delay", "depth_delay")
+STEP_S = 0.04
+
+
+@pytest.fixture(scope="module")
+def problem():
+    return SeriesProblem(simulate(Setup(runs=1)), paths=PATHS)
+
+
+def numbers_of(problem, **own):
+    found = np.zeros_like(problem.variation)
+    names = [v.name for v in problem.variations]
+    for name, value in own.items():
+        found[:, names.index(name)] = value
+    return found
+
+
+def predicted(problem, run):
+    """Channels (T, C) as the model alone predicts them."""
+    silent = replace(run, measured=np.zeros_like(run.measured), distortion=None)
+    one = problem.with_runs([silent])
+    z = np.zeros((len(PATHS), 1))
+    flat = one.innovations(z, {}, one.default_noise(), [without_feedback(silent)])
+    return -flat[0].reshape(run.measured.shape)
+
+
+def dense(run, step_s):
+    clock = np.arange(0.0, run.clock[-1] + 1e-9, step_s)
+    rows = len(clock)
+    return replace(
+        run,
+        clock=clock,
+        substeps=np.ones(rows, np.int64),
+        fresh=np.zeros(rows, bool),
+        measured=np.zeros((rows, run.measured.shape[1])),
+    )
+
+
+@pytest.mark.parametrize("age", [0.003, 0.013, 0.027, 0.0399])
+def test_a_late_device_shows_the_state_that_was(problem, age):
+    (run,) = problem.runs
+    fine = dense(run, 0.002)
+    truth, now = predicted(problem, fine), predicted(problem, run)
+    late = problem.with_variation(
+        numbers_of(problem, **dict.fromkeys(DELAYS, age)), problem.start, problem.default_noise()
+    )
+    shown = predicted(problem, late.runs[0])
+    inside = run.clock > 0.1
+    for i in range(len(problem.channels)):
+        was = np.interp(run.clock - age, fine.clock, truth[:, i])
+        off, moved = (np.std((each[:, i] - was)[inside]) for each in (shown, now))
+        assert off < 0.01 * moved
+
+
+def test_only_the_channels_of_a_device_are_late(problem):
+    (run,) = problem.runs
+    now = predicted(problem, run)
+    values = numbers_of(problem, depth_delay=0.02)
+    late = problem.with_variation(values, problem.start, problem.default_noise())
+    apart = np.abs(predicted(problem, late.runs[0]) - now).max(axis=0)
+    assert {n for n, gap in zip(problem.channels, apart, strict=True) if gap > 1e-12} == {"z"}
+
+
+def test_rows_are_moved_by_whole_samples_and_as_many_always_count(problem):
+    devices = devices_of(problem.channels)
+    movable = problem.with_runs([problem.runs[0].movable(devices)])
+    run = movable.runs[0]
+    assert run.most_rows == 2
+    inertial = [i for i, d in enumerate(devices) if d == Device.INERTIAL]
+    counts = {int(np.isfinite(run.measured).sum())}
+    for delay, rows in ((0.03, 0), (0.05, 1), (0.09, 2), (0.2, 2)):
+        values = numbers_of(problem, inertial_delay=delay)
+        moved = movable.with_variation(values, problem.start, problem.default_noise()).runs[0]
+        assert moved.moved[Device.INERTIAL] == rows
+        np.testing.assert_array_equal(
+            moved.measured[4:-2, inertial],
+            run.recorded[4 + rows : len(run.clock) - 2 + rows, inertial],
+        )
+        ages = moved.ages(moved.variation[:, None])[:, 0]
+        assert ages[Device.INERTIAL] == pytest.approx(delay - rows * STEP_S)
+        counts.add(int(np.isfinite(moved.measured).sum()))
+    assert len(counts) == 1
+
+
+def test_the_likelihood_hardly_leaps_where_a_row_is_moved(problem):
+    devices = devices_of(problem.channels)
+    movable = problem.with_runs([problem.runs[0].movable(devices)])
+    noise, at = problem.default_noise(), Point(np.zeros(len(PATHS)), {})
+
+    def value(delay):
+        values = numbers_of(problem, inertial_delay=delay)
+        moved = movable.with_variation(values, at, noise)
+        return -2.0 * moved.filtered(at, noise)[0].log_likelihood
+
+    below, above = value(STEP_S - 1e-4), value(STEP_S + 1e-4)
+    far = value(0.0)
+    assert abs(below - above) < 0.1 * abs(above - far)

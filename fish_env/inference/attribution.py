@@ -27,7 +27,8 @@ from fish_env.inference.projection import Signal
 from fish_env.inference.rivals import explained_away, rivals_of, tied
 from fish_env.inference.screening import Screen, screen
 from fish_env.inference.search import refits, restart_from_winner
-from fish_env.inference.shortlist import shortlisted
+from fish_env.inference.shortlist import like, newly_shown, shortlisted
+from fish_env.inference.trials import tried_out
 
 
 @dataclass(frozen=True)
@@ -127,7 +128,7 @@ def extended(
             test says that something is missing.
     """
     search = Search(causes, rng, effort, report, relaxed_log_p)
-    found, together = search.measured(begun), effort.retries
+    found, together = search.hidden(search.measured(begun)), effort.retries
     while len(found.accepted.causes) < POLICY.most_causes:
         if found.accepted.causes and together:
             found, together = search.together(found), False
@@ -192,6 +193,22 @@ class Search:
             begun, accepted=accepted, screens=(*begun.screens, after),
             gain=nothing.score - accepted.score,
         )  # fmt: skip
+
+    def hidden(self, begun: Attribution) -> Attribution:
+        """With an effect that an uneven drive hides; the same without such, or beside causes.
+
+        Beside a large misfit no screen shows it, and what makes up for it would be found instead.
+        """
+        nothing = begun.accepted
+        if nothing.causes or not (self.effort.retries and disturbance_at_limit(nothing.fit)):
+            return begun
+        more = tried_out(nothing, begun.screens[-1], self.report)
+        if more is None:
+            return begun
+        after = screen(more.fit, self.causes, self.rng)
+        return replace(
+            begun, accepted=more, screens=(*begun.screens, after), gain=nothing.score - more.score
+        )
 
     def together(self, found: Attribution) -> Attribution:
         """With further effects that are needed beside those found, and what the runs differ in."""
@@ -282,8 +299,8 @@ class Search:
         if effort.retries:
             relaxed = _under_relaxed_noise(current, chosen, self.causes, self.rng)
         problem = current.fit.problem
-        like = partial(_like, before=shown, chosen=[*chosen, *unseen], problem=problem)
-        return refits(current, chosen, self.report, relaxed, effort, like, unseen)
+        alike = partial(like, before=shown, chosen=[*chosen, *unseen], problem=problem)
+        return refits(current, chosen, self.report, relaxed, effort, alike, unseen)
 
     def _questioned(
         self,
@@ -301,8 +318,8 @@ class Search:
         after = screen(best.fit, self.causes, self.rng)
         problem, least = best.fit.problem, roughness(best) * total
         if self.effort.retries and not current.causes and shortlisted(problem, after, 1, least):
-            others = _new(after, chosen)
-            others += _like(best.causes[-1], shown, others, problem)
+            others = newly_shown(after, chosen)
+            others += like(best.causes[-1], shown, others, problem)
             tried = restart_from_winner(current, tried, others, self.report)
         varied = tried[0].varied()
         if varied is not best:
@@ -379,17 +396,3 @@ def _may_be_out_of_step(current: Explanation, chosen: Sequence[Signal]) -> bool:
     if current.causes or current.fit.problem.drive.known:
         return False
     return bool(chosen) and bool(disturbance_at_limit(current.fit))
-
-
-def _new(after: Screen, chosen: Sequence[Signal]) -> list[Signal]:
-    """Effects that the first screen had not shown: the misfit then hid them."""
-    known = {s.cause.name for s in chosen}
-    leading = [s for s in after.best() if s.log_p < after.threshold and s.cause.is_effect]
-    return [s for s in leading if s.cause.name not in known][:3]
-
-
-def _like(winner: str, before: Screen, chosen: Sequence[Signal], problem: Problem) -> list[Signal]:
-    """Effects known to look like the winner, whatever the screen made of them."""
-    alike = set(problem.known[winner].confusable_with) if winner in problem.known else set()
-    known = {winner, *(s.cause.name for s in chosen)}
-    return [s for s in before.best() if s.cause.name in alike - known]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from fish_env.inference.problem import Problem
@@ -55,3 +57,17 @@ def _threshold_of_coefficients(screen: Screen, found: int) -> float:
         return screen.threshold
     count = sum(not s.cause.is_effect for s in screen.signals) + found
     return max(screen.threshold, float(np.log(screen.level * (found + 1) / count)))
+
+
+def newly_shown(after: Screen, chosen: Sequence[Signal]) -> list[Signal]:
+    """Effects that the first screen had not shown: the misfit then hid them."""
+    known = {s.cause.name for s in chosen}
+    leading = [s for s in after.best() if s.log_p < after.threshold and s.cause.is_effect]
+    return [s for s in leading if s.cause.name not in known][:3]
+
+
+def like(winner: str, before: Screen, chosen: Sequence[Signal], problem: Problem) -> list[Signal]:
+    """Effects known to look like the winner, whatever the screen made of them."""
+    alike = set(problem.known[winner].confusable_with) if winner in problem.known else set()
+    known = {winner, *(s.cause.name for s in chosen)}
+    return [s for s in before.best() if s.cause.name in alike - known]

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.stats import binom
 
 from fish_env.arrays import BoolArray, FloatArray
+from fish_env.identification.filtering import Filtered
 from fish_env.identification.in_step import nominal_point
 from fish_env.identification.runs import RunData
 from fish_env.identification.series import SeriesProblem
@@ -25,6 +26,8 @@ BESIDE, AROUND = (-2, -1, 1, 2), (-4, -3, -2, -1, 1, 2, 3, 4)
 """Samples whose median says what is missed anyhow, and those that say how much that scatters."""
 MAD_SD = 1.4826
 """Standard deviation of normal numbers over the median of their sizes."""
+BEGINS_S = 0.6
+"""Seconds of a run in which the filter still finds out where the fish is and how it moves."""
 CHANCE = 0.01
 """Of as many outliers near jumps, by the share elsewhere, below which they are motion."""
 
@@ -47,12 +50,10 @@ def without_model_outliers(
         point = nominal_point(problem)
         settled = problem.settled(point, noise)
         try:
-            missed = [f.slopes.raw for f in settled.filtered(point, noise, keep_slopes=True)
-                      if f.slopes is not None]  # fmt: skip
+            filtered = settled.filtered(point, noise, keep_slopes=True)
         except np.linalg.LinAlgError:
             break
-        masks = [np.where(np.isfinite(run.measured), raw, np.nan)
-                 for run, raw in zip(problem.runs, missed, strict=True)]  # fmt: skip
+        masks = [_missed(run, one) for run, one in zip(problem.runs, filtered, strict=True)]
         found = [np.zeros(raw.shape, bool) for raw in masks]
         for channel in range(len(problem.channels)):
             own = _of_channel([raw[:, channel] for raw in masks], near, shares[channel])
@@ -65,6 +66,13 @@ def without_model_outliers(
         runs = [_without(run, mask) for run, mask in zip(problem.runs, found, strict=True)]
         problem = problem.with_runs(runs)
     return problem, _together(problem, known, flagged, sizes)
+
+
+def _missed(run: RunData, filtered: Filtered) -> FloatArray:
+    """(T, C) measured less predicted (SI); NaN where missing, or before the filter has settled."""
+    assert filtered.slopes is not None
+    judged = np.isfinite(run.measured) & (run.clock > BEGINS_S)[:, None]
+    return np.asarray(np.where(judged, filtered.slopes.raw, np.nan))
 
 
 def _near_jumps(run: RunData) -> BoolArray:

@@ -39,7 +39,8 @@ TAIL_PHASE = 13  # row of the state
 CORRECTIONS = 4
 """Each leaves a tenth or less of the error of a start."""
 TEMPLATES = tuple(
-    Path(__file__).with_name(f"{name}_template.py") for name in ("error_state", "filter", "replay")
+    Path(__file__).with_name(f"{name}_template.py")
+    for name in ("observation", "error_state", "filter", "replay")
 )
 
 _LOADING = Lock()

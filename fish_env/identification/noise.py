@@ -19,10 +19,6 @@ from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point
 from fish_env.params.schema import FishParams
 
-HIDING_PHASE_SD = 0.05
-"""Random walk of the phase (rad/s^0.5) from which it follows a late tail: in the two seconds
-between commands it then goes as far as a lag of 20 ms shifts the phase when the beat changes by
-0.6 Hz."""
 UNEVEN_PHASE_SD = 0.03
 """Random walk of the tail's phase (rad/s^0.5) that a fit begins with where runs beat differently:
 no such beat is constant to the last. Its size is then estimated with the disturbance."""

@@ -15,6 +15,11 @@ LARGEST_TURN = 0.3
 """By which one sample may correct the tail's phase (rad). What a phase does is a sine: over this
 much it is off its tangent by 5 %, and beyond it a correction soon points the wrong way."""
 
+HIDING_PHASE_SD = 0.05
+"""Random walk of the phase (rad/s^0.5) from which it follows a late tail: in the two seconds
+between commands it then goes as far as a lag of 20 ms shifts the phase when the beat changes by
+0.6 Hz."""
+
 
 @dataclass(frozen=True)
 class NoiseModel:
@@ -51,6 +56,11 @@ class NoiseModel:
         Under relaxed noise the phase may be off by any amount, and has to be found.
         """
         return np.inf if self.phase_sd >= RELAXED_PHASE_SD else LARGEST_TURN
+
+    @property
+    def hides_lags(self) -> bool:
+        """Whether the tail's phase walks far enough to follow a late tail."""
+        return self.phase_sd > HIDING_PHASE_SD
 
     @property
     def wrench_variance(self) -> FloatArray:

@@ -13,23 +13,17 @@ from fish_env.data.schema import Run
 from fish_env.data.vocabulary import COMMANDS
 from fish_env.errors import DatasetError
 from fish_env.identification.channels import BY_NAME, Device, Kind
-from fish_env.identification.state_blocks import N_ERROR, PHASE_COLUMN, columns
+from fish_env.identification.first_state import first_state
+from fish_env.identification.late_rows import in_earlier_rows, rows_to_spare
+from fish_env.identification.state_blocks import PHASE_COLUMN
 from fish_env.identification.variation import BEAT, COUNT, SAG, SENSOR_ERRORS, device_ages
-from fish_env.model.frames import quaternion_from_euler
-from fish_env.model.state import BASE_STATES
 
-POSITION, ROTATION = columns("position"), columns("rotation")
-VELOCITY, RATE = columns("velocity"), columns("rate")
 PHASE = PHASE_COLUMN
 UNTOLD_S = 0.15
 """A record does not say what a servo was told before it begins, and a late one still follows that:
 of a run from rest, the first samples judge nothing (s)."""
 
 
-LATEST_S = 0.1
-"""Largest delay of a device by which its samples are moved to earlier rows (s)."""
-UNEVEN = 0.02
-"""Share of the usual sample interval by which the others may differ for rows to be moved."""
 SAME_INSTANT_S = 1e-6
 BEFORE_S = 1e3
 FREQUENCY = 2  # column of the commands
@@ -140,7 +134,7 @@ class RunData:
         rows = np.clip(rows, 0, self.most_rows)
         if np.array_equal(rows, self.moved):
             return numbered
-        return replace(numbered, measured=self._in_rows(self.recorded, rows), moved=rows)
+        return replace(numbered, measured=self._in_rows(rows), moved=rows)
 
     def movable(self, devices: Sequence[int]) -> RunData:
         """The same run with rows that may be moved, where its samples are evenly spaced.
@@ -152,11 +146,19 @@ class RunData:
         Args:
             devices: (C,) device of each channel.
         """
-        spans = np.diff(self.clock)
-        if np.ptp(spans) > UNEVEN * float(np.median(spans)) or self.most_rows < 1:
+        if self.most_rows < 1:
             return self
         run = replace(self, devices=np.asarray(devices), recorded=self.measured)
-        return replace(run, measured=run._in_rows(self.measured, run.moved))
+        return replace(run, measured=run._in_rows(run.moved))
+
+    def _in_rows(self, rows: IntArray) -> FloatArray:
+        """(T, C) samples moved to earlier rows (devices,), but for those that judge nothing."""
+        assert self.recorded is not None
+        assert self.devices is not None
+        seen = in_earlier_rows(self.recorded, self.devices, rows, self.most_rows)
+        if not self.swimming:
+            seen[self.clock < UNTOLD_S] = np.nan
+        return seen
 
     @cached_property
     def step_s(self) -> float:
@@ -166,21 +168,7 @@ class RunData:
     @property
     def most_rows(self) -> int:
         """Rows by which samples may be moved."""
-        return min(int(LATEST_S / self.step_s), len(self.clock) // 4)
-
-    def _in_rows(self, recorded: FloatArray, rows: IntArray) -> FloatArray:
-        """Samples (T, C) moved to earlier rows, by as many as their devices (devices,) ask for."""
-        assert self.devices is not None
-        seen = recorded.copy()
-        for device in np.unique(self.devices[self.devices != Device.DRIVE]).tolist():
-            own = np.flatnonzero(self.devices == device)
-            kept = len(seen) - self.most_rows
-            first = int(rows[device])
-            seen[:kept, own] = recorded[first : first + kept, own]
-            seen[kept:, own] = np.nan
-        if not self.swimming:
-            seen[self.clock < UNTOLD_S] = np.nan
-        return np.ascontiguousarray(seen)
+        return rows_to_spare(self.clock)
 
     def ages(self, own: FloatArray) -> FloatArray:
         """How much older than its row a sample of each device is (devices, N), s.
@@ -306,7 +294,7 @@ def prepare_run(
     switches = run.commands.times_s - run.time_s[0]
     fresh = _after(switches[_jumped(run.commands.values)], clock)
     substeps = _steps(clock, np.where(fresh, dt / FINER, dt))
-    state0, covariance0 = _initial(run, channels, measured, clock, noise_sd)
+    state0, covariance0 = first_state(run, channels, measured, clock, noise_sd)
     if run.start == "rest":
         measured[clock < UNTOLD_S] = np.nan
     # Where the tail is at the first sample is known only once it has moved.
@@ -379,62 +367,3 @@ def _merged(clock: FloatArray, measured: FloatArray) -> tuple[FloatArray, FloatA
         at = int(np.searchsorted(first, row, side="right")) - 1
         merged[at] = np.where(np.isfinite(merged[at]), merged[at], measured[row])
     return clock[first], merged
-
-
-def _initial(
-    run: Run,
-    channels: Sequence[str],
-    measured: FloatArray,
-    clock: FloatArray,
-    noise_sd: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Initial state and its spread: level and at rest, or a local line through the first samples.
-
-    At rest the first measured pose is off by the sensor noise only; the velocities have the spread
-    that a first stroke gives in a tenth of a second. An unknown start takes value
-    and slope of each channel over the first 0.6 s; a channel that is not measured starts at zero
-    with a spread that covers a swimming fish.
-    """
-    rest = run.start == "rest"
-    first = {name: _start_of(measured[:, i], clock) for i, name in enumerate(channels)}
-    noise = dict(zip(channels, noise_sd, strict=True))
-    pose = {n: first.get(n, (0.0, 0.0))[0] for n in ("x", "y", "z", "roll", "pitch", "yaw")}
-    if rest:
-        pose["roll"] = pose["pitch"] = 0.0
-    state = np.zeros(len(BASE_STATES))
-    state[0:3] = pose["x"], pose["y"], pose["z"]
-    euler = np.array([pose["roll"], pose["pitch"], pose["yaw"]])
-    state[3:7] = quaternion_from_euler(euler)
-    state[13] = run.tail_phase or 0.0
-    spread = np.zeros(N_ERROR)
-    wide = {"x": 1e-3, "y": 1e-3, "z": 1e-3, "roll": 0.05, "pitch": 0.1, "yaw": 1e-3}
-    for i, name in enumerate(("x", "y", "z", "roll", "pitch", "yaw")):
-        spread[i] = 2.0 * noise.get(name, wide[name])
-    if rest:
-        spread[3:5] = np.minimum(spread[3:5], 0.02)
-        spread[VELOCITY], spread[RATE] = 0.02, 0.2
-    else:
-        ground = np.array([first.get(n, (0.0, 0.0))[1] for n in ("x", "y", "z")])
-        state[7:10] = _into_body(euler, ground)
-        spread[VELOCITY], spread[RATE] = 0.05, 0.6
-    spread[PHASE] = 0.0 if run.tail_phase is not None else 0.4
-    return state, np.diag(spread**2)
-
-
-def _start_of(values: FloatArray, clock: FloatArray) -> tuple[float, float]:
-    """Value at the first sample and slope of a line through the first 0.6 s."""
-    chosen = (clock <= 0.6) & np.isfinite(values)
-    if chosen.sum() < 3:
-        chosen = np.isfinite(values)
-        chosen &= np.cumsum(chosen) <= 3
-    if chosen.sum() < 2:
-        return float(np.nanmean(values)), 0.0
-    slope, level = np.polyfit(clock[chosen], np.unwrap(values[chosen]), 1)
-    return float(level), float(slope)
-
-
-def _into_body(euler: FloatArray, inertial: FloatArray) -> FloatArray:
-    from scipy.spatial.transform import Rotation
-
-    result: FloatArray = Rotation.from_euler("ZYX", euler[::-1]).inv().apply(inertial)
-    return result

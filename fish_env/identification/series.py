@@ -21,7 +21,6 @@ from fish_env.identification.filtering import Filtered, Measurement, Pushes, Run
 from fish_env.identification.generic_forces import BoundForces, generic_forces
 from fish_env.identification.kernel_kinds import LEAN, quickest, with_stages
 from fish_env.identification.noise import (
-    HIDING_PHASE_SD,
     UNEVEN_PHASE_SD,
     disturbance_range,
     fitted_noise,
@@ -38,7 +37,7 @@ from fish_env.identification.runs import FINER, RunData, prepare_run
 from fish_env.identification.sensor_errors import slopes_of_runs
 from fish_env.identification.sensors import largest_jitter_of, largest_noise
 from fish_env.identification.tail_drive import LATE, TailDrive
-from fish_env.identification.variation import EVERY, VARIATIONS
+from fish_env.identification.variation import EVERY, USUAL, VARIATIONS
 from fish_env.identification.variation_slopes import swum_slopes
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.hypotheses import effects_of
@@ -95,8 +94,7 @@ class SeriesProblem(Problem):
         )
         self.baseline = Baseline(self.fish, paths)
         self.effects = tuple(effects)
-        self.unrefined = False
-        self.drive: TailDrive = TailDrive()
+        self.unrefined, self.drive = False, TailDrive()
         self._filters: dict[frozenset[str], RunFilter] = {}
         if unknown := [name for name in self.effects if name not in self.known]:
             raise EffectError(f"unknown effects {unknown}; known: {', '.join(self.known)}")
@@ -152,13 +150,12 @@ class SeriesProblem(Problem):
     def groups(self) -> tuple[IntArray, FloatArray]:
         """(D,) run of each innovation, and (D,) its time in the run (s)."""
         run_of = np.repeat(np.arange(len(self.runs)), [run.measured.size for run in self.runs])
-        time_of = [np.repeat(run.clock, len(self.channels)) for run in self.runs]
-        return run_of, np.concatenate(time_of)
+        return run_of, np.concatenate([np.repeat(r.clock, len(self.channels)) for r in self.runs])
 
     def residual_channels(self) -> tuple[tuple[str, ...], IntArray]:
         """Names of the channels, and (D,) which of them each innovation is of."""
-        samples = sum(len(run.clock) for run in self.runs)
-        return self.channels, np.tile(np.arange(len(self.channels)), samples)
+        rows = sum(len(run.clock) for run in self.runs)
+        return self.channels, np.tile(np.arange(len(self.channels)), rows)
 
     @property
     def measured(self) -> BoolArray:
@@ -188,10 +185,8 @@ class SeriesProblem(Problem):
     def default_noise(self) -> NoiseModel:
         """Sensor noise from differences of the data, and a disturbance of a few millinewton."""
         noise = small_disturbance(self.sensor_sd)
-        if not self.drive.uneven:
-            return noise
-        spread = np.array([variation.usual for variation in self.variations])
-        return replace(noise, phase_sd=UNEVEN_PHASE_SD, spread=spread)
+        uneven = replace(noise, phase_sd=UNEVEN_PHASE_SD, spread=USUAL)
+        return uneven if self.drive.uneven else noise
 
     def fitted_noise(
         self,
@@ -214,8 +209,8 @@ class SeriesProblem(Problem):
         return bool(widest_disturbance(self.fish).left_by(noise))
 
     def drive_hides(self, noise: NoiseModel) -> bool:
-        """Whether the tail's phase walks far enough to follow a late tail (see the protocol)."""
-        return self.drive.uneven and noise.phase_sd > HIDING_PHASE_SD
+        """Whether the tail's phase walks far enough to follow a late tail."""
+        return self.drive.uneven and noise.hides_lags
 
     def settled(self, point: Point, noise: NoiseModel, nearby: bool = False) -> SeriesProblem:
         """The same problem with the likeliest starting phase of every run that has none."""

@@ -69,6 +69,7 @@ unit takes away beside making it late; the picture of a camera some metres above
 with depth, by the refractive index and its height. Water that drifts carries the fish along: to the
 sensors it is as if their frame moved."""
 EVERY = (*VARIATIONS, *SENSOR_ERRORS)
+USUAL = np.array([variation.usual for variation in EVERY])
 UPRIGHT = ("z", "roll", "pitch", "w", "p", "q")
 """Channels that show how a fish floats. A camera above the tank alone sees none of them."""
 _MASS, _BUOYANCY = RECORD_FIELDS.index("mass_total"), RECORD_FIELDS.index("mass_buoyancy")

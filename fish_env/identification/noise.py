@@ -19,9 +19,6 @@ from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point
 from fish_env.params.schema import FishParams
 
-UNEVEN_PHASE_SD = 0.03
-"""Random walk of the tail's phase (rad/s^0.5) that a fit begins with where runs beat differently:
-no such beat is constant to the last. Its size is then estimated with the disturbance."""
 PHASE_SD_RANGE = (3e-3, 0.2)
 """Random walk of the phase of a tail whose beat is a little different in each run (rad/s^0.5): one
 that is half a per cent off is 0.3 rad off after ten seconds, as is a walk of 0.1."""

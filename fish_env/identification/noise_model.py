@@ -15,6 +15,9 @@ LARGEST_TURN = 0.3
 """By which one sample may correct the tail's phase (rad). What a phase does is a sine: over this
 much it is off its tangent by 5 %, and beyond it a correction soon points the wrong way."""
 
+UNEVEN_PHASE_SD = 0.03
+"""Random walk of the tail's phase (rad/s^0.5) that a fit begins with where runs beat differently:
+no such beat is constant to the last. Its size is then estimated with the disturbance."""
 HIDING_PHASE_SD = 0.05
 """Random walk of the phase (rad/s^0.5) from which it follows a late tail: in the two seconds
 between commands it then goes as far as a lag of 20 ms shifts the phase when the beat changes by

@@ -21,14 +21,13 @@ from fish_env.identification.filtering import Filtered, Measurement, Pushes, Run
 from fish_env.identification.generic_forces import BoundForces, generic_forces
 from fish_env.identification.kernel_kinds import LEAN, quickest, with_stages
 from fish_env.identification.noise import (
-    UNEVEN_PHASE_SD,
     disturbance_range,
     fitted_noise,
     small_disturbance,
     white_noise_sd,
     widest_disturbance,
 )
-from fish_env.identification.noise_model import RELAXED_PHASE_SD, NoiseModel
+from fish_env.identification.noise_model import RELAXED_PHASE_SD, UNEVEN_PHASE_SD, NoiseModel
 from fish_env.identification.open_loop import windows, without_feedback
 from fish_env.identification.parameters import ALIKE, Baseline, changes_of, neutral_values
 from fish_env.identification.phases import settle_phases
@@ -65,6 +64,7 @@ class SeriesProblem(Problem):
     """
 
     known: dict[str, Effect]
+    drive: TailDrive
     out_of_step = ("frequency_scale", "battery_sag", "clock_scale", "clock_skew")
     hidden_by_drive = LATE
     interchangeable = ALIKE

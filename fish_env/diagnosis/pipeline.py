@@ -186,6 +186,7 @@ def _diagnose_runs(
             found, gain = unnamed(found, judging, np.random.default_rng([seed, 4])), None
             dataset = replace(dataset, notes=(*dataset.notes, USELESS))
     progress("locating the misfit")
+    problem = problem.with_refinement()  # long steps may be too long for the published estimates
     judged = one_step(problem, baseline, found.accepted)
     place = localise_fits(problem, judged, np.random.default_rng([seed, 3]))
     progress("choosing the next experiment")

@@ -23,6 +23,7 @@ from fish_env.identification.filtering import Filtered, Slopes
 from fish_env.identification.runs import RunData
 from fish_env.identification.state_blocks import N_ERROR, N_MOVING, columns
 from fish_env.identification.variation import SENSOR_ERRORS
+from fish_env.identification.variation_slopes import leave_diverged
 from fish_env.model.frames import euler_from_quaternion
 from fish_env.rigidbody.kinematics import euler_rates, rotations
 
@@ -194,6 +195,8 @@ def slopes_of_runs(
         )
         for run, one in zip(runs, filtered, strict=True)
     ]  # fmt: skip
+    for part in parts:
+        leave_diverged(part)
     return np.concatenate(parts)
 
 

@@ -73,7 +73,15 @@ def swum_slopes(
     slopes = np.asarray((rows[1:] - rows[0]).T / steps)
     ends = np.cumsum([run.measured.size for run in problem.runs])[:-1]
     for own in np.split(slopes, ends):
-        # A number by which the simulation of its run diverges stays where it is.
-        own[:, ~(np.abs(own).max(axis=0) < LARGEST_SLOPE)] = 0.0
+        leave_diverged(own)
     slopes[:, unseen(problem.channels)] = 0.0
     return slopes
+
+
+def leave_diverged(slopes: FloatArray) -> None:
+    """Give numbers of a run by which its simulation diverges no slope, in place: they stay.
+
+    Args:
+        slopes: (D, K) of the innovations of one run.
+    """
+    slopes[:, ~(np.abs(slopes).max(axis=0) < LARGEST_SLOPE)] = 0.0

@@ -10,6 +10,7 @@ import pytest
 from fish_env.identification.channels import Device, devices_of
 from fish_env.identification.open_loop import without_feedback
 from fish_env.identification.series import SeriesProblem
+from fish_env.identification.variation_slopes import leave_diverged
 from fish_env.inference.problem import Point
 from tests.identification.synthetic import PATHS, Setup, simulate
 
@@ -110,3 +111,9 @@ def test_the_likelihood_hardly_leaps_where_a_row_is_moved(problem):
     below, above = value(STEP_S - 1e-4), value(STEP_S + 1e-4)
     far = value(0.0)
     assert abs(below - above) < 0.1 * abs(above - far)
+
+
+def test_numbers_by_which_a_run_diverges_get_no_slope():
+    slopes = np.array([[1.0, 1e200, np.nan, -3.0], [2.0, 1.0, 0.0, np.inf]])
+    leave_diverged(slopes)
+    np.testing.assert_array_equal(slopes, [[1.0, 0.0, 0.0, 0.0], [2.0, 0.0, 0.0, 0.0]])

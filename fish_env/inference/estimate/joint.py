@@ -125,7 +125,9 @@ def _evaluated(problem: Problem, free: Free, vector: FloatArray, noise: Any) -> 
 def _agreed(at: Joint, free: Free, noise: Any) -> Joint:
     """The same numbers, with what follows from the motion nearer to that motion.
 
-    Steps are then compared with what they begin from: the value may have risen.
+    Steps are then compared with what they begin from: the value may have risen. Where it rises by
+    more than the noise of all residuals, the motion and what follows from it drive each other away,
+    and stay as they are.
     """
     problem = at.problem
     if not problem.variation.any():
@@ -136,7 +138,7 @@ def _agreed(at: Joint, free: Free, noise: Any) -> Joint:
         agreed = _evaluated(moved, free, at.vector, noise)
     except np.linalg.LinAlgError:
         return at
-    return agreed if np.isfinite(agreed.value) else at
+    return agreed if agreed.value < at.value + len(at.residuals) else at
 
 
 class _Model:

@@ -30,6 +30,7 @@ from fish_env.model.composed import (
     X,
     kernel,
     lane_initialise,
+    normalise,
     rk4_step,
 )
 from fish_env.model.history import HEARD, RECORD
@@ -81,14 +82,7 @@ def step_lanes_once(work, width, elapsed, h, pace, late, history, tables):
     for k in range(width):  # true time since the run began is `pace` times the recorded one
         work[TIME * width + k] = (pace[k] - 1.0) * elapsed
     rk4_step(work, width, elapsed, h, tables, late, history, 0, width, pace)
-    for k in range(width):
-        qw, qx = work[(X + 3) * width + k], work[(X + 4) * width + k]
-        qy, qz = work[(X + 5) * width + k], work[(X + 6) * width + k]
-        scale = 1.0 / np.sqrt(qw * qw + qx * qx + qy * qy + qz * qz)
-        work[(X + 3) * width + k] = qw * scale
-        work[(X + 4) * width + k] = qx * scale
-        work[(X + 5) * width + k] = qy * scale
-        work[(X + 6) * width + k] = qz * scale
+    normalise(work, width)
     for n in range(BODY * width):  # what the step has changed, see keep_step
         work[SUM * width + n] = work[X * width + n] - work[X0 * width + n]
     for n in range(N_STATES * width):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 
 from fish_env.identification.series import SeriesProblem
 from fish_env.identification.tail_drive import SCALE
@@ -19,6 +18,5 @@ def nominal_point(problem: SeriesProblem, more: Iterable[str] = ()) -> Point:
         more: effect parameters whose effects get their neutral values too.
     """
     own = {path: value for path, value in problem.drive.measured.items() if path != SCALE}
-    told = {**problem.neutral(effects_of((*own, SCALE, *more))), **own}
-    begin = Point(problem.start.z, told)
-    return replace(begin, effects={**begin.effects, SCALE: problem.drive.scale})
+    neutral = problem.neutral(effects_of((*own, SCALE, *more)))
+    return Point(problem.start.z, {**neutral, **own, SCALE: problem.drive.scale})

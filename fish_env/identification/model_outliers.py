@@ -46,8 +46,8 @@ def without_model_outliers(
     flagged = [np.zeros(run.measured.shape, bool) for run in problem.runs]
     near = [_near_jumps(run) for run in problem.runs]
     shares = _calm_shares(problem, known, near)
+    point = nominal_point(problem)
     for _ in range(ROUNDS):
-        point = nominal_point(problem)
         settled = problem.settled(point, noise)
         try:
             filtered = settled.filtered(point, noise, keep_slopes=True)

@@ -27,6 +27,19 @@ PERTURB = 1e-5
 
 
 @kernel
+def normalise(work, width):
+    """Make the quaternions of the X rows unit ones."""
+    for k in range(width):
+        qw, qx = work[(X + 3) * width + k], work[(X + 4) * width + k]
+        qy, qz = work[(X + 5) * width + k], work[(X + 6) * width + k]
+        scale = 1.0 / np.sqrt(qw * qw + qx * qx + qy * qy + qz * qz)
+        work[(X + 3) * width + k] = qw * scale
+        work[(X + 4) * width + k] = qx * scale
+        work[(X + 5) * width + k] = qy * scale
+        work[(X + 6) * width + k] = qz * scale
+
+
+@kernel
 def keep_step(work, width, path, step):
     """Keep how the body's state changed in a step, and its slope at the end.
 
@@ -63,13 +76,7 @@ def put_earlier(work, width, age, h, steps, path):
             slope = path[step, BODY + j, k]
             bend = (slope * h - path[step, j, k]) * (2.0 / (h * h))
             work[(X + j) * width + k] -= left * (slope - 0.5 * left * bend)
-        qw, qx = work[(X + 3) * width + k], work[(X + 4) * width + k]
-        qy, qz = work[(X + 5) * width + k], work[(X + 6) * width + k]
-        scale = 1.0 / np.sqrt(qw * qw + qx * qx + qy * qy + qz * qz)
-        work[(X + 3) * width + k] = qw * scale
-        work[(X + 4) * width + k] = qx * scale
-        work[(X + 5) * width + k] = qy * scale
-        work[(X + 6) * width + k] = qz * scale
+    normalise(work, width)
 
 
 @kernel

@@ -181,9 +181,7 @@ def test_a_filter_in_the_inertial_unit_is_a_delay_and_a_little_smoothing():
     found = problem.variation
     assert found[:, late].mean() == pytest.approx(LATE_S, abs=0.002)
     assert found[:, smooth].mean() == pytest.approx(1.0, abs=0.25)
-    numbers = np.zeros_like(found)
     clean = SeriesProblem(data)
     clean = clean.with_runs([run.movable(devices) for run in clean.runs])
-    numbers[:, late] = found[:, late]
     best = misfit(clean)
     assert misfit(problem) - best < 0.02 * (spoilt - best)

@@ -31,7 +31,7 @@ from fish_env.identification.series import series_of
 from fish_env.inference.attribution import Ranked
 from fish_env.inference.effort import effort_of
 from fish_env.inference.estimate.fit import Fit
-from fish_env.inference.estimate.free import spread_of
+from fish_env.inference.estimate.free import least_of, spread_of
 from fish_env.inference.estimate.run_variation import shown_spread
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import coefficient_sizes
@@ -147,7 +147,7 @@ def _predicted(fit: Fit) -> tuple[FloatArray, FloatArray]:
     if marginal is not None:
         active = np.flatnonzero(spread)
         residuals = np.concatenate([run.residuals for run in fit.filtered])
-        numbers = marginal.predicted(residuals)
+        numbers = marginal.predicted(residuals, least=least_of(fit.problem, active))
         values[:, active] = numbers * spread[active]
         if fit.problem.drive.uneven:
             spread[active] *= shown_spread(numbers, marginal.uncertainty())

@@ -101,7 +101,7 @@ def _undone(run: RunData, seen: RunData, filtered: Filtered, channels: Sequence[
         filtered: that motion, with its slopes.
         channels: names of its channels.
     """
-    slopes = sensor_slopes(seen.clock, filtered, channels)
+    slopes = sensor_slopes(seen.clock, filtered, channels, run.own_ages)
     return replace(run, distortion=np.asarray(slopes @ run.sensor_errors))
 
 
@@ -114,7 +114,7 @@ def _moved(run: RunData, seen: RunData, filtered: Filtered, channels: Sequence[s
         filtered: its motion, with its slopes.
         channels: names of its channels.
     """
-    slopes = sensor_slopes(run.clock, filtered, channels)
+    slopes = sensor_slopes(seen.clock, filtered, channels, run.own_ages)
     change = slopes @ (run.sensor_errors - seen.sensor_errors)
     return replace(run, distortion=change if seen.distortion is None else seen.distortion + change)
 

@@ -178,6 +178,11 @@ class RunData:
         """
         return device_ages(own) - self.step_s * self.moved[:, None]
 
+    @property
+    def own_ages(self) -> FloatArray:
+        """(devices,) the same by the run's present numbers."""
+        return self.ages(self.variation[:, None])[:, 0]
+
     def steps(self, corners: bool) -> IntArray:
         """(T,) RK4 steps up to each sample, finer for motion with corners."""
         return self.corner_substeps if corners else self.substeps

@@ -11,14 +11,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
+from scipy.linalg import expm
 from scipy.signal import butter, sosfilt
 
 from fish_env.arrays import FloatArray
-from fish_env.identification.channels import BY_NAME, has_inertial_unit
+from fish_env.identification.channels import BY_NAME, devices_of, has_inertial_unit
 from fish_env.identification.filtering import Filtered, Slopes
 from fish_env.identification.runs import RunData
 from fish_env.identification.state_blocks import N_ERROR, N_MOVING, columns
@@ -37,55 +38,70 @@ _ROWS = {"velocity": [BY_NAME[n].index for n in "uvw"], "rate": [BY_NAME[n].inde
 _ATTITUDE, _RATES, _PLACE = ("roll", "pitch", "yaw"), ("p", "q", "r"), ("x", "y", "z")
 
 
-def sensor_slopes(clock: FloatArray, filtered: Filtered, channels: Sequence[str]) -> FloatArray:
+def sensor_slopes(
+    clock: FloatArray,
+    filtered: Filtered,
+    channels: Sequence[str],
+    ages: FloatArray | None = None,
+) -> FloatArray:
     """Change of every sample by every sensor error, at the filtered motion, shape (T, C, K).
 
     Args:
-        clock: (T,) times of the samples (s).
+        clock: (T,) times of the rows (s).
         filtered: the run filtered, with its slopes.
         channels: names of its C channels.
+        ages: (devices,) how much older than its row a sample of each device is (s); default: none.
 
     Raises:
         ValueError: the filter kept no slopes.
         LinAlgError: the simulation has diverged.
     """
     motion = _predicted(clock, filtered)
-    states, euler = motion.states, motion.euler
-    rates = states[:, _ROWS["rate"]]
-    place = states[:, :3] - states[0, :3]
-    found = np.zeros((len(euler), len(channels), len(SENSOR_ERRORS)))
-    at = {name: i for i, name in enumerate(channels)}
-    for name in (*_ATTITUDE, *_RATES):
-        if name in at:
-            reshaped = _reshaped(clock, motion.of(name), motion.change[name])
-            _put(found, at, name, "inertial_smoothing", reshaped)
-    turns, kinematics = rotations(euler), euler_rates(euler)
+    found = np.zeros((len(clock), len(channels), len(SENSOR_ERRORS)))
+    devices = np.array(devices_of(channels))
+    for device in np.unique(devices).tolist():
+        age = 0.0 if ages is None else float(ages[device])
+        at = {channels[i]: i for i in np.flatnonzero(devices == device).tolist()}
+        _put_mounting(found, at, motion.ago(age))
+        _put_camera(found, at, motion.ago(age))
+        for name in at.keys() & {*_ATTITUDE, *_RATES}:
+            _put(found, at, name, "inertial_smoothing", motion.reshaped(name, age))
+    found[:, :, [_INDEX[name] for name in _absent(channels)]] = 0.0
+    return found
+
+
+def _put_mounting(found: FloatArray, at: dict[str, int], motion: _Motion) -> None:
+    """What markers and an inertial unit show that sit aside or askew, or have another gain."""
+    turns, kinematics = rotations(motion.euler), euler_rates(motion.euler)
     for k, axis in enumerate(_PLACE):
         for j, name in enumerate(_PLACE):
             _put(found, at, name, f"marker_{axis}", turns[:, j, k])
     for k, angle in enumerate(_ATTITUDE):
         for j, name in enumerate(_ATTITUDE):
             _put(found, at, name, f"mounting_{angle}", kinematics[:, j, k])
-        swung = np.cross(rates, np.eye(3)[k])
+        swung = np.cross(motion.rates, np.eye(3)[k])
         for j, name in enumerate(_RATES):
             _put(found, at, name, f"mounting_{angle}", swung[:, j])
     for j, name in enumerate(_RATES):
-        _put(found, at, name, f"gyro_gain_{name}", rates[:, j])
-    yaw = euler[:, 2]
+        _put(found, at, name, f"gyro_gain_{name}", motion.rates[:, j])
+    yaw = motion.euler[:, 2]
     for turn, label in ((1.0, ""), (2.0, "2_")):
         _put(found, at, "yaw", f"compass_sin_{label}yaw", np.sin(turn * yaw))
         _put(found, at, "yaw", f"compass_cos_{label}yaw", np.cos(turn * yaw))
+
+
+def _put_camera(found: FloatArray, at: dict[str, int], motion: _Motion) -> None:
+    """What a camera shows in water that drifts, from an angle, and through the surface."""
+    turns, clock = rotations(motion.euler), motion.clock
     for k, (axis, name) in enumerate((("x", "current_north"), ("y", "current_east"))):
         _put(found, at, axis, name, clock - clock[0])
         for j, speed in enumerate("uvw"):
             _put(found, at, speed, name, turns[:, k, j])
-    depth = place[:, 2]
+    depth = motion.place[:, 2]
     _put(found, at, "x", "camera_pitch", depth)
     _put(found, at, "y", "camera_roll", -depth)
     for j, name in enumerate(("x", "y")):
-        _put(found, at, name, "camera_scale_per_depth", -place[:, j] * depth)
-    found[:, :, [_INDEX[name] for name in _absent(channels)]] = 0.0
-    return found
+        _put(found, at, name, "camera_scale_per_depth", -motion.place[:, j] * depth)
 
 
 def _absent(channels: Sequence[str]) -> list[str]:
@@ -98,39 +114,77 @@ def _absent(channels: Sequence[str]) -> list[str]:
     return [name for name in _INDEX if name.startswith(absent)] if absent else []
 
 
-def _reshaped(clock: FloatArray, values: FloatArray, rate: FloatArray) -> FloatArray:
-    """What an inertial unit's filter does to samples (T,) beside making them late.
-
-    How late the unit is the filter of the motion takes into account. Between two samples the
-    channel follows from both and its rates there, and from none after: with that the regressor
-    would follow its innovation.
-    """
-    even = np.arange(clock[0], clock[-1] + FINE_S, FINE_S)
-    path = CubicHermiteSpline(clock, values, rate)(np.minimum(even, clock[-1]))
-    filtered = np.asarray(sosfilt(_LOW_PASS, path - values[0])) + values[0]
-    late = np.interp(even - LATE_S, even, path)
-    return np.asarray(np.interp(clock, even, filtered - late))
-
-
 @dataclass(frozen=True, eq=False)
 class _Motion:
     """A run as predicted, one sample ahead.
 
     Attributes:
-        states: (T, states).
+        clock: (T,) times (s).
+        place: (T, 3) from where the run begins (m).
         euler: (T, 3) angles.
-        change: rate of change (T,) of each angle and angular rate.
+        rates: (T, 3) of the body.
+        slopes: rate of change (T, 3) of each of these.
     """
 
-    states: FloatArray
+    clock: FloatArray
+    place: FloatArray
     euler: FloatArray
-    change: dict[str, FloatArray]
+    rates: FloatArray
+    slopes: tuple[FloatArray, FloatArray, FloatArray]
 
-    def of(self, channel: str) -> FloatArray:
-        """An angle or rate (T,)."""
-        if channel in _ATTITUDE:
-            return self.euler[:, _ATTITUDE.index(channel)]
-        return self.states[:, BY_NAME[channel].index]
+    def ago(self, age: float) -> _Motion:
+        """The motion as it was some time (s) before each row.
+
+        Between two rows it follows from both and its slopes there, and from nothing after: with
+        that a regressor would follow its innovation.
+        """
+        if age == 0.0:
+            return self
+        at = np.maximum(self.clock - age, self.clock[0])
+        seen = zip((self.place, self.euler, self.rates), self.slopes, strict=True)
+        earlier = [np.asarray(CubicHermiteSpline(self.clock, *p)(at)) for p in seen]
+        return replace(self, place=earlier[0], euler=earlier[1], rates=earlier[2])
+
+    def reshaped(self, channel: str, age: float) -> FloatArray:
+        """What an inertial unit's filter does to samples (T,) beside making them late.
+
+        A sample that shows what was some time before its row was taken ``LATE_S`` after that. From
+        the row to there the filter is carried on along the slope at the row, as nothing after the
+        row may be known.
+
+        Args:
+            channel: an angle or rate.
+            age: how much older than its row a sample is (s); late as the unit is, the filter of the
+                motion takes that into account.
+        """
+        of = _ATTITUDE if channel in _ATTITUDE else _RATES
+        which, column = (1 if of is _ATTITUDE else 2), of.index(channel)
+        clock, slope = self.clock, self.slopes[which][:, column]
+        values = (self.euler if which == 1 else self.rates)[:, column]
+        even = np.arange(clock[0], clock[-1] + FINE_S, FINE_S)
+        spline = CubicHermiteSpline(clock, values, slope)
+        path = np.asarray(spline(np.minimum(even, clock[-1])))
+        filtered = np.asarray(sosfilt(_LOW_PASS, path - values[0])) + values[0]
+        ahead = LATE_S - age
+        known = np.minimum(clock, clock + ahead)
+        at = [np.interp(known, even, f) for f in (filtered, _backward_slope(filtered))]
+        carried = _carried_on(max(ahead, 0.0)) @ np.array([*at, values, slope])
+        return np.asarray(carried - spline(np.maximum(clock - age, clock[0])))
+
+
+def _backward_slope(values: FloatArray) -> FloatArray:
+    """Rate of change of values every ``FINE_S`` (T,), from them and the two before (BDF2)."""
+    padded = np.concatenate([values[:1], values[:1], values])
+    return np.asarray((3.0 * padded[2:] - 4.0 * padded[1:-1] + padded[:-2]) / (2.0 * FINE_S))
+
+
+def _carried_on(ahead: float) -> FloatArray:
+    """(4,) what filtered value, its slope, input and its slope each add some time (s) later."""
+    omega = 2.0 * np.pi * CUTOFF_HZ
+    motion = np.zeros((4, 4))
+    motion[0, 1], motion[2, 3] = 1.0, 1.0
+    motion[1] = [-(omega**2), -math.sqrt(2.0) * omega, omega**2, 0.0]
+    return np.asarray(expm(ahead * motion)[0])
 
 
 def _predicted(clock: FloatArray, filtered: Filtered) -> _Motion:
@@ -151,12 +205,16 @@ def _predicted(clock: FloatArray, filtered: Filtered) -> _Motion:
     euler = np.unwrap(euler_from_quaternion(states[:, 3:7]), axis=0)
     kinematics = euler_rates(euler)
     euler -= np.einsum("tij,tj->ti", kinematics, moved[:, columns("rotation")])
-    change = dict(zip(_RATES, _slope_at_end(clock, states, filtered.states).T, strict=True))
-    turn = np.einsum("tij,tj->ti", kinematics, states[:, _ROWS["rate"]])
-    change |= dict(zip(_ATTITUDE, turn.T, strict=True))
-    if not all(np.isfinite(rate).all() for rate in change.values()):
+    rates, velocity = states[:, _ROWS["rate"]], states[:, _ROWS["velocity"]]
+    change = (
+        np.einsum("tij,tj->ti", rotations(euler), velocity),
+        np.einsum("tij,tj->ti", kinematics, rates),
+        _slope_at_end(clock, states, filtered.states),
+    )
+    place = states[:, :3] - states[0, :3]
+    if not all(np.isfinite(part).all() for part in (place, euler, rates, *change)):
         raise np.linalg.LinAlgError("the simulation diverges, and shows no sensor errors")
-    return _Motion(states, euler, change)
+    return _Motion(clock, place, euler, rates, change)
 
 
 def _slope_at_end(clock: FloatArray, predicted: FloatArray, filtered: FloatArray) -> FloatArray:
@@ -191,7 +249,7 @@ def slopes_of_runs(
     parts = [
         innovation_slopes(
             run.clock, run.measured, one, correlation_s,
-            sensor_slopes(run.clock, one, channels),
+            sensor_slopes(run.clock, one, channels, run.own_ages),
         )
         for run, one in zip(runs, filtered, strict=True)
     ]  # fmt: skip

@@ -66,9 +66,13 @@ def confirmed(accepted: Explanation, threshold: float) -> Explanation | None:
 
 
 def _measured(found: Explanation) -> frozenset[str]:
-    """Causes that were measured without a model."""
+    """Causes that were measured without a model.
+
+    Where runs have beats of their own, a law of the beat may be what these happen to differ by.
+    """
     drive = found.fit.problem.drive
-    return drive.effects & {*found.causes} if drive.certain else frozenset()
+    known = drive.certain and not drive.uneven
+    return drive.effects & {*found.causes} if known else frozenset()
 
 
 def sustained(found: Explanation, rng: np.random.Generator) -> Explanation | None:

@@ -185,3 +185,28 @@ def test_a_filter_in_the_inertial_unit_is_a_delay_and_a_little_smoothing():
     clean = clean.with_runs([run.movable(devices) for run in clean.runs])
     best = misfit(clean)
     assert misfit(problem) - best < 0.02 * (spoilt - best)
+
+
+def test_a_late_gyro_has_the_gain_of_what_it_shows(filtered):
+    """The gain of a gyro as an effect and as an error of its unit are one thing at any delay."""
+    problem, point, noise, _ = filtered
+    numbers = np.zeros_like(problem.variation)
+    names = [variation.name for variation in problem.variations]
+    numbers[:, names.index("inertial_delay")] = 0.03
+    late = problem.with_variation(numbers, point, noise)
+    results = late.filtered(point, noise, keep_slopes=True)
+    (run,), (result,) = late.runs, results
+    gain = 0.01
+    effects = {f"effects.gyro_scale.{axis}": np.array([1.0]) for axis in "pqr"}
+    more = effects | {"effects.gyro_scale.r": np.array([1.0 + gain])}
+    z = point.z[:, None]
+    before, after = (late.innovations(z, e, noise, results)[0] for e in (effects, more))
+
+    def slope(ages):
+        changes = sensor_slopes(run.clock, result, late.channels, ages)
+        of_all = innovation_slopes(run.clock, run.measured, result, noise.correlation_s, changes)
+        return -gain * of_all[:, NAMES.index("gyro_gain_r")]
+
+    size = np.linalg.norm(after - before)
+    assert np.linalg.norm(after - before - slope(run.own_ages)) < 0.1 * size
+    assert np.linalg.norm(after - before - slope(None)) > 0.2 * size

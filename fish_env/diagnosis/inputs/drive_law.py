@@ -44,7 +44,7 @@ class DriveLaw:
     Attributes:
         common: ratio at the start of a run, without offset and stroke; None where no beat is clear.
         sizes: effect parameter of :data:`TERMS` -> size, of those that show.
-        p: largest p-value of these, each alone.
+        p: largest p-value of these, times the number of terms that were tested (Bonferroni).
     """
 
     common: float | None = None
@@ -122,7 +122,8 @@ def _law(ratio: FloatArray, weight: FloatArray, terms: FloatArray, run_of: IntAr
         doubtful = np.where(small, 1.0, p)
         if not kept or doubtful.max() < LEVEL:
             found = {TERMS[i]: float(size) for i, size in zip(kept, sizes, strict=True)}
-            return DriveLaw(float(value[0]), found, float(doubtful.max(initial=0.0)))
+            largest = min(1.0, len(TERMS) * float(doubtful.max(initial=0.0)))
+            return DriveLaw(float(value[0]), found, largest)
         kept.pop(int(np.argmax(doubtful)))
 
 

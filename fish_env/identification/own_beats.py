@@ -4,11 +4,13 @@ A tail that beats half a per cent quicker than in the other runs is a radian off
 seconds, and so is one whose battery loses a per cent in that time; then nothing fits. So every run
 is filtered with a comb of frequencies at once, its starting phase being free within what servos
 differ by, and then with a comb of sags. Fits begin where these leave least, and estimate what is
-left of both as something the runs differ in. What the runs share is a cause, to be found and named.
+left of both as something the runs differ in. What the runs share, beyond what the mean of so many
+ordinary runs may be, is a cause, to be found and named.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
@@ -19,7 +21,7 @@ from fish_env.identification.channels import devices_of
 from fish_env.identification.in_step import nominal_point
 from fish_env.identification.runs import PHASE, RunData
 from fish_env.identification.series import SeriesProblem
-from fish_env.identification.tail_drive import RATE, SCALE
+from fish_env.identification.tail_drive import RATE, SCALE, TailDrive
 
 COARSE: FloatArray = np.asarray(1.0 + np.arange(-24, 25) * 5e-3)
 """Frequencies over the commanded one of all runs together, tried on their beginnings."""
@@ -32,6 +34,9 @@ PHASE_SD = 0.2
 """How far the phase at the start of a run may be from the declared one (rad)."""
 USUAL_BEAT, USUAL_SAG = 4e-3, 3e-4
 """Ordinary spreads over runs of servos' frequencies, and of what batteries lose each second."""
+SURE, HALF_NORMAL = 3.0, (math.sqrt(2.0 / math.pi), math.sqrt(1.0 - 2.0 / math.pi))
+"""Standard errors of a mean over runs within which it is ordinary, and the mean and spread of what
+is normal and only counted where positive: batteries lose charge."""
 LEAST = 1.5e-3
 """Difference of two beats below which the comb cannot tell them apart."""
 CLEARLY = 0.2
@@ -50,15 +55,14 @@ class OwnBeats:
     """Tail frequencies that suit runs best.
 
     Attributes:
-        common: frequency over the commanded one, of all runs together, beside what was known of
-            the drive; None where none is clear.
+        drive: what all runs share of their beat; None where none is clear.
         own: frequency at the start over that of all runs, by run id; empty where runs share one.
         sags: share of the beat that is lost each second (1/s), by run id; empty likewise.
         gains: share of what the common beat leaves that its own takes away, by run id, of all runs
             whose own is another.
     """
 
-    common: float | None = None
+    drive: TailDrive | None = None
     own: Mapping[str, float] = field(default_factory=dict)
     sags: Mapping[str, float] = field(default_factory=dict)
     gains: Mapping[str, float] = field(default_factory=dict)
@@ -94,10 +98,13 @@ def own_beats(problem: SeriesProblem, differ: bool = False) -> OwnBeats:
         found[run.id] = _minimum(mine, comb, own) / together
         if abs(found[run.id] - 1.0) >= LEAST:
             gains[run.id] = 1.0 - float(mine[own] / mine[common])
+    drive = problem.drive.at(together)
     if not (differ or _differ(gains.values())):
-        return OwnBeats(together, gains=gains)
-    drive = replace(problem.drive.at(together), uneven=True)
-    return replace(_sagging(free.with_drive(drive), found), common=together, gains=gains)
+        return OwnBeats(drive, gains=gains)
+    if drive.effects and not drive.certain:
+        # What runs differ by may look like a law of their beats.
+        return own_beats(problem.with_drive(TailDrive()), differ=True)
+    return replace(_sagging(free.with_drive(replace(drive, uneven=True)), found), gains=gains)
 
 
 def _differ(gains: Iterable[float]) -> bool:
@@ -114,19 +121,37 @@ def _sagging(problem: SeriesProblem, own: Mapping[str, float]) -> OwnBeats:
         problem: the runs, told the beat that they share.
         own: mean frequency over that of all runs, by run id.
     """
-    even = OwnBeats(own={run.id: own.get(run.id, 1.0) for run in problem.runs})
+    mean = np.array([own.get(run.id, 1.0) for run in problem.runs])
+    even = OwnBeats(problem.drive, dict(zip(problem.run_ids, mean.tolist(), strict=True)))
     lasting = float(np.median([run.duration for run in problem.runs]))
     comb = {RATE: SAGS, SCALE: problem.drive.scale * (1.0 + 0.5 * lasting * SAGS)}
     left = _left(with_own_beats(problem, even), comb)
-    if left is None:
-        return even
-    best = np.argmin(left, axis=0).tolist()
-    inside = [0 < at < len(SAGS) - 1 for at in best]
-    sags = [_minimum(mine, SAGS, at) if ok else 0.0
-            for mine, at, ok in zip(left.T, best, inside, strict=True)]  # fmt: skip
-    begun = {run.id: even.own[run.id] * (1.0 + 0.5 * lasting * sag)
-             for run, sag in zip(problem.runs, sags, strict=True)}  # fmt: skip
-    return OwnBeats(own=begun, sags=dict(zip(begun, sags, strict=True)))
+    sags = np.zeros(len(mean))
+    if left is not None:
+        for i, at in enumerate(np.argmin(left, axis=0).tolist()):
+            if 0 < at < len(SAGS) - 1:
+                sags[i] = _minimum(left[:, i], SAGS, at)
+    return _beside_shared(problem, mean * (1.0 + 0.5 * lasting * sags), sags)
+
+
+def _beside_shared(problem: SeriesProblem, beats: FloatArray, sags: FloatArray) -> OwnBeats:
+    """Own beats and sags beside what the runs share, which is nothing within what is ordinary.
+
+    Args:
+        problem: the runs, told the beat that they share.
+        beats: (R,) frequency at the start over that of the told drive.
+        sags: (R,) share lost each second (1/s) beside that of the told drive.
+    """
+    beats = problem.drive.scale * beats
+    sags = sags + problem.drive.measured.get(RATE, 0.0)
+    chance = SURE / np.sqrt(len(beats))
+    scale = float(beats.mean()) if abs(beats.mean() - 1.0) > chance * USUAL_BEAT else 1.0
+    usual = HALF_NORMAL[0] + chance * HALF_NORMAL[1]
+    rate = float(sags.mean()) if sags.mean() > usual * USUAL_SAG else 0.0
+    own, left = (beats / scale).tolist(), (sags - rate).tolist()
+    ids = problem.run_ids
+    drive = problem.drive.of_uneven_runs(scale, rate)
+    return OwnBeats(drive, dict(zip(ids, own, strict=True)), dict(zip(ids, left, strict=True)))
 
 
 def with_own_beats(problem: SeriesProblem, beats: OwnBeats) -> SeriesProblem:
@@ -136,7 +161,7 @@ def with_own_beats(problem: SeriesProblem, beats: OwnBeats) -> SeriesProblem:
         problem: some of the runs.
         beats: what runs beat at. What they share is told to the problem and left to its effects.
     """
-    drive = problem.drive if beats.common is None else problem.drive.at(beats.common)
+    drive = beats.drive or problem.drive
     if not beats.own:
         return problem.with_drive(drive)
     devices = devices_of(problem.channels)

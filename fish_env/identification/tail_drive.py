@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from fish_env.inference.vehicle import Drive
 from fish_env.model.effect import Effect
@@ -36,8 +36,18 @@ class TailDrive(Drive):
 
     def at(self, scale: float) -> TailDrive:
         """The same with another beat over the commanded frequency."""
-        drive = tail_drive({**self.measured, SCALE: scale}, self.certain)
-        return replace(drive, uneven=self.uneven)
+        return tail_drive({**self.measured, SCALE: scale}, self.certain, self.uneven)
+
+    def of_uneven_runs(self, scale: float, rate: float) -> TailDrive:
+        """The same where single runs differ, with what they share of their beats and sags.
+
+        Args:
+            scale: beat over the commanded frequency at the start; 1 for what is ordinary.
+            rate: share of it lost each second (1/s); 0 likewise.
+        """
+        others = {path: value for path, value in self.measured.items() if path != RATE}
+        sag = {RATE: rate} if rate else {}
+        return tail_drive({**others, SCALE: scale, **sag}, self.certain, uneven=True)
 
     def beside(self, effect: Effect) -> tuple[dict[str, float], ...]:
         """Sizes of an effect that scales the beat, around what was measured.
@@ -53,24 +63,30 @@ class TailDrive(Drive):
         return tuple({scales[0]: self.scale + off} for off in BESIDE)
 
 
-def tail_drive(measured: Mapping[str, float], certain: bool = False) -> TailDrive:
+def tail_drive(
+    measured: Mapping[str, float], certain: bool = False, uneven: bool = False
+) -> TailDrive:
     """What is known of the beat, and which effects put a model in step with it.
 
     None do where all beats are off by one ratio only: several effects do that, and a comparison of
-    all of them tells which.
+    all of them tells which. Where single runs differ nothing can be compared before they are in
+    step, so that the ratio itself is where a fit begins.
 
     Args:
         measured: ``effects.<name>.<parameter>`` -> about its value.
         certain: whether chance is ruled out for what was measured.
+        uneven: whether single runs differ; what is ordinary is then in the runs' own beats.
     """
     found = dict(measured)
-    ordinary = SCALE in found and abs(found[SCALE] - 1.0) <= ORDINARY
+    least = 0.0 if uneven else ORDINARY
+    ordinary = SCALE in found and abs(found[SCALE] - 1.0) <= least
     if ordinary:
         found.pop(SCALE)
-    in_step = found if found.keys() - {SCALE} else {}
+    in_step = found if uneven or found.keys() - {SCALE} else {}
     return TailDrive(
         in_step,
         known=bool(in_step) or ordinary,
         certain=bool(in_step) and certain,
+        uneven=uneven,
         measured=measured,
     )

@@ -11,6 +11,7 @@ from fish_env.data import CommandSteps
 from fish_env.identification.own_beats import CLEARLY, LEAST, OwnBeats, own_beats, with_own_beats
 from fish_env.identification.runs import FREQUENCY
 from fish_env.identification.series import SeriesProblem
+from fish_env.identification.tail_drive import RATE, SCALE, TailDrive, tail_drive
 from fish_env.identification.variation import BEAT, SAG
 from tests.identification.synthetic import Setup, simulate
 
@@ -49,14 +50,14 @@ def test_runs_that_beat_alike_have_no_beat_of_their_own(dataset):
     assert own_beats(SeriesProblem(dataset)).own == {}
     quicker = own_beats(SeriesProblem(told(dataset, [1.01] * 5)))
     assert quicker.own == {}
-    assert quicker.common == pytest.approx(1.01, abs=1e-3)
+    assert quicker.drive.scale == pytest.approx(1.01, abs=1e-3)
 
 
 def test_each_runs_own_beat_is_found_beside_a_common_one(dataset):
     ratios = np.array([1.0, 1.008, 0.99, 1.0, 1.0])
     problem = SeriesProblem(told(dataset, 0.97 * ratios))
     beats = own_beats(problem)
-    assert beats.common == pytest.approx(0.97, abs=1e-3)
+    assert beats.drive.scale == pytest.approx(0.97, abs=1e-3)
     for found, ratio in zip(beats.own.values(), ratios, strict=True):
         assert found == pytest.approx(ratio, abs=1e-3)
     assert max(map(abs, beats.sags.values())) < 1e-4
@@ -71,7 +72,7 @@ def test_each_runs_own_sag_is_found(dataset):
 
 def test_the_commands_are_those_that_the_tail_followed(dataset):
     problem = SeriesProblem(told(dataset, [1.0, 1.008, 1.0, 1.0, 1.0]))
-    right = with_own_beats(problem, OwnBeats(1.0, {"r1": 1.008}))
+    right = with_own_beats(problem, OwnBeats(TailDrive(), {"r1": 1.008}))
     expected = SeriesProblem(dataset).runs[1].command_values
     assert np.allclose(right.runs[1].driven[1], expected)
     assert with_own_beats(problem, OwnBeats()).runs is problem.runs
@@ -79,7 +80,9 @@ def test_the_commands_are_those_that_the_tail_followed(dataset):
 
 def test_a_sagging_tail_loses_phase_with_the_square_of_time(dataset):
     problem = SeriesProblem(dataset)
-    (run,) = with_own_beats(problem, OwnBeats(1.0, {"r1": 1.0}, {"r1": 1e-3})).some([1]).runs
+    (run,) = (
+        with_own_beats(problem, OwnBeats(TailDrive(), {"r1": 1.0}, {"r1": 1e-3})).some([1]).runs
+    )
     times, values = run.driven
     end = 10.0
     spans = np.diff(np.clip([*times, run.duration], 0.0, end))
@@ -105,9 +108,29 @@ def test_two_runs_that_differ_are_enough_beside_a_misfit():
 @pytest.mark.parametrize("differ", [False, True])
 def test_only_runs_that_differ_may_have_a_beat_of_their_own(dataset, differ):
     own = {"r1": 1.004} if differ else {}
-    problem = with_own_beats(SeriesProblem(dataset), OwnBeats(1.0, own))
+    problem = with_own_beats(SeriesProblem(dataset), OwnBeats(TailDrive(), own))
     noise = problem.default_noise()
     filtered = problem.filtered(problem.start, noise, keep_slopes=True)
     steps = np.array([0.3 * v.usual for v in problem.variations])
     slopes = problem.variation_slopes(problem.start, noise, filtered, steps)
     assert np.abs(slopes[:, [BEAT, SAG]]).max(axis=0).astype(bool).tolist() == [differ, differ]
+
+
+def test_what_ordinary_runs_share_by_chance_is_no_cause(dataset):
+    ratios = np.array([1.0, 0.994, 0.996, 0.999, 0.997])
+    beats = own_beats(SeriesProblem(told(dataset, ratios)), differ=True)
+    assert not beats.drive.in_step
+    assert beats.drive.known
+    np.testing.assert_allclose(list(beats.own.values()), ratios, atol=2e-3)
+    beats = own_beats(SeriesProblem(told(dataset, 0.98 * ratios)), differ=True)
+    assert beats.drive.in_step == {SCALE: pytest.approx(0.98 * ratios.mean(), abs=1e-3)}
+    beats = own_beats(SeriesProblem(sagging(dataset, np.full(5, 1e-3))), differ=True)
+    assert beats.drive.in_step == {RATE: pytest.approx(1e-3, rel=0.1)}
+
+
+@pytest.mark.parametrize("certain", [False, True])
+def test_a_doubtful_law_of_the_beat_is_left_to_the_runs(dataset, certain):
+    problem = SeriesProblem(told(dataset, [1.0, 1.008, 0.99, 1.0, 1.0]))
+    law = tail_drive({"effects.beat_load.load": 1e-4, SCALE: 1.0}, certain)
+    beats = own_beats(problem.with_drive(law))
+    assert ("beat_load" in beats.drive.effects) == certain

@@ -130,7 +130,10 @@ def _law(ratio: FloatArray, weight: FloatArray, terms: FloatArray, run_of: IntAr
 def _regression(
     columns: FloatArray, ratio: FloatArray, weight: FloatArray, run_of: IntArray
 ) -> tuple[FloatArray, FloatArray, int]:
-    """Weighted least squares without far windows, with errors that allow for runs that differ.
+    """Weighted least squares without far windows, each run having a beat of its own.
+
+    The own beats are random intercepts: a term that differs between runs only counts for no more
+    than the runs' number, and one that changes within runs counts in full.
 
     Args:
         columns: (N, k).
@@ -140,19 +143,56 @@ def _regression(
 
     Returns:
         (k,) estimates, (k,) their standard errors, and the degrees of freedom of the latter.
-        Source: Liang and Zeger (1986), Biometrika 73, 13, with the factor R / (R - k).
+        Sources: Fuller and Battese (1974), J. Econometrics 2, 67, for the intercepts; Liang and
+        Zeger (1986), Biometrika 73, 13, with the factor R / (R - k), for the errors.
     """
+    runs, own = np.unique(run_of, return_inverse=True)
     near: BoolArray = np.ones(len(ratio), bool)
+    shrink = np.zeros(len(runs))
     for _ in range(ROUNDS):
         used = weight * near
-        inverse = np.linalg.pinv(columns.T @ (used[:, None] * columns))
-        value = inverse @ columns.T @ (used * ratio)
+        rows = _less_means(np.column_stack([columns, ratio]), used, own, shrink)
+        inverse = np.linalg.pinv(rows[:, :-1].T @ (used[:, None] * rows[:, :-1]))
+        value = inverse @ rows[:, :-1].T @ (used * rows[:, -1])
         left = ratio - columns @ value
+        offset, shrink = _own_offsets(left, used, own)
+        left -= offset[own]
         scale = 1.4826 * float(np.median(np.abs(left[near])))
         near = np.abs(left) < FAR * max(scale, 1e-4)
-    pulls = columns * (used * left)[:, None]
-    runs = np.unique(run_of)
-    sums = np.array([pulls[run_of == run].sum(axis=0) for run in runs])
+    pulls = rows[:, :-1] * (used * (rows[:, -1] - rows[:, :-1] @ value))[:, None]
+    sums = np.array([pulls[own == run].sum(axis=0) for run in range(len(runs))])
     freedom = max(len(runs) - columns.shape[1], 1)
     covariance = inverse @ sums.T @ sums @ inverse * len(runs) / freedom
     return value, np.sqrt(np.maximum(np.diag(covariance), 1e-30)), freedom
+
+
+def _own_offsets(
+    left: FloatArray, weight: FloatArray, own: IntArray
+) -> tuple[FloatArray, FloatArray]:
+    """Best predictions (R,) of the runs' own offsets, and the share (R,) of means to take off.
+
+    Their variance is that of DerSimonian and Laird (1986), Controlled Clinical Trials 7, 177.
+
+    Args:
+        left: (N,) residuals.
+        weight: (N,).
+        own: (N,) run of each.
+    """
+    whole = np.maximum(np.bincount(own, weight), 1e-300)
+    mean = np.bincount(own, weight * left) / whole
+    freedom = max(int(np.count_nonzero(weight)) - len(whole), 1)
+    noise = max(float(weight @ (left - mean[own]) ** 2) / freedom, 1e-300)
+    total = whole.sum()
+    apart = float(whole @ mean**2) / noise - (len(whole) - 1)
+    between = max(apart * noise / max(total - float(whole @ whole) / total, 1e-300), 0.0)
+    told = whole * between / (noise + whole * between)
+    return told * mean, 1.0 - np.sqrt(1.0 - told)
+
+
+def _less_means(
+    rows: FloatArray, weight: FloatArray, own: IntArray, shrink: FloatArray
+) -> FloatArray:
+    """Rows (N, k) without a share (R,) of the weighted means of their runs."""
+    whole = np.maximum(np.bincount(own, weight), 1e-300)
+    means = np.array([np.bincount(own, weight * column) for column in rows.T]) / whole
+    return np.asarray(rows - (shrink * means)[:, own].T)

@@ -34,7 +34,7 @@ PHASE_SD = 0.2
 """How far the phase at the start of a run may be from the declared one (rad)."""
 USUAL_BEAT, USUAL_SAG = 4e-3, 3e-4
 """Ordinary spreads over runs of servos' frequencies, and of what batteries lose each second."""
-SURE, HALF_NORMAL = 3.0, (math.sqrt(2.0 / math.pi), math.sqrt(1.0 - 2.0 / math.pi))
+SURE, HALF_NORMAL = 3.0, np.array([math.sqrt(2.0 / math.pi), math.sqrt(1.0 - 2.0 / math.pi)])
 """Standard errors of a mean over runs within which it is ordinary, and the mean and spread of what
 is normal and only counted where positive: batteries lose charge."""
 LEAST = 1.5e-3
@@ -131,23 +131,32 @@ def _sagging(problem: SeriesProblem, own: Mapping[str, float]) -> OwnBeats:
         for i, at in enumerate(np.argmin(left, axis=0).tolist()):
             if 0 < at < len(SAGS) - 1:
                 sags[i] = _minimum(left[:, i], SAGS, at)
-    return _beside_shared(problem, mean * (1.0 + 0.5 * lasting * sags), sags)
+    return _beside_shared(problem, mean * (1.0 + 0.5 * lasting * sags), sags, 0.5 * lasting)
 
 
-def _beside_shared(problem: SeriesProblem, beats: FloatArray, sags: FloatArray) -> OwnBeats:
+def _beside_shared(
+    problem: SeriesProblem, beats: FloatArray, sags: FloatArray, middle: float
+) -> OwnBeats:
     """Own beats and sags beside what the runs share, which is nothing within what is ordinary.
+
+    The beat in the middle of a run is surer than that at its start, which a sag trades with.
 
     Args:
         problem: the runs, told the beat that they share.
         beats: (R,) frequency at the start over that of the told drive.
         sags: (R,) share lost each second (1/s) beside that of the told drive.
+        middle: half the length of a run (s).
     """
     beats = problem.drive.scale * beats
     sags = sags + problem.drive.measured.get(RATE, 0.0)
-    chance = SURE / np.sqrt(len(beats))
-    scale = float(beats.mean()) if abs(beats.mean() - 1.0) > chance * USUAL_BEAT else 1.0
-    usual = HALF_NORMAL[0] + chance * HALF_NORMAL[1]
-    rate = float(sags.mean()) if sags.mean() > usual * USUAL_SAG else 0.0
+    ordinary = USUAL_SAG * HALF_NORMAL
+    sure = SURE / np.sqrt(len(beats))
+    large = float(ordinary[0] + sure * ordinary[1])
+    rate = float(sags.mean()) if sags.mean() > large else 0.0
+    lost = middle * ordinary[0] if rate == 0.0 else 0.0
+    off = float(np.mean(beats * (1.0 - middle * (sags - rate)))) - 1.0 + lost
+    beyond = abs(off) > sure * np.hypot(USUAL_BEAT, middle * ordinary[1])
+    scale = float(beats.mean()) if beyond else 1.0
     own, left = (beats / scale).tolist(), (sags - rate).tolist()
     ids = problem.run_ids
     drive = problem.drive.of_uneven_runs(scale, rate)

@@ -19,7 +19,7 @@ from fish_env.identification.filtering import Filtered
 from fish_env.identification.runs import RunData
 from fish_env.identification.series import SeriesProblem
 from fish_env.inference.estimate.fit import Fit
-from fish_env.inference.estimate.free import evaluated
+from fish_env.inference.estimate.settle import evaluated
 from fish_env.inference.gain import ClosedGap
 from fish_env.inference.policy import POLICY
 

@@ -27,7 +27,7 @@ from fish_env.identification.runs import RunData
 from fish_env.identification.series import SeriesProblem, series_of
 from fish_env.inference.adequacy import NOTHING, generic_signals
 from fish_env.inference.estimate.fit import Fit, fit
-from fish_env.inference.estimate.free import evaluated
+from fish_env.inference.estimate.settle import evaluated
 from fish_env.inference.gain import by_window
 from fish_env.inference.problem import Problem
 from fish_env.inference.projection import Projector

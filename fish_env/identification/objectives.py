@@ -24,7 +24,7 @@ from fish_env.identification.whole_runs import fitting, prediction
 from fish_env.identification.whole_runs.problem import WholeRunProblem
 from fish_env.identification.writing import identified_fish
 from fish_env.inference.estimate.fit import Fit, fit
-from fish_env.inference.estimate.free import evaluated
+from fish_env.inference.estimate.settle import evaluated
 from fish_env.inference.problem import Point, Problem
 from fish_env.params.io import load_fish
 from fish_env.params.schema import FishParams

@@ -20,7 +20,8 @@ import numpy as np
 
 from fish_env.arrays import BoolArray, FloatArray, IntArray
 from fish_env.inference.estimate.fit import Fit
-from fish_env.inference.estimate.free import evaluated, spread_of
+from fish_env.inference.estimate.free import spread_of
+from fish_env.inference.estimate.settle import evaluated
 from fish_env.inference.hypotheses import PARAMETER, effect_of
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Problem

@@ -13,7 +13,7 @@ import numpy as np
 
 from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.fit import Fit
-from fish_env.inference.estimate.free import evaluated
+from fish_env.inference.estimate.settle import evaluated
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
 

@@ -14,7 +14,7 @@ from fish_env.identification.series import SeriesProblem
 from fish_env.identification.variation import SENSOR_ERRORS
 from fish_env.inference.estimate.again import run_variation
 from fish_env.inference.estimate.fit import fit
-from fish_env.inference.estimate.free import predicted_variation
+from fish_env.inference.estimate.settle import predicted_variation
 from fish_env.inference.problem import Point
 from tests.identification.synthetic import PATHS, Setup, simulate
 

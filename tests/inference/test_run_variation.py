@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from fish_env.inference.estimate.free import predicted_variation
 from fish_env.inference.estimate.run_variation import Marginal, RunVariation, shown_spread
+from fish_env.inference.estimate.settle import predicted_variation
 from fish_env.inference.estimate.spread import Likelihood, fit_spread
 from fish_env.inference.problem import Point
 from tests.inference.stated import Evaluated, Stated, White

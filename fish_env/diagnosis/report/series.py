@@ -24,7 +24,7 @@ from fish_env.identification.series import SeriesProblem, series_of
 from fish_env.identification.writing import identified_fish
 from fish_env.inference.effort import FULL
 from fish_env.inference.estimate.fit import Fit
-from fish_env.inference.estimate.free import evaluated
+from fish_env.inference.estimate.settle import evaluated
 from fish_env.inference.policy import POLICY
 from fish_env.params.schema import FishParams
 from fish_env.replay import Motion, motion_from_channels, motion_from_trajectory

@@ -6,9 +6,9 @@ With what estimates are made of: the objective at a vector, residuals and their 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, TypeVar, cast
+from typing import Any
 
 import numpy as np
 
@@ -20,15 +20,10 @@ from fish_env.inference.evaluation import Evaluation
 from fish_env.inference.problem import Point, Problem
 from fish_env.inference.vehicle import finite_values
 
-P = TypeVar("P", bound=Problem)
 SHORTEST = 0.02
 """Shortest step for differences, as a share of the longest."""
 DIFFERENCE = 0.3
 """Step for differences by what runs differ in, in usual spreads."""
-DAMPING = (0.0, 0.3, 3.0, 30.0)
-"""Of a run's step to its own numbers, one after another until its likelihood rises."""
-MOST_STEPS, NEAR = 6, 0.1
-"""To the numbers of runs that no fit has seen, and the step, in spreads, after which they stay."""
 LARGEST_SLOPE = 1e9
 """In standard deviations of the noise per unit; what exceeds it has diverged."""
 
@@ -241,77 +236,6 @@ def marginal_of(
     steps = DIFFERENCE * np.array([v.usual for v in problem.variations])
     slopes = problem.variation_slopes(point, noise, filtered, steps)[:, active] * spread
     return Marginal(slopes, problem.variation[:, active] / spread, problem.groups()[0])
-
-
-def predicted_variation(
-    problem: Problem, point: Point, noise: Any
-) -> tuple[Problem, Marginal | None]:
-    """The problem at the best prediction of what its runs differ in, and how to integrate it out.
-
-    The prediction is of the linear model. Where that lowers a run's likelihood the run goes only
-    part of the way, or stays.
-
-    Args:
-        problem: the problem, at an earlier prediction.
-        point: values of the shared parameters.
-        noise: noise model with the spreads.
-    """
-    spreads = spread_of(problem, noise)
-    if not spreads.any():
-        return problem, None
-    active = np.flatnonzero(spreads)
-    filtered = problem.filtered(point, noise)
-    marginal = marginal_of(problem, point, noise, filtered)
-    assert marginal is not None
-    residuals = np.concatenate([f.residuals for f in filtered])
-    numbers, before = problem.variation.copy(), _own_objectives(problem, filtered, noise)
-    worse, least = list(range(problem.run_count)), least_of(problem, active)
-    for damping in DAMPING:
-        trial = problem.variation.copy()
-        trial[:, active] = marginal.predicted(residuals, damping, least) * spreads[active]
-        better, near = [], [filtered[i] for i in worse]
-        try:
-            part = problem.some(worse).with_variation(trial[worse], point, noise)
-            after = _own_objectives(part, part.filtered(point, noise, near), noise)
-        except np.linalg.LinAlgError:
-            continue
-        better = [i for i, value in zip(worse, after, strict=True) if value <= before[i]]
-        numbers[better] = trial[better]
-        worse = [i for i in worse if i not in better]
-        if not worse:
-            break
-    whole = len(better) == problem.run_count  # nothing to work out again
-    problem = part if whole else problem.with_variation(numbers, point, noise)
-    return problem, replace(marginal, at=problem.variation[:, active] / spreads[active])
-
-
-def _own_objectives(problem: Problem, filtered: Sequence[Evaluation], noise: Any) -> FloatArray:
-    """(R,) -2 log likelihood of each run together with its own numbers, but for a constant."""
-    spreads = spread_of(problem, noise)
-    active = np.flatnonzero(spreads)
-    own = problem.variation[:, active] / spreads[active]
-    of_runs = np.array([-2.0 * f.log_likelihood for f in filtered])
-    return np.asarray(of_runs + np.sum(own**2, axis=1))
-
-
-def evaluated(problem: P, point: Point, noise: Any) -> tuple[P, Sequence[Any]]:
-    """Every run with what is unknown of it where it suits these parameters best, and evaluated.
-
-    Runs that were not fitted, or were fitted with other parameters, have another start or none.
-
-    Args:
-        problem: the runs.
-        point: values of the shared parameters.
-        noise: noise model.
-    """
-    settled = problem.settled(point, noise)
-    spreads = np.maximum(spread_of(problem, noise), 1e-300)
-    for _ in range(MOST_STEPS):
-        before = settled.variation
-        settled, _ = predicted_variation(settled, point, noise)
-        if np.all(np.abs(settled.variation - before) < NEAR * spreads):
-            break
-    return cast(P, settled), settled.filtered(point, noise)
 
 
 def objective(

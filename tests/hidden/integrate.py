@@ -11,12 +11,16 @@ from tests.hidden.jit import entry_point, helper
 from tests.hidden.motion import derivative
 from tests.hidden.servo import (
     BLOCK,
+    KICK,
+    LAST,
     LIMIT,
     PLAY,
     ROW,
     SHIFT,
     TURN,
     close_step,
+    is_limited,
+    jump_of_rate,
     plan_limit,
     plan_play,
     plan_side,
@@ -58,6 +62,21 @@ def step(t, h, y, trial, slopes, row, late, fish, e, table, push, drive, matrix,
 
 
 @helper
+def kick(jump, t, y, trial, slopes, row, late, fish, e, table, push, drive, matrix, wrench):
+    """The body's velocities after a jump of the tail's rate, which the carried water resists.
+
+    Acceleration of the body is linear in that of the tail: a jump is an acceleration without end
+    for no time, and its impulse follows from the difference of two accelerations.
+    """
+    for i in range(2):
+        drive[KICK] = i * jump
+        derivative(t, y, slopes[i], row, late, fish, e, table, push, drive, matrix, wrench)
+    drive[KICK] = 0.0
+    for n in range(12, 18):
+        y[n] += slopes[1, n] - slopes[0, n]
+
+
+@helper
 def switch(row, e, table, drive):
     """A new row of commands: the block moves within its play."""
     if row == int(drive[ROW]):
@@ -76,6 +95,7 @@ def begin(y, fish, e, table, drive):
     drive[PLAY] = angle
     drive[BLOCK] = table[0, SHIFT] * e.block_scale_scale
     drive[ROW] = 0.0
+    drive[LAST] = 0.0
     y[18] = angle
     y[19] = angle
     y[21] = drive[BLOCK]
@@ -100,6 +120,12 @@ def advance(y, edges, rows, lates, store, out, fish, e, table, push, drive, long
             plan_side(t + 0.5 * h, late, e, table, drive)
             plan_limit(t, h, late, e, table, drive)
             plan_play(t, h, late, e, table, drive)
+            told = is_limited(e) or e.servo_backlash_gap != 0.0
+            told |= k > 0 or (i > 0 and rows[i - 1] == row and lates[i - 1] == late)
+            jump = jump_of_rate(t, late, e, table, drive) if told else 0.0
+            if jump != 0.0 and e.tail_reactive_scale != 0.0:
+                kick(jump, t, y, trial, slopes, row, late, fish, e, table, push, drive, matrix,
+                     wrench)  # fmt: skip
             step(t, h, y, trial, slopes, row, late, fish, e, table, push, drive, matrix, wrench)
             close_step(t + h, late, e, table, drive)
             flip_fin(y[17], e, drive)

@@ -9,7 +9,8 @@ step each either follows its input exactly or moves evenly. `drive` holds that m
 0-3 rate limit, 4-7 play of the tail, each: angle at the step's start, 1 when it moves evenly,
 its rate then, the step's start time; 8 place of the block behind its play; 9 side of the
 sticking fin; 10 row of the commands in force; 11 half stroke (+1 or -1) of the step; 12 moment of
-the water about the tail's hinge; 13 fastest that the servo turns during the step.
+the water about the tail's hinge; 13 fastest that the servo turns during the step; 14 rate of the
+tail at the end of the last step; 15 what is added to its acceleration.
 """
 
 from __future__ import annotations
@@ -20,8 +21,10 @@ from tests.hidden.jit import helper
 
 TWO_PI = 2.0 * math.pi
 TIME, OFFSET, AMPLITUDE, FREQUENCY, SHIFT, TURN, PHASE = range(7)
-LIMIT, PLAY, BLOCK, FIN, ROW, SIDE, HINGE, FASTEST = 0, 4, 8, 9, 10, 11, 12, 13
-DRIVE_SIZE = 14
+LIMIT, PLAY, BLOCK, FIN, ROW, SIDE, HINGE, FASTEST, LAST, KICK = (
+    0, 4, 8, 9, 10, 11, 12, 13, 14, 15,
+)  # fmt: skip
+DRIVE_SIZE = 16
 FREE_SPEED, STALLED = 9.0, 0.05
 """rad/s without load, and the share of it that a stalled servo still creeps at."""
 
@@ -143,12 +146,29 @@ def close_step(t, late, e, table, drive):
         drive[LIMIT] = limited(t, late, e, table, drive)[0]
     if e.servo_backlash_gap != 0.0:
         drive[PLAY] = driven(t, late, e, table, drive)[0]
+    drive[LAST] = driven(t, late, e, table, drive)[1]
+
+
+@helper
+def jump_of_rate(t, late, e, table, drive):
+    """By how much the tail's rate jumps as a step begins, where a servo that holds it lets it jump.
+
+    A command that jumps moves an ideal servo at no time at all; what the water then gets is left
+    out, as in the equations of the paper. Behind a lag or a spring the tail's rate is smooth.
+    """
+    smooth = e.servo_lag_time_constant > 0.0 or not math.isinf(e.tail_flexibility_natural_frequency)
+    bends = e.servo_backlash_gap != 0.0 or is_limited(e) or e.tail_asymmetry_ratio != 0.0
+    stops = not (math.isinf(e.angle_limit_lower) and math.isinf(e.angle_limit_upper))
+    if smooth or not (bends or stops):
+        return 0.0
+    return driven(t, late, e, table, drive)[1] - drive[LAST]
 
 
 @helper
 def tail_motion(t, y, dy, late, e, table, drive):
     """Tail angle, rate and acceleration; fills the rates of the servo's own states."""
     angle, rate, bend = driven(t, late, e, table, drive)
+    bend += drive[KICK]
     lag = e.servo_lag_time_constant
     dy[18] = 0.0
     if lag > 0.0:

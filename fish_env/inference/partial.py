@@ -29,13 +29,20 @@ from fish_env.inference.tails import chi2_log_tail
 
 Describe = Callable[[Fit, float, Problem | None], ResidualModel | None]
 """Models what a fit leaves: the fit, the log p-value that a term has to pass, runs to judge on."""
+Report = Callable[[str], None]
 POOL = 16
 """Generic forces that are considered beside each set of causes, the most indicated ones."""
 MOST = 8
 """Generic forces in one sum."""
 
 
-def confirmed(accepted: Explanation, threshold: float) -> Explanation | None:
+def silent(step: str) -> None:
+    """Tells nobody."""
+
+
+def confirmed(
+    accepted: Explanation, threshold: float, report: Report = silent
+) -> Explanation | None:
     """The explanation with those of its causes that no sum of generic forces can stand in for.
 
     What is left may be a disturbance of implausible strength: it is estimated with the rest, and
@@ -45,6 +52,7 @@ def confirmed(accepted: Explanation, threshold: float) -> Explanation | None:
     Args:
         accepted: causes that explain part of the data.
         threshold: log p-value that a generic force has to pass, and a cause beside such forces.
+        report: told what is dropped and why.
 
     Returns:
         The causes that are left with their fit; None where none is.
@@ -52,12 +60,15 @@ def confirmed(accepted: Explanation, threshold: float) -> Explanation | None:
     measured = _measured(accepted)
     while {*accepted.causes} - measured:
         weakest = _implausible(accepted, measured)
-        if weakest is None:
+        if weakest is not None:
+            report(f"leaving out {weakest}: its estimate is implausible")
+        else:
             log_p = StandIns(accepted, threshold).log_p()
             log_p = {name: value for name, value in log_p.items() if name not in measured}
             weakest = max(log_p, key=lambda name: log_p[name])
             if log_p[weakest] < threshold:
                 return accepted
+            report(f"leaving out {weakest}: forces without a name explain as much")
         smaller = without(accepted, (weakest,))
         if smaller is None:
             return None
@@ -75,7 +86,9 @@ def _measured(found: Explanation) -> frozenset[str]:
     return drive.effects & {*found.causes} if known else frozenset()
 
 
-def sustained(found: Explanation, rng: np.random.Generator) -> Explanation | None:
+def sustained(
+    found: Explanation, rng: np.random.Generator, report: Report = silent
+) -> Explanation | None:
     """The explanation with those of its causes that close part of the misfit in simulation.
 
     One sample ahead a cause may stand in for the spectrum of what is unknown: it makes whitened
@@ -86,6 +99,7 @@ def sustained(found: Explanation, rng: np.random.Generator) -> Explanation | Non
     Args:
         found: causes that act beside something unknown.
         rng: for intervals of the shares.
+        report: told what is dropped and why.
 
     Returns:
         The causes that are left with their fit; None where none is.
@@ -102,6 +116,7 @@ def sustained(found: Explanation, rng: np.random.Generator) -> Explanation | Non
         worst = min(others, key=lambda name: least[name])
         if least[worst] > 0.0:
             return found
+        report(f"leaving out {worst}: simulated without feedback it does not help in most runs")
         smaller = without(found, (worst,))
         if smaller is None:
             return None
@@ -161,11 +176,19 @@ class StandIns:
         self.projector = Projector(self.fit)
 
     def log_p(self) -> dict[str, float]:
-        """Log p-value of what each cause explains that no sum of forces makes good."""
+        """Log p-value of what each cause explains that no sum of forces makes good.
+
+        A sum of more forces than the cause has parameters pays for each of them what a force has to
+        explain to be believed: of two descriptions that explain as much the shorter one counts.
+        Source: minimum description length (Rissanen, 1978), Automatica 14, 465.
+        """
         return {name: self._log_p(self.removed(name)) for name in self.causes}
 
     def _log_p(self, removed: Removed) -> float:
-        gap = removed.loss + self._explained(None) - self._explained(removed)
+        beside, few = self._explained(None)
+        instead, many = self._explained(removed)
+        longer = max(many - few - len(removed.own), 0)
+        gap = removed.loss + beside - instead - 2.0 * self.threshold * longer
         return float(chi2_log_tail(max(gap, 0.0) / removed.inflation, len(removed.own)))
 
     def removed(self, name: str) -> Removed:
@@ -230,11 +253,14 @@ class StandIns:
             score = score - seen.T @ removed.shift
         return info, score
 
-    def _explained(self, removed: Removed | None) -> float:
-        """What the best sum of forces explains, in -2 log likelihood; picked one after another."""
-        pool = self._pool
+    def _explained(self, removed: Removed | None) -> tuple[float, int]:
+        """What the best sum of forces explains, in -2 log likelihood, and how many there are.
+
+        They are picked one after another.
+        """
+        pool, count = self._pool, 0
         if not pool:
-            return 0.0
+            return 0.0, 0
         info, score = self._system(pool, removed)
         whole, explained = np.diag(info).copy(), 0.0
         inflation = np.array([s.variance_inflation for s in pool])
@@ -244,8 +270,8 @@ class StandIns:
             best = int(np.argmax(gains / inflation))
             if chi2_log_tail(float(gains[best] / inflation[best]), 1) >= self.threshold:
                 break
-            explained += float(gains[best])
+            explained, count = explained + float(gains[best]), count + 1
             along = info[best] / info[best, best]
             score = score - along * score[best]
             info = info - np.outer(info[best], along)
-        return explained
+        return explained, count

@@ -122,7 +122,7 @@ def investigate(
     partly_known = verdict.name == "outside_library" and bool(attribution.accepted.causes)
     if effort.retries and partly_known:
         report("testing which causes act beside what is unknown")
-        attribution, verdict = partly(attribution, left, verdict, rng)
+        attribution, verdict = partly(attribution, left, verdict, rng, report)
     attribution = attribution.extrapolated()
     gap = None
     if verdict.name in EXTENDING and held_out is not None:
@@ -155,7 +155,11 @@ def unnamed(found: Result, held_out: Problem | None, rng: np.random.Generator) -
 
 
 def partly(
-    attribution: Attribution, left: Adequacy, verdict: Verdict, rng: np.random.Generator
+    attribution: Attribution,
+    left: Adequacy,
+    verdict: Verdict,
+    rng: np.random.Generator,
+    report: Report,
 ) -> tuple[Attribution, Verdict]:
     """The verdict ``partial`` where known causes act beside something unknown.
 
@@ -164,9 +168,10 @@ def partly(
         left: adequacy of the accepted explanation, which is not adequate.
         verdict: the verdict without such causes.
         rng: for intervals of shares.
+        report: told what is being done.
     """
-    found = confirmed(attribution.accepted, left.threshold)
-    found = sustained(found, rng) if found else None
+    found = confirmed(attribution.accepted, left.threshold, report)
+    found = sustained(found, rng, report) if found else None
     if found is None:
         return attribution, verdict
     rivals = tuple(e for e in attribution.rivals if len(e.causes) == len(found.causes))

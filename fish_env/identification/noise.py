@@ -19,9 +19,10 @@ from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point
 from fish_env.params.schema import FishParams
 
-PHASE_SD_RANGE = (3e-3, 0.2)
-"""Random walk of the phase of a tail whose beat is a little different in each run (rad/s^0.5): one
-that is half a per cent off is 0.3 rad off after ten seconds, as is a walk of 0.1."""
+PHASE_SD_RANGE = (3e-3, 0.03)
+"""Random walk of the phase of a tail whose beat is a little different in each run (rad/s^0.5): what
+its own beat and sag leave is some 0.15 rad after half a minute, as is the larger one. A larger one
+would follow whatever makes the tail late, and nothing that does would show."""
 JITTER_SD_RANGE = (2e-4, 0.01)
 """How early or late samples may be (s): a camera's exposures jitter by a few milliseconds."""
 JITTER_TRIALS = (1e-3, 2e-3, 4e-3)

@@ -17,6 +17,7 @@ from fish_env.identification.filtering import Measurement, RunFilter
 from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.runs import FREQUENCY, RunData
 from fish_env.identification.state_blocks import PHASE_COLUMN
+from fish_env.identification.variation import START
 from fish_env.inference.problem import Point
 
 COARSE = np.arange(24, dtype=np.float64) * (np.pi / 12.0)
@@ -60,6 +61,9 @@ S = TypeVar("S", bound=Filtering)
 def settle_phases(problem: S, point: Point, noise: NoiseModel, nearby: bool = False) -> S:
     """The problem with the likeliest starting phase of every run whose phase is unknown.
 
+    Where runs have numbers of their own, one of these is the phase: once a beginning has told it
+    roughly, the whole run tells it better, and it is only taken on from there.
+
     Args:
         problem: its runs' own phases are used only as centres of what is near them.
         point: parameters to judge by.
@@ -70,6 +74,12 @@ def settle_phases(problem: S, point: Point, noise: NoiseModel, nearby: bool = Fa
     if not unknown:
         return problem
     runs = list(problem.runs)
+    if noise.spread[START] > 0.0:
+        for i in unknown:
+            runs[i] = _taken_on(runs[i])
+        unknown = [i for i in unknown if not runs[i].phase_found]
+        if not unknown:
+            return problem.with_runs(runs)
     own = [runs[i] for i in unknown]
     found = _nearest(problem, point, noise, own) if nearby else None
     if found is None:
@@ -114,7 +124,17 @@ def _starting(run: RunData, phase: float, spread: float) -> RunData:
     state, covariance = run.state0.copy(), run.covariance0.copy()
     state[PHASE] = phase
     covariance[PHASE_COLUMN, PHASE_COLUMN] = spread**2
-    return replace(run, state0=state, covariance0=covariance)
+    return replace(run, state0=state, covariance0=covariance, phase_found=True)
+
+
+def _taken_on(run: RunData) -> RunData:
+    """The run with its own number for the phase in its initial state."""
+    if not (run.phase_found and run.variation[START]):
+        return run
+    state, variation = run.state0.copy(), run.variation.copy()
+    state[PHASE] += variation[START]
+    variation[START] = 0.0
+    return replace(run, state0=state, variation=variation)
 
 
 def _beginning(run: RunData) -> RunData:

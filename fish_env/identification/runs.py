@@ -43,7 +43,7 @@ JUMPS = {
 with every sample, leave plain steps wrong by less than a fifth of usual sensor noise."""
 FINER = 4
 """How many times finer those are than the others."""
-LONG_STEP_S = 0.02
+LONG_STEP_S = 0.01
 """Longest step where causes are only compared: what most of them change comes out the same within
 a thousandth, what the quickest lags change within a tenth, and within a quarter where the tail's
 rate jumps. Twice as long, a lag that the usual steps follow diverges."""
@@ -68,6 +68,7 @@ class RunData:
         state0: (18,) initial base state.
         covariance0: (19, 19) of its error state.
         phase_known: whether the tail phase at the start is known.
+        phase_found: whether the initial state has the likeliest one, if it is not.
         swimming: whether the tail was beating before the run began.
         as_measured: whether position and heading of the initial state are as the samples show them,
             with whatever distorts those; otherwise they are true.
@@ -108,6 +109,7 @@ class RunData:
     devices: IntArray | None = None
     moved: IntArray = field(default_factory=lambda: np.zeros(len(Device), np.int64))
     usual_substeps: IntArray | None = None
+    phase_found: bool = False
 
     @property
     def known_wrench(self) -> FloatArray:

@@ -43,7 +43,7 @@ JUMPS = {
 with every sample, leave plain steps wrong by less than a fifth of usual sensor noise."""
 FINER = 4
 """How many times finer those are than the others."""
-LONG_STEP_S = 0.01
+LONG_STEP_S = 0.02
 """Longest step where causes are only compared: what most of them change comes out the same within
 a thousandth, what the quickest lags change within a tenth, and within a quarter where the tail's
 rate jumps. Twice as long, a lag that the usual steps follow diverges."""

@@ -17,7 +17,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fish_env.arrays import FloatArray
-from fish_env.identification.channels import devices_of
 from fish_env.identification.in_step import nominal_point
 from fish_env.identification.runs import PHASE, RunData
 from fish_env.identification.series import SeriesProblem
@@ -173,8 +172,7 @@ def with_own_beats(problem: SeriesProblem, beats: OwnBeats) -> SeriesProblem:
     drive = beats.drive or problem.drive
     if not beats.own:
         return problem.with_drive(drive)
-    devices = devices_of(problem.channels)
-    runs = [_beating(run, beats).movable(devices) for run in problem.runs]
+    runs = [_beating(run, beats).movable(problem.channels) for run in problem.runs]
     return problem.with_runs(runs).with_drive(replace(drive, uneven=True))
 
 

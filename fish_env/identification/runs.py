@@ -12,7 +12,7 @@ from fish_env.arrays import BoolArray, FloatArray, IntArray
 from fish_env.data.schema import Run
 from fish_env.data.vocabulary import COMMANDS
 from fish_env.errors import DatasetError
-from fish_env.identification.channels import BY_NAME, Device, Kind
+from fish_env.identification.channels import BY_NAME, Device, Kind, devices_of
 from fish_env.identification.first_state import first_state
 from fish_env.identification.late_rows import in_earlier_rows, rows_to_spare
 from fish_env.identification.state_blocks import PHASE_COLUMN
@@ -24,6 +24,9 @@ UNTOLD_S = 0.15
 of a run from rest, the first samples judge nothing (s)."""
 
 
+SMEARED_S = 0.16
+"""How long a gyro with a low-pass of 5 Hz inside shows a jump: after 0.14 s its answer is within a
+twentieth, and its clock may be some 0.02 s off."""
 SAME_INSTANT_S = 1e-6
 BEFORE_S = 1e3
 FREQUENCY = 2  # column of the commands
@@ -138,19 +141,25 @@ class RunData:
             return numbered
         return replace(numbered, measured=self._in_rows(rows), moved=rows)
 
-    def movable(self, devices: Sequence[int]) -> RunData:
+    def movable(self, channels: Sequence[str]) -> RunData:
         """The same run with rows that may be moved, where its samples are evenly spaced.
 
         A device that is late shows what was. Moved by whole rows its samples are as they were, and
         only part of a row is left to the equations of motion. The last rows count for nothing, so
-        that the same samples count however far they are moved.
+        that the same samples count however far they are moved. What a filter inside a gyro makes of
+        a jump nobody knows, so that its samples after one judge nothing either.
 
         Args:
-            devices: (C,) device of each channel.
+            channels: names of the channels.
         """
         if self.most_rows < 1:
             return self
-        run = replace(self, devices=np.asarray(devices), recorded=self.measured)
+        recorded = self.measured.copy()
+        gyro = np.array([name in ("p", "q", "r") for name in channels])
+        since = self.clock[:, None] - jump_times(*self.commands)
+        smeared = ((since >= 0.0) & (since < SMEARED_S)).any(axis=1)
+        recorded[np.ix_(smeared, gyro)] = np.nan
+        run = replace(self, devices=np.array(devices_of(channels)), recorded=recorded)
         return replace(run, measured=run._in_rows(run.moved))
 
     def _in_rows(self, rows: IntArray) -> FloatArray:

@@ -78,11 +78,10 @@ def test_only_the_channels_of_a_device_are_late(problem):
 
 
 def test_rows_are_moved_by_whole_samples_and_as_many_always_count(problem):
-    devices = devices_of(problem.channels)
-    movable = problem.with_runs([problem.runs[0].movable(devices)])
+    movable = problem.with_runs([problem.runs[0].movable(problem.channels)])
     run = movable.runs[0]
     assert run.most_rows == 2
-    inertial = [i for i, d in enumerate(devices) if d == Device.INERTIAL]
+    inertial = [i for i, d in enumerate(devices_of(problem.channels)) if d == Device.INERTIAL]
     counts = {int(np.isfinite(run.measured).sum())}
     for delay, rows in ((0.03, 0), (0.05, 1), (0.09, 2), (0.2, 2)):
         values = numbers_of(problem, inertial_delay=delay)
@@ -99,8 +98,7 @@ def test_rows_are_moved_by_whole_samples_and_as_many_always_count(problem):
 
 
 def test_the_likelihood_hardly_leaps_where_a_row_is_moved(problem):
-    devices = devices_of(problem.channels)
-    movable = problem.with_runs([problem.runs[0].movable(devices)])
+    movable = problem.with_runs([problem.runs[0].movable(problem.channels)])
     noise, at = problem.default_noise(), Point(np.zeros(len(PATHS)), {})
 
     def value(delay):

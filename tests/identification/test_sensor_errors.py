@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfilt
 
-from fish_env.identification.channels import devices_of
 from fish_env.identification.sensor_errors import LATE_S, innovation_slopes, sensor_slopes
 from fish_env.identification.series import SeriesProblem
 from fish_env.identification.variation import SENSOR_ERRORS
@@ -163,8 +162,7 @@ def test_a_filter_in_the_inertial_unit_is_a_delay_and_a_little_smoothing():
             seen[name] = np.interp(run.time_s, even, smooth)
         runs.append(replace(run, channels=seen))
     problem = SeriesProblem(replace(data, runs=tuple(runs)))
-    devices = devices_of(problem.channels)
-    problem = problem.with_runs([run.movable(devices) for run in problem.runs])
+    problem = problem.with_runs([run.movable(problem.channels) for run in problem.runs])
     at, plain = Point(np.zeros(len(problem.baseline)), {}), problem.default_noise()
     names = [v.name for v in problem.variations]
     late, smooth = names.index("inertial_delay"), names.index("inertial_smoothing")
@@ -182,7 +180,7 @@ def test_a_filter_in_the_inertial_unit_is_a_delay_and_a_little_smoothing():
     assert found[:, late].mean() == pytest.approx(LATE_S, abs=0.002)
     assert found[:, smooth].mean() == pytest.approx(1.0, abs=0.25)
     clean = SeriesProblem(data)
-    clean = clean.with_runs([run.movable(devices) for run in clean.runs])
+    clean = clean.with_runs([run.movable(problem.channels) for run in clean.runs])
     best = misfit(clean)
     assert misfit(problem) - best < 0.02 * (spoilt - best)
 

@@ -9,6 +9,7 @@ import pytest
 
 from fish_env.identification.channels import Device, devices_of
 from fish_env.identification.open_loop import without_feedback
+from fish_env.identification.runs import SMEARED_S, jump_times
 from fish_env.identification.series import SeriesProblem
 from fish_env.identification.variation_slopes import leave_diverged
 from fish_env.inference.problem import Point
@@ -115,3 +116,17 @@ def test_numbers_by_which_a_run_diverges_get_no_slope():
     slopes = np.array([[1.0, 1e200, np.nan, -3.0], [2.0, 1.0, 0.0, np.inf]])
     leave_diverged(slopes)
     np.testing.assert_array_equal(slopes, [[1.0, 0.0, 0.0, 0.0], [2.0, 0.0, 0.0, 0.0]])
+
+
+def test_a_gyro_says_nothing_just_after_a_jump(problem):
+    """What a filter inside it makes of a jump nobody knows."""
+    (run,) = problem.runs
+    movable = run.movable(problem.channels)
+    since = run.clock[:, None] - jump_times(*run.commands)
+    after = ((since >= 0.0) & (since < SMEARED_S)).any(axis=1)
+    gyro = np.isin(problem.channels, ["p", "q", "r"])
+    kept = np.isfinite(movable.recorded)
+    assert 0 < after.sum() < 0.5 * len(after)
+    assert not kept[np.ix_(after, gyro)].any()
+    assert np.array_equal(kept[~after], np.isfinite(run.measured[~after]))
+    assert np.array_equal(kept[:, ~gyro], np.isfinite(run.measured[:, ~gyro]))

@@ -26,8 +26,8 @@ from fish_env.diagnosis.regimes import as_plain
 from fish_env.diagnosis.result import Diagnosed, Diagnosis
 from fish_env.identification.beats import beats_of, by_run, uneven
 from fish_env.identification.generic_forces import wrench_unit
-from fish_env.identification.own_beats import USUAL_BEAT, USUAL_SAG
 from fish_env.identification.series import series_of
+from fish_env.identification.variation import USUAL_BEAT, USUAL_SAG
 from fish_env.inference.attribution import Ranked
 from fish_env.inference.effort import effort_of
 from fish_env.inference.estimate.fit import Fit

@@ -21,6 +21,7 @@ from fish_env.identification.in_step import nominal_point
 from fish_env.identification.runs import PHASE, RunData
 from fish_env.identification.series import SeriesProblem
 from fish_env.identification.tail_drive import RATE, SCALE, TailDrive
+from fish_env.identification.variation import USUAL_BEAT, USUAL_SAG
 
 COARSE: FloatArray = np.asarray(1.0 + np.arange(-24, 25) * 5e-3)
 """Frequencies over the commanded one of all runs together, tried on their beginnings."""
@@ -31,8 +32,6 @@ SAGS: FloatArray = np.asarray(np.arange(-8, 13) * 1e-4)
 """Shares of the beat lost each second, beside what was known of the drive."""
 PHASE_SD = 0.2
 """How far the phase at the start of a run may be from the declared one (rad)."""
-USUAL_BEAT, USUAL_SAG = 4e-3, 3e-4
-"""Ordinary spreads over runs of servos' frequencies, and of what batteries lose each second."""
 SURE, HALF_NORMAL = 3.0, np.array([math.sqrt(2.0 / math.pi), math.sqrt(1.0 - 2.0 / math.pi)])
 """Standard errors of a mean over runs within which it is ordinary, and the mean and spread of what
 is normal and only counted where positive: batteries lose charge."""

@@ -17,6 +17,10 @@ from fish_env.identification.channels import Device, devices_of
 from fish_env.inference.estimate.run_variation import RunVariation
 from fish_env.params.packing import RECORD_FIELDS
 
+USUAL_BEAT, USUAL_SAG = 4e-3, 3e-4
+"""Ordinary spreads over runs of servos' frequencies, and of what batteries lose each second (1/s).
+Within these a beat that runs share is none: a narrower spread about what combs have found would
+take the mean of their errors for a cause."""
 VARIATIONS = (
     RunVariation("trim_x", "m", 1e-4),
     RunVariation("trim_y", "m", 1e-4),
@@ -26,17 +30,17 @@ VARIATIONS = (
     RunVariation("gyro_zero_q", "rad/s", 5e-3),
     RunVariation("gyro_zero_r", "rad/s", 5e-3),
     RunVariation("clock_offset", "s", 1e-2),
-    RunVariation("beat", "1", 1e-3),
-    RunVariation("beat_sag", "1/s", 1.5e-4),
+    RunVariation("beat", "1", USUAL_BEAT),
+    RunVariation("beat_sag", "1/s", USUAL_SAG),
     RunVariation("camera_delay", "s", 0.02, shared=True, positive=True),
     RunVariation("inertial_delay", "s", 0.03, shared=True, positive=True),
     RunVariation("depth_delay", "s", 0.02, shared=True, positive=True),
     RunVariation("start_phase", "rad", 0.2),
 )
-"""Trim is how far the barycentre of the whole fish at rest is moved. The beat and its sag are what
-their combs may have got wrong, see ``own_beats``. Devices are late by a frame of a camera; a filter
-of 5 Hz inside an inertial unit makes that 0.045 s late. The phase is that of the tail at the first
-sample, beside what is declared or was found on a grid: it moves with the delays."""
+"""Trim is how far the barycentre of the whole fish at rest is moved. The beat and its sag are beside
+what combs have found, see ``own_beats``. Devices are late by a frame of a camera; a filter of 5 Hz
+inside an inertial unit makes that 0.045 s late. The phase is that of the tail at the first sample,
+beside what is declared or was found on a grid: it moves with the delays."""
 COUNT = len(VARIATIONS)
 BEAT, SAG, START = (
     next(i for i in range(COUNT) if VARIATIONS[i].name == name)

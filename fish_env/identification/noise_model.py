@@ -17,11 +17,8 @@ much it is off its tangent by 5 %, and beyond it a correction soon points the wr
 
 UNEVEN_PHASE_SD = 0.03
 """Random walk of the tail's phase (rad/s^0.5) that a fit begins with where runs beat differently:
-no such beat is constant to the last. Its size is then estimated with the disturbance."""
-HIDING_PHASE_SD = 0.05
-"""Random walk of the phase (rad/s^0.5) from which it follows a late tail: in the two seconds
-between commands it then goes as far as a lag of 20 ms shifts the phase when the beat changes by
-0.6 Hz."""
+no such beat is constant to the last. Its size is then estimated with the disturbance, up to
+this."""
 
 
 @dataclass(frozen=True)
@@ -59,11 +56,6 @@ class NoiseModel:
         Under relaxed noise the phase may be off by any amount, and has to be found.
         """
         return np.inf if self.phase_sd >= RELAXED_PHASE_SD else LARGEST_TURN
-
-    @property
-    def hides_lags(self) -> bool:
-        """Whether the tail's phase walks far enough to follow a late tail."""
-        return self.phase_sd > HIDING_PHASE_SD
 
     @property
     def wrench_variance(self) -> FloatArray:

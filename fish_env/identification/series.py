@@ -35,7 +35,7 @@ from fish_env.identification.run_numbers import renumbered
 from fish_env.identification.runs import FINER, RunData, prepare_run
 from fish_env.identification.sensor_errors import slopes_of_runs
 from fish_env.identification.sensors import largest_jitter_of, largest_noise
-from fish_env.identification.tail_drive import LATE, TailDrive
+from fish_env.identification.tail_drive import TailDrive
 from fish_env.identification.variation import EVERY, USUAL, VARIATIONS
 from fish_env.identification.variation_slopes import swum_slopes
 from fish_env.inference.estimate.fit import Fit
@@ -66,7 +66,6 @@ class SeriesProblem(Problem):
     known: dict[str, Effect]
     drive: TailDrive
     out_of_step = ("frequency_scale", "battery_sag", "clock_scale", "clock_skew")
-    hidden_by_drive = LATE
     interchangeable = ALIKE
     variations = EVERY
 
@@ -207,10 +206,6 @@ class SeriesProblem(Problem):
     def swamped(self, noise: NoiseModel) -> bool:
         """Whether a disturbance is as strong as any that a noise model may have."""
         return bool(widest_disturbance(self.fish).left_by(noise))
-
-    def drive_hides(self, noise: NoiseModel) -> bool:
-        """Whether the tail's phase walks far enough to follow a late tail."""
-        return self.drive.uneven and noise.hides_lags
 
     def settled(self, point: Point, noise: NoiseModel, nearby: bool = False) -> SeriesProblem:
         """The same problem with the likeliest starting phase of every run that has none."""

@@ -37,10 +37,10 @@ VARIATIONS = (
     RunVariation("depth_delay", "s", 0.02, shared=True, positive=True),
     RunVariation("start_phase", "rad", 0.2),
 )
-"""Trim is how far the barycentre of the whole fish at rest is moved. The beat and its sag are beside
-what combs have found, see ``own_beats``. Devices are late by a frame of a camera; a filter of 5 Hz
-inside an inertial unit makes that 0.045 s late. The phase is that of the tail at the first sample,
-beside what is declared or was found on a grid: it moves with the delays."""
+"""Trim is how far the barycentre of the whole fish at rest is moved. The beat and its sag are
+beside what combs have found, see ``own_beats``. Devices are late by a frame of a camera; a filter
+of 5 Hz inside an inertial unit makes that 0.045 s late. The phase is that of the tail at the first
+sample, beside what is declared or was found on a grid: it moves with the delays."""
 COUNT = len(VARIATIONS)
 BEAT, SAG, START = (
     next(i for i in range(COUNT) if VARIATIONS[i].name == name)

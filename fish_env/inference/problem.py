@@ -56,7 +56,6 @@ class Problem(Protocol):
         run_count: number of runs.
         out_of_step: effects that put a periodic drive out of step by more and more; after whole
             periods no small change tells which way to go.
-        hidden_by_drive: effects that no slope shows while the phase of an uneven drive walks.
         interchangeable: sets of coefficients that act alike.
         variations: what runs may differ in, K of them.
         drive: what was measured of a periodic drive.
@@ -67,7 +66,6 @@ class Problem(Protocol):
     baseline: Coefficients
     effects: tuple[str, ...] = ()
     out_of_step: tuple[str, ...] = ()
-    hidden_by_drive: tuple[str, ...] = ()
     interchangeable: tuple[frozenset[str], ...] = ()
     variations: tuple[RunVariation, ...] = ()
     drive: Drive = Drive()
@@ -293,10 +291,6 @@ class Problem(Protocol):
     def swamped(self, noise: Any) -> bool:
         """Whether a disturbance is as strong as any that a noise model may have."""
         return False
-
-    def drive_hides(self, noise: Any) -> bool:
-        """Whether an uneven drive hides ``hidden_by_drive`` under a noise model."""
-        return bool(self.drive.uneven)
 
     def settled(self, point: Point, noise: Any, nearby: bool = False) -> Problem:
         """The same problem with what is unknown of each run's start where it suits a point.

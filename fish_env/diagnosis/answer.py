@@ -71,7 +71,7 @@ def shared_entries(diagnosis: Diagnosed) -> Plain:
         for rival in attribution.rivals
         if rival.causes in verdict.alternatives
     ]
-    screen = attribution.screens[0]
+    screen = attribution.first
     sizes = coefficient_sizes(screen.signals, lambda s: smallest_detectable(s, 0, screen.threshold))
     return {
         "format": FORMAT,

@@ -52,7 +52,8 @@ class Attribution:
 
     Attributes:
         baseline: refitted baseline.
-        screens: screen of the baseline, then of each accepted explanation.
+        first: screen of the baseline.
+        shown: screen of the accepted explanation. Those between take much memory and tell no more.
         accepted: explanation of the last step (the baseline itself when nothing was added).
         rivals: explanations that fit as well as the accepted one.
         ranking: causes fitted in the first step, best first.
@@ -61,7 +62,8 @@ class Attribution:
     """
 
     baseline: Explanation
-    screens: tuple[Screen, ...]
+    first: Screen
+    shown: Screen
     accepted: Explanation
     rivals: tuple[Explanation, ...]
     ranking: tuple[Ranked, ...]
@@ -103,7 +105,7 @@ def attribute(
         partial(screen, baseline, causes, rng),
         lambda: nothing.with_relaxed_noise if relax else None,
     )
-    begun = Attribution(nothing, (first,), nothing, (), (), 0.0)
+    begun = Attribution(nothing, first, first, nothing, (), (), 0.0)
     return extended(begun, causes, rng, effort, report)
 
 
@@ -189,7 +191,7 @@ class Search:
             return begun
         after = screen(accepted.fit, self.causes, self.rng)
         return replace(
-            begun, accepted=accepted, screens=(*begun.screens, after),
+            begun, accepted=accepted, shown=after,
             gain=nothing.score - accepted.score,
         )  # fmt: skip
 
@@ -197,7 +199,7 @@ class Search:
         """With further effects that are needed beside those found, and what the runs differ in."""
         before, rough = found.accepted, roughness(found.accepted)
         current, after = pursue(
-            before, found.screens[-1], self.causes, self.rng, self.report,
+            before, found.shown, self.causes, self.rng, self.report,
             rough * found.gain, self.relaxed_log_p,
         )  # fmt: skip
         if current is before:
@@ -205,11 +207,10 @@ class Search:
         gain = found.gain + before.score - current.score
         if current.causes == before.causes:
             alike = tuple(e.varied(beside_misfit=True) for e in found.rivals)
-            screens = (*found.screens[:-1], after)
-            return replace(found, accepted=current, rivals=alike, screens=screens, gain=gain)
+            return replace(found, accepted=current, rivals=alike, shown=after, gain=gain)
         current, rivals = challenged(current, after, found.rivals, self.report)
         return replace(
-            found, accepted=current, rivals=rivals, screens=(*found.screens, after), gain=gain,
+            found, accepted=current, rivals=rivals, shown=after, gain=gain,
             failed=frozenset(),
         )  # fmt: skip
 
@@ -230,7 +231,7 @@ class Search:
         accepted = more.explanation
         after = screen(accepted.fit, self.causes, self.rng)
         return replace(
-            begun, accepted=accepted, screens=(*begun.screens, after),
+            begun, accepted=accepted, shown=after,
             ranking=ranking_of(more.tried, more.base), gain=nothing.score - accepted.score,
         )  # fmt: skip
 
@@ -241,7 +242,7 @@ class Search:
         found together, and what else is missing pulls at coefficients.
         """
         current, effort = found.accepted, self.effort
-        problem, shown = current.fit.problem, found.screens[-1]
+        problem, shown = current.fit.problem, found.shown
         least = roughness(current) * found.gain
         if current.causes and effort.retries:
             effort = effort.reduced
@@ -269,7 +270,7 @@ class Search:
         best, others, after = self._questioned(current, tried, chosen, shown, found.gain + gain)
         others = [e for e in others if explained_away(e.causes[-1], shown, after)]
         return replace(
-            found, accepted=best, screens=(*found.screens, after), ranking=ranking,
+            found, accepted=best, shown=after, ranking=ranking,
             rivals=rivals_of(best, others), gain=found.gain + gain, failed=frozenset(),
         )  # fmt: skip
 

@@ -111,7 +111,7 @@ def investigate(
     where = baseline if effort.retries else None
     left, shown = both(
         partial(adequacy, attribution.accepted.fit, rng, attribution.tolerated),
-        partial(preconditions, problem, attribution.screens[0], causes, where),
+        partial(preconditions, problem, attribution.first, causes, where),
     )
     if effort.retries and left.slight and describe:
         left = cross_validated(attribution, left, describe, report)
@@ -272,7 +272,7 @@ def with_weaker_causes(
     """
     # Some of the causes that the last screen was made beside may have been dropped since.
     shown = screen(attribution.accepted.fit, causes, rng)
-    begun = replace(attribution, screens=(*attribution.screens, shown))
+    begun = replace(attribution, shown=shown)
     more = extended(begun, causes, rng, FULL, report, POLICY.relaxed_log_p)
     if more.accepted.causes == attribution.accepted.causes:
         return attribution, left

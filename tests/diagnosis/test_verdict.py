@@ -6,16 +6,18 @@ from fish_env.inference.adequacy import Adequacy
 from fish_env.inference.attribution import Attribution
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.preconditions import Precondition
+from fish_env.inference.screening import Screen
 from fish_env.inference.verdict import VERDICTS, decide
 from tests.inference.stated import Stated, apart, effect, fit_of
 
+SHOWN = Screen((), -11.0, 0.05)
 FIT = fit_of(Stated(apart({"current": [0.0]}), [effect("current")]))
 LEFT = {reached: Adequacy(reached, -11.0, ()) for reached in (True, False)}
 
 
 def attribution(causes=(), rivals=()):
     accepted, *others = (Explanation(tuple(names), FIT) for names in (causes, *rivals))
-    return Attribution(Explanation((), FIT), (), accepted, tuple(others), (), 0.0)
+    return Attribution(Explanation((), FIT), SHOWN, SHOWN, accepted, tuple(others), (), 0.0)
 
 
 def shown(*excited):

@@ -11,8 +11,10 @@ from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.pipeline import cross_validated, with_weaker_causes
 from fish_env.inference.probes import causes_of
+from fish_env.inference.screening import Screen
 from tests.inference.stated import Stated, apart, effect
 
+SHOWN = Screen((), -11.0, 0.05)
 LEFT = Adequacy(False, -11.0, (Misfit("u", "heave", -12.0, 0.01),))
 NAMES = ("wave", *(f"effect {i}" for i in range(60)))
 UNKNOWN = "unknown"
@@ -91,7 +93,7 @@ def test_one_half_of_the_runs_refutes_chance_in_the_other(causes, gain, reached)
 
     problem = Stated(apart({"hull_compression": np.ones(5)}), [effect("hull_compression")])
     nothing, found = (Explanation(names, fit(problem, names)) for names in ((), causes))
-    attribution = Attribution(nothing, (), found, (), (), 0.0)
+    attribution = Attribution(nothing, SHOWN, SHOWN, found, (), (), 0.0)
     after = cross_validated(attribution, LEFT, describe, lambda step: None)
     assert after.reached == reached
     assert after.refuted == (2.0 * gain if reached else None)

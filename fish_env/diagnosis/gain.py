@@ -17,7 +17,7 @@ from fish_env.arrays import FloatArray
 from fish_env.identification import open_loop
 from fish_env.identification.filtering import Filtered
 from fish_env.identification.runs import RunData
-from fish_env.identification.series import SeriesProblem
+from fish_env.identification.series import SeriesProblem, series_of
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.settle import evaluated
 from fish_env.inference.gain import ClosedGap
@@ -85,10 +85,19 @@ def measure_gain(problem: SeriesProblem, baseline: Fit, extended: Fit, gap: Clos
 
 def one_step(problem: SeriesProblem, baseline: Fit, extended: Fit) -> OneStep:
     """The runs of a problem filtered with each of two fits, both under the second one's noise."""
-    _, after = evaluated(problem, extended.point, extended.noise)
+    _, after = evaluated(_begun(problem, extended), extended.point, extended.noise)
     if extended is baseline:
         return after, after
-    return evaluated(problem, baseline.point, extended.noise)[1], after
+    return evaluated(_begun(problem, baseline), baseline.point, extended.noise)[1], after
+
+
+def _begun(problem: SeriesProblem, fit: Fit) -> SeriesProblem:
+    """The runs with the numbers of their own that a fit to them has found.
+
+    The same runs if the fit was to others.
+    """
+    own = series_of(fit)
+    return own.with_refinement() if own.run_ids == problem.run_ids else problem
 
 
 def misfit_of(problem: SeriesProblem, judged: OneStep) -> dict[str, Pair]:

@@ -341,6 +341,8 @@ class SeriesProblem(Problem):
 
     def with_refinement(self) -> SeriesProblem:
         """The same problem in usual steps, finer for effects that make the tail's rate jump."""
+        if not self.unrefined and all(run.usual_substeps is None for run in self.runs):
+            return self
         return self.with_runs([run.in_usual_steps() for run in self.runs])._but(unrefined=False)
 
     def is_coarse(self, effects: Iterable[str]) -> bool:

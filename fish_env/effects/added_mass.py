@@ -1,4 +1,4 @@
-"""Added mass: the water that accelerates with the body (Kirchhoff, diagonal at O_b)."""
+"""Added mass: inertia of the water around the body (Kirchhoff, diagonal at O_b)."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ def add_inertia(inertia, tail, fish, e):
 def coriolis_and_munk(motion, tail, inputs, centre, fish, e):
     """-omega x (M_A V_rel) - M_A drift; -omega x (I_A omega) - V_rel x (M_A V_rel).
 
-    The drift, omega x R^T U - R^T DU/Dt, is what d(V_rel)/dt has beside dV_b/dt: water that speeds
-    up takes the fish along by M_A DU/Dt. The last term is the Munk moment.
+    The drift is d(V_rel)/dt - dV_b/dt = omega x R^T U - R^T DU/Dt: accelerating water exerts the
+    force M_A DU/Dt on the fish. The last term is the Munk moment.
     """
     omega = Vector(motion.p, motion.q, motion.r)
     velocity = Vector(motion.u, motion.v, motion.w)
@@ -73,7 +73,7 @@ def _inertia(name: str, plausible: tuple[float, float]) -> EffectParameter:
 EFFECT = Effect(
     name="added_mass",
     section="inertia",
-    summary="Water moves with the body: slower to speed up, and a Munk moment in sideslip.",
+    summary="The water adds inertia: the fish accelerates less, and sideslip gives a Munk moment.",
     equation=(
         "F = -M_A dV_rel/dt - omega x (M_A V_rel), "
         "M = -I_A domega/dt - omega x (I_A omega) - V_rel x (M_A V_rel)"

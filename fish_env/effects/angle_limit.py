@@ -1,7 +1,7 @@
-"""Angle limit: stops hold the tail within a range, on one side or on both.
+"""Angle limit: stops limit the tail angle on one side or on both.
 
-The tail's rate jumps where it meets a stop. Within half a step of that instant the jump is spread
-as its mean over one step around the present, so that steps add up to what the angle gains.
+The tail's rate jumps when it meets a stop. Within half a step of the jump, the rate is replaced by
+its mean over one step about the present time. The steps then add up to the change of the angle.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ def stop_tail(tail, inputs, phase, time, fish, e, memory, since):
 
 @kernel
 def start_anywhere(inputs, tail, fish, e):
-    """Nothing is known of the length of the step before a run."""
+    """The length of the step before a run is unknown."""
     return (UNTOLD_STEP,)
 
 
 EFFECT = Effect(
     name="angle_limit",
     section="actuation",
-    summary="The tail stops short of large angles, on one side or on both.",
+    summary="Stops limit the tail angle on one side or on both.",
     equation="xi = min(max(cmd, lower), upper)",
     source="End stops of a servo or of the hull, and pulse widths that a servo cuts off",
     parameters=(

@@ -1,4 +1,4 @@
-"""Attitude misalignment: the inertial unit is not mounted square."""
+"""Attitude misalignment: the inertial unit is not aligned with the hull."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def _angle(name: str) -> EffectParameter:
 EFFECT = Effect(
     name="attitude_misalignment",
     section="measurement",
-    summary="Angles and rates are those of a sensor turned in the hull, not of the hull.",
+    summary="Angles and rates are measured about the axes of a sensor that is rotated in the hull.",
     equation="measured R = R M, measured omega = M^T omega, M = R_z(yaw) R_y(pitch) R_x(roll)",
     source="Mounting error of a strapdown unit: Titterton and Weston, Strapdown Inertial "
     "Navigation Technology, chapter 3",

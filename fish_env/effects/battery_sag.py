@@ -1,4 +1,4 @@
-"""Battery sag: the tail beats ever more slowly as the battery empties."""
+"""Battery sag: the tail frequency falls as the battery empties."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ def slow_down(inputs, time, fish, e):
 EFFECT = Effect(
     name="battery_sag",
     section="actuation",
-    summary="The same command beats more slowly late in a run than early.",
+    summary="The same command gives a lower tail frequency late in a run than early.",
     equation="f1 -> f1 (1 - rate t), t since the run's start, f1 >= 0",
     source="Speed of a d.c. motor under load follows its voltage, which falls with the charge used",
     parameters=(
         EffectParameter(
-            "rate", "1/s", 0.0, -0.01, 0.1, (0.0002, 0.01), "share of f1 lost a second"
+            "rate", "1/s", 0.0, -0.01, 0.1, (0.0002, 0.01), "share of f1 lost per second"
         ),
     ),
     hooks={"inputs": slow_down},

@@ -1,4 +1,4 @@
-"""Beat load: the tail beats more slowly under load, and with its centre to one side."""
+"""Beat load: the tail frequency falls with the load and with the tail offset."""
 
 from __future__ import annotations
 
@@ -31,13 +31,12 @@ def slow_beat(inputs, time, fish, e):
 EFFECT = Effect(
     name="beat_load",
     section="actuation",
-    summary="The tail beats more slowly than commanded the faster its stroke and the larger its "
-    "offset.",
+    summary="The tail frequency is below its command, more so for fast strokes and large offsets.",
     equation="f1 -> f1 (1 - offset |xi1_bar|) (1 - load 2 pi A1 f1)",
     source="Speed of a d.c. motor falls linearly with its load, which grows with stroke and offset",
     parameters=(
-        EffectParameter("offset", "1/rad", 0.0, 0.0, 2.0, (0.05, 0.4), "share lost a radian"),
-        EffectParameter("load", "s/rad", 0.0, 0.0, 0.2, (0.002, 0.02), "share lost a rad/s"),
+        EffectParameter("offset", "1/rad", 0.0, 0.0, 2.0, (0.05, 0.4), "share lost per radian"),
+        EffectParameter("load", "s/rad", 0.0, 0.0, 0.2, (0.002, 0.02), "share lost per rad/s"),
     ),
     hooks={"inputs": slow_beat},
     drifts_in_phase=True,

@@ -23,19 +23,19 @@ def lag_block(inputs, time, fish, e, states):
 
 @kernel
 def start_at_command(inputs, tail, fish, e):
-    """The run starts with the block where it is commanded."""
+    """The run starts with the block at its command."""
     return (inputs.block_displacement,)
 
 
 def fastest(values):
-    """The lag itself; infinite when the effect is off."""
+    """Time constant of the lag; infinite when the effect is off."""
     return values["time_constant"] or float("inf")
 
 
 EFFECT = Effect(
     name="block_lag",
     section="actuation",
-    summary="The weight block creeps to where it is told to go.",
+    summary="The weight block approaches its command with a lag.",
     equation="d(x)/dt = (dd - x) / time_constant, the block being at x",
     source="First-order servo model, e.g. Ogata, Modern Control Engineering, section 5-2",
     parameters=(

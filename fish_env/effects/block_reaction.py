@@ -1,15 +1,14 @@
 """Block reaction: moving the weight block pushes the hull the other way.
 
-The baseline puts the block where its actuator holds it and leaves out what it takes to move it.
-Here the block's acceleration in the hull and its Coriolis part act back on the hull.
+The baseline prescribes the block's position and leaves out the force that moves the block. This
+effect adds the reaction of that force on the hull: the block's acceleration in the hull and its
+Coriolis part.
 
-An ideal actuator moves the block at once, which would be an infinite force forth and back within
-no time, but with a finite result: the hull is displaced by -m_w dd / m. So that this result is
-there whatever drives the block, the reaction is that of a block which follows its commanded place
-x by a critically damped approach, s'' = 2 (x' - s')/T + (x - s)/T^2, within some 0.02 s.
-A block that moves no faster than its drive allows (slew limit, lag) is followed without delay.
-The barycentre is where the block is commanded, as ever, so after a jump the place of the fish is
-right to first order in dd.
+An ideal actuator moves the block at once. Its force is infinite, but the displacement of the hull
+is finite: -m_w dd / m. To keep this result for every actuator, the reaction is that of a block that
+follows its command x in about 0.02 s, critically damped: s'' = 2 (x' - s')/T + (x - s)/T^2.
+A block that moves slowly (slew limit, lag) is followed without delay. The barycentre still
+follows the command. After a jump, the position of the fish is right to first order in dd.
 """
 
 from __future__ import annotations
@@ -29,7 +28,7 @@ APPROACH_TIME = 0.02
 
 @kernel
 def approach(place, rate, followed, followed_rate):
-    """Acceleration of what follows a place (per second squared)."""
+    """Acceleration of a block that follows a command (per second squared)."""
     per_second = 1.0 / APPROACH_TIME
     return per_second * (2.0 * (rate - followed_rate) + per_second * (place - followed))
 
@@ -62,12 +61,12 @@ def push_back(motion, tail, inputs, centre, fish, e, states):
 
 @kernel
 def start_at_rest(inputs, tail, fish, e):
-    """The run starts with the block in its place."""
+    """The run starts with the block at rest at its command."""
     return inputs.block_displacement, 0.0, inputs.block_angle, 0.0
 
 
 def fastest(values):
-    """The approach; infinite when the effect is off."""
+    """Time constant of the approach; infinite when the effect is off."""
     return APPROACH_TIME if values["scale"] else inf
 
 
@@ -78,7 +77,9 @@ EFFECT = Effect(
     equation="F = -scale m_w (a_w + 2 omega x v_w), M = C_w x F; a_w, v_w of the block in the hull",
     source="d(m C_m)/dt of the system of hull and block; Greenwood, Principles of Dynamics, 4-4",
     parameters=(
-        EffectParameter("scale", "-", 0.0, 0.0, 2.0, (0.3, 1.2), "1 is the block's whole momentum"),
+        EffectParameter(
+            "scale", "-", 0.0, 0.0, 2.0, (0.3, 1.2), "1 is the whole reaction of the block"
+        ),
     ),
     hooks={"wrench": push_back},
     states={"wrench": ("stroke", "stroke_rate", "turn", "turn_rate")},

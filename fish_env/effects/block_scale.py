@@ -1,4 +1,4 @@
-"""Block scale: the weight block moves further or less far than commanded."""
+"""Block scale: the stroke of the weight block is larger or smaller than commanded."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Buoyancy offset: the trim is not what the scales said."""
+"""Buoyancy offset: the displaced mass differs from the fish file."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def shift_buoyancy(centre, place, inputs, time, fish, e):
 EFFECT = Effect(
     name="buoyancy_offset",
     section="hydrostatics",
-    summary="The fish displaces a little more or less water than its weight.",
+    summary="The fish displaces more or less water than its file says, and rises or sinks.",
     equation="m_b -> m_b + mass",
     source="Archimedes' principle",
     parameters=(

@@ -17,7 +17,7 @@ def _angle(name: str) -> EffectParameter:
 EFFECT = Effect(
     name="camera_tilt",
     section="measurement",
-    summary="The measured path shifts with depth, and is shorter one way than the other.",
+    summary="The measured path shifts with depth, and is shortened in one direction.",
     equation="measured (x, y) = those of T^T C_I, T = R_y(pitch) R_x(roll)",
     source="Extrinsic calibration of a camera: Hartley and Zisserman, Multiple View Geometry",
     parameters=(_angle("roll"), _angle("pitch")),

@@ -1,4 +1,4 @@
-"""Clock scale: the one clock of a whole log runs fast or slow."""
+"""Clock scale: the clock of a log runs fast or slow."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def true_time(recorded_s, values):
 EFFECT = Effect(
     name="clock_scale",
     section="measurement",
-    summary="The log's clock runs at another rate than true time, for commands and measurements.",
+    summary="The clock of commands and measurements runs at another rate than true time.",
     equation="recorded time = true time / scale, of commands and measurements alike",
     source="Rate error of the recorder's oscillator, or a log replayed at another speed",
     parameters=(EffectParameter("scale", "-", 1.0, 0.2, 5.0, (0.97, 1.03), "rate of true time"),),

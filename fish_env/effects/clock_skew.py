@@ -13,11 +13,13 @@ def true_time(recorded_s, values):
 EFFECT = Effect(
     name="clock_skew",
     section="measurement",
-    summary="Measurements carry times of a clock that runs at another rate than the commands'.",
+    summary="The clock of the measurements runs at another rate than that of the commands.",
     equation="recorded time = time on the commands' clock / scale, of measurements alone",
     source="Clock skew between two recorders",
     parameters=(
-        EffectParameter("scale", "-", 1.0, 0.2, 5.0, (0.97, 1.03), "rate of the commands' clock"),
+        EffectParameter(
+            "scale", "-", 1.0, 0.2, 5.0, (0.97, 1.03), "rate of the clock of the commands"
+        ),
     ),
     sample_time=true_time,
     confusable_with=(

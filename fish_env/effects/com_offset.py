@@ -1,4 +1,4 @@
-"""Centre-of-mass offset: the ballast is not where the drawing has it."""
+"""Centre-of-mass offset: the centre of mass differs from the fish file."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def _component(axis: str, way: str) -> EffectParameter:
 EFFECT = Effect(
     name="com_offset",
     section="hydrostatics",
-    summary="The fish does not hang level: it pitches or rolls at rest; its path climbs or bends.",
+    summary="The fish pitches or rolls at rest, and its path climbs or turns.",
     equation="C_m -> C_m + (x, y, z)",
     source="Statics: tan(pitch at rest) = -x / z of the barycentre",
     parameters=(

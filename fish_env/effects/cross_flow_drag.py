@@ -1,4 +1,4 @@
-"""Cross-flow drag: the body sheds eddies where the flow crosses it."""
+"""Cross-flow drag: drag of the flow across the body."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def _coefficient(name: str) -> EffectParameter:
 EFFECT = Effect(
     name="cross_flow_drag",
     section="hydrodynamics",
-    summary="Sideways and vertical motion meet more resistance, however small the speed ahead.",
+    summary="More drag on sideways and vertical motion, at every forward speed.",
     equation="F_y = -sway v |v|, F_z = -heave w |w|",
     source="Hoerner, Fluid-Dynamic Drag, section 3: the cross-flow principle",
     parameters=(_coefficient("sway"), _coefficient("heave")),

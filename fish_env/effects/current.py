@@ -20,7 +20,7 @@ def _component(name: str) -> EffectParameter:
 EFFECT = Effect(
     name="current",
     section="surroundings",
-    summary="The whole body of water moves: the path drifts, the dynamics do not change.",
+    summary="All of the water moves: the path drifts, and the dynamics do not change.",
     equation="V_rel = V_b - R^T [north, east, down]",
     source="Fossen, Handbook of Marine Craft, section 10.3",
     parameters=tuple(_component(name) for name in ("north", "east", "down")),

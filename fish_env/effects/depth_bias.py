@@ -1,4 +1,4 @@
-"""Depth bias: the depth sensor's zero is off."""
+"""Depth bias: the depth sensor has a constant error."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def add_offset(channels, values):
 EFFECT = Effect(
     name="depth_bias",
     section="measurement",
-    summary="The measured depth is off by a constant.",
+    summary="The measured depth has a constant error.",
     equation="measured z = true z + offset",
     source="Zero of a pressure sensor: 1 mbar of air pressure is 1 cm of water",
     parameters=(EffectParameter("offset", "m", 0.0, -5.0, 5.0, (-0.1, 0.1), "added to the depth"),),

@@ -1,4 +1,4 @@
-"""A fish with its effects: which kernel runs it, and the record that kernel reads."""
+"""A fish with its effects: the kernel that runs it, and the record that the kernel reads."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from fish_env.reading import is_number, shown
 EffectValues = Mapping[str, Mapping[str, float]]
 PREFIX = "effects."
 SHORTEST_STEP_S, LONGEST_STEP_S = 1e-6, 0.1
-"""Of the physics. With shorter steps, rounding errors grow beyond what is gained."""
+"""Of the physics. With shorter steps, rounding errors exceed the gain in accuracy."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,7 +97,7 @@ class ExtendedModel:
 
     @property
     def command_delay(self) -> float:
-        """How late the tail's command is (s)."""
+        """Delay of the tail's command (s)."""
         return sum(
             self.effects[effect.name][effect.command_delay]
             for effect in self.declared
@@ -156,8 +156,8 @@ def build_model(
 
     Args:
         fish: parameters; its own ``effects`` are on.
-        effects: further effects or other values, by name; they win over the file's.
-        user_effects: effects of the caller's own. An unknown name in the fish's file is looked for
+        effects: further effects or other values, by name; they replace the file's.
+        user_effects: effects of the caller. An unknown name in the fish's file is looked for
             as ``<name>.py`` beside that file, which is run only if ``fish.trust_effects``.
         whole_catalogue: use the kernel with every effect even if all are off, so that parameters
             of any effect can be changed later without another kernel.

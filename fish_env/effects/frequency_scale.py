@@ -18,11 +18,13 @@ def scale_frequency(inputs, time, fish, e):
 EFFECT = Effect(
     name="frequency_scale",
     section="actuation",
-    summary="The tail beats at another frequency than commanded, always by the same factor.",
+    summary="The tail frequency differs from its command by a constant factor.",
     equation="f1 -> scale f1",
     source="Rate error of the clock that generates the stroke",
     parameters=(
-        EffectParameter("scale", "-", 1.0, 0.2, 5.0, (0.9, 1.05), "beat over commanded beat"),
+        EffectParameter(
+            "scale", "-", 1.0, 0.2, 5.0, (0.9, 1.05), "frequency over commanded frequency"
+        ),
     ),
     hooks={"inputs": scale_frequency},
     drifts_in_phase=True,

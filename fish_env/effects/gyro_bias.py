@@ -17,7 +17,7 @@ def _axis(name: str, axis: str) -> EffectParameter:
 EFFECT = Effect(
     name="gyro_bias",
     section="measurement",
-    summary="The measured rates are off by a constant that the measured attitude does not follow.",
+    summary="The measured rates have a constant error that the measured attitude does not show.",
     equation="measured (p, q, r) = true (p, q, r) + bias",
     source="Zero-rate offset of low-cost gyros, some degrees a second",
     parameters=(_axis("p", "x"), _axis("q", "y"), _axis("r", "z")),

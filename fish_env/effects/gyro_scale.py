@@ -1,4 +1,4 @@
-"""Gyro scale: the rate sensor's gain is off."""
+"""Gyro scale: the gain of the rate sensor is wrong."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def _axis(name: str, axis: str) -> EffectParameter:
 EFFECT = Effect(
     name="gyro_scale",
     section="measurement",
-    summary="The measured rates are larger or smaller than those of the measured attitude.",
+    summary="The measured rates are larger or smaller than the measured attitude shows.",
     equation="measured (p, q, r) = scale (p, q, r)",
     source="Scale-factor error of a gyro: Titterton and Weston, section 4.2",
     parameters=(_axis("p", "x"), _axis("q", "y"), _axis("r", "z")),

@@ -1,4 +1,4 @@
-"""Hull compression: the hull, and the air in it, yield to the pressure of depth."""
+"""Hull compression: the pressure at depth compresses the hull and the air in it."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ def compress(centre, place, inputs, time, fish, e):
 EFFECT = Effect(
     name="hull_compression",
     section="hydrostatics",
-    summary="The deeper the fish, the less it displaces: it will not hold a depth by itself.",
+    summary="A deeper fish displaces less water, so it does not keep its depth by itself.",
     equation="m_b -> m_b - rate z",
     source="Archimedes' principle with a volume that falls linearly with pressure",
     parameters=(
         EffectParameter(
-            "rate", "kg/m", 0.0, -0.5, 0.5, (0.0005, 0.01), "displaced mass lost a metre of depth"
+            "rate", "kg/m", 0.0, -0.5, 0.5, (0.0005, 0.01), "displaced mass lost per metre of depth"
         ),
     ),
     hooks={"barycentre": compress},

@@ -20,7 +20,7 @@ def _coefficient(name: str, plausible: tuple[float, float]) -> EffectParameter:
 EFFECT = Effect(
     name="linear_drag",
     section="hydrodynamics",
-    summary="Drag that does not fade as the fish slows down: it coasts less far.",
+    summary="Drag in proportion to speed: the fish glides a shorter distance.",
     equation="F = -diag(surge, sway, heave) V_rel",
     source="Fossen, Handbook of Marine Craft, section 6.4: linear viscous damping",
     parameters=(

@@ -17,7 +17,7 @@ def _component(axis: str, way: str) -> EffectParameter:
 EFFECT = Effect(
     name="marker_offset",
     section="measurement",
-    summary="The measured path swings with the attitude: it is that of a marker beside the origin.",
+    summary="The measured path moves with the attitude, as the marker is not at the origin.",
     equation="measured (x, y) = those of C_I + R (x, y, z)",
     source="Lever arm of a tracked point: Titterton and Weston, section 12.3",
     parameters=(

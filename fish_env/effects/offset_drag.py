@@ -1,4 +1,4 @@
-"""Offset drag: a tail held to one side brakes."""
+"""Offset drag: a tail offset adds drag."""
 
 from __future__ import annotations
 

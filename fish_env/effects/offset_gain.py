@@ -1,4 +1,4 @@
-"""Offset gain: the tail's centre moves further or less far than commanded."""
+"""Offset gain: the tail offset is larger or smaller than commanded."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fish_env.model.jit import kernel
 
 @kernel
 def scale_offset(inputs, time, fish, e):
-    """xi1_bar -> gain xi1_bar; the swing stays."""
+    """xi1_bar -> gain xi1_bar; the amplitude stays."""
     return with_tail_command(
         inputs,
         e.gain * inputs.tail_offset,
@@ -24,7 +24,7 @@ def scale_offset(inputs, time, fish, e):
 EFFECT = Effect(
     name="offset_gain",
     section="actuation",
-    summary="The tail's offset is larger or smaller than commanded: turns are off, swing is not.",
+    summary="The tail offset is larger or smaller than commanded; the amplitude is right.",
     equation="xi1_bar -> gain xi1_bar",
     source="Scale error of servo and linkage about the tail's centre",
     parameters=(

@@ -1,4 +1,4 @@
-"""Position scale: the tracker's metre is not a metre."""
+"""Position scale: measured positions have a wrong scale."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def scale_position(channels, values):
 EFFECT = Effect(
     name="position_scale",
     section="measurement",
-    summary="Measured distances are too long or too short, which measured speeds do not share.",
+    summary="Measured distances are too long or too short; measured speeds are right.",
     equation="measured (x, y, z) = scale (x, y, z)",
     source="Calibration of a camera that looks through a water surface of refractive index 1.33",
     parameters=(

@@ -1,4 +1,4 @@
-"""Quadratic damping: a moment against rotation that grows with its square."""
+"""Quadratic damping: a moment against rotation that grows with the square of its rate."""
 
 from __future__ import annotations
 

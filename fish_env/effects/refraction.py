@@ -1,4 +1,4 @@
-"""Refraction: a camera above the water sees a deep fish smaller than a shallow one."""
+"""Refraction: in a camera above the water, a deep fish looks smaller than a shallow one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Finds the effects: one module of this package each, and files that users bring."""
+"""Find the effects: one module of this package each, and files of users."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sensor delay: what is recorded is already some time old."""
+"""Sensor delay: measurements are recorded late."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ from fish_env.model.effect import Effect, EffectParameter
 
 
 def true_time(recorded_s, values):
-    """Every channel at t shows the state at t - delay (s); the clock's own rate comes first."""
+    """Every channel at t shows the state at t - delay (s). The rate of the clock comes first."""
     return recorded_s - values["delay"]
 
 
 EFFECT = Effect(
     name="sensor_delay",
     section="measurement",
-    summary="All measured channels are late against the commands by the same time.",
+    summary="All measured channels lag the commands by the same time.",
     equation="measured(t) = true(t - delay)",
     source="Exposure, transmission and filtering of camera and sensors",
     parameters=(
-        EffectParameter("delay", "s", 0.0, 0.0, 5.0, (0.01, 0.2), "age of what is recorded"),
+        EffectParameter("delay", "s", 0.0, 0.0, 5.0, (0.01, 0.2), "age of the recorded values"),
     ),
     sample_time=true_time,
     order=1,

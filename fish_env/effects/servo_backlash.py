@@ -1,11 +1,11 @@
 """Servo backlash: play in the gears between the servo and the tail.
 
-The tail stays where it is until the servo has taken up the play, and then moves with it: the
-"play" operator, which is exact from step to step and needs no stiff contact force.
+The tail stays at rest until the servo has taken up the play, and then moves with it. This "play"
+operator is exact from step to step and needs no stiff contact force.
 
-The tail's rate jumps where the servo takes it along. Where such a jump falls within a step, the
-water sees the mean of the rate over one step, or forces that depend on it would be off by a tenth
-to a half of the effect's own share of them at a step of 10 ms.
+The tail's rate jumps when contact is made. If a jump falls within a step, the hydrodynamics use the
+mean of the rate over that step. Otherwise, at a step of 10 ms, forces that depend on the rate would
+be wrong by a tenth to a half of the effect's share of them.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ STANDSTILL = 1e-3  # rad/s; a tail this slow rests
 
 @kernel
 def turning_point(tail, bent, since, at):
-    """The servo's angle where it turns round between the step's start and ``at`` (rad)."""
+    """The servo's angle where it reverses between the step's start and ``at`` (rad)."""
     turning = tail.acceleration != 0.0
     turn = since - tail.rate / (tail.acceleration if turning else 1.0)
     inside = turning & (turn > 0.0) & (turn < at)
@@ -50,7 +50,7 @@ def ahead_of_servo(angle, tail, bent, since, at, half):
 
 @kernel
 def take_up_play(tail, inputs, phase, time, fish, e, states, memory, since):
-    """The tail rests within the play, and moves with the servo where that takes it along."""
+    """The tail rests within the play, and moves with the servo while in contact."""
     (settled_rate,) = states
     half = 0.5 * e.gap
     ahead, rate, gained = follow(ahead_of_servo, half, tail, since, memory)
@@ -69,7 +69,7 @@ def take_up_play(tail, inputs, phase, time, fish, e, states, memory, since):
 
 @kernel
 def start_in_contact(inputs, tail, fish, e):
-    """The run starts with the play taken up in the sense in which the servo turns."""
+    """The run starts with the play taken up in the direction in which the servo turns."""
     half = 0.5 * e.gap
     behind = half if tail.rate > 0.0 else (-half if tail.rate < 0.0 else 0.0)
     return tail.rate, *starting(tail.angle - behind, tail)
@@ -83,11 +83,11 @@ def fastest(values):
 EFFECT = Effect(
     name="servo_backlash",
     section="actuation",
-    summary="The tail rests at every reversal while the gears take up their play.",
+    summary="The tail rests at each reversal until the gears have taken up their play.",
     equation="xi = min(max(xi before, servo - gap/2), servo + gap/2)",
     source="Visintin, Differential Models of Hysteresis: the play operator",
     parameters=(
-        EffectParameter("gap", "rad", 0.0, 0.0, 0.5, (0.01, 0.15), "whole play, end to end"),
+        EffectParameter("gap", "rad", 0.0, 0.0, 0.5, (0.01, 0.15), "whole play, from end to end"),
     ),
     hooks={"tail": take_up_play},
     states={"tail": ("settled_rate",)},

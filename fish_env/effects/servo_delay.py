@@ -1,9 +1,9 @@
-"""Servo delay: the tail's servo hears its command late.
+"""Servo delay: the tail's servo receives its command late.
 
-The delay acts on the command itself (offset, amplitude, frequency and phase), before anything
-that servo and tail make of it: the engine remembers what was told in each physics step and
-evaluates it anew, so the delayed angle is exact however often commands change within the delay.
-What a fish was told before its run is taken to be the run's first command.
+The delay acts on the command (offset, amplitude, frequency and phase), before all other effects of
+servo and tail. The engine stores the command of each physics step and evaluates it again, so the
+delayed angle is exact even if commands change often within the delay. Before the run, the command
+is taken to be the first of the run.
 """
 
 from __future__ import annotations
@@ -13,11 +13,13 @@ from fish_env.model.effect import Effect, EffectParameter
 EFFECT = Effect(
     name="servo_delay",
     section="actuation",
-    summary="The tail does what it was told some time ago: a lag in phase without loss of swing.",
+    summary="The tail follows its command late: a phase lag without loss of amplitude.",
     equation="xi(t) = cmd(t - delay)",
     source="Transport delay: radio link, command buffer and the servo's pulse period (20 ms each)",
     parameters=(
-        EffectParameter("delay", "s", 0.0, 0.0, 2.0, (0.01, 0.2), "age of the command obeyed"),
+        EffectParameter(
+            "delay", "s", 0.0, 0.0, 2.0, (0.01, 0.2), "age of the command that is followed"
+        ),
     ),
     command_delay="delay",
     order=3,

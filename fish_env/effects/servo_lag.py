@@ -25,19 +25,19 @@ def lag_tail(tail, inputs, phase, time, fish, e, states):
 
 @kernel
 def start_at_command(inputs, tail, fish, e):
-    """The run starts with the tail where it is commanded."""
+    """The run starts with the tail at its command."""
     return (tail.angle,)
 
 
 def fastest(values):
-    """The lag itself; infinite when the effect is off."""
+    """Time constant of the lag; infinite when the effect is off."""
     return values["time_constant"] or float("inf")
 
 
 EFFECT = Effect(
     name="servo_lag",
     section="actuation",
-    summary="The tail lags its command, so it loses amplitude and phase as the beat quickens.",
+    summary="The tail lags its command: it loses more amplitude and phase at higher frequency.",
     equation="d(xi)/dt = (cmd - xi) / time_constant",
     source="First-order servo model, e.g. Ogata, Modern Control Engineering, section 5-2",
     parameters=(

@@ -1,8 +1,8 @@
-"""Servo rate limit: the tail's servo turns only so fast.
+"""Servo rate limit: the tail's servo has a largest rate.
 
-The tail's rate jumps where it meets its command again. Where such a jump falls within a step, the
-water sees the mean of the rate over one step, or the path would be off by up to a twentieth of the
-effect on it even at steps of 2.5 ms.
+The tail's rate jumps when it meets its command again. If a jump falls within a step, the
+hydrodynamics use the mean of the rate over that step. Otherwise the path would be wrong by up to a
+twentieth of the effect on it, even at steps of 2.5 ms.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ def ahead_of_command(angle, tail, bent, since, at, limit):
     """How far the tail is ahead of its command, a time ``at`` after the step's start (rad).
 
     The exact solution of d(xi)/dt = clip(towards cmd, -limit, limit) from ``angle`` at the step's
-    start, for a command that bends little in a step: at its limit until it meets its command, and
-    then along with it, as far as the limit allows.
+    start, for a command that bends little in a step. The tail moves at its limit until it meets
+    its command, and then follows it as far as the limit allows.
     """
     gap = angle_at(tail, bent, -since) - angle
     behind = abs(gap) > ROUNDING
@@ -63,7 +63,7 @@ def limit_rate(tail, inputs, phase, time, fish, e, states, memory, since):
 
 @kernel
 def start_at_command(inputs, tail, fish, e):
-    """The run starts with the tail where it is commanded, moving as fast as it can follow."""
+    """The run starts with the tail at its command, at the commanded rate within the limit."""
     return min(max(tail.rate, -e.rate), e.rate), *starting(tail.angle, tail)
 
 
@@ -75,7 +75,7 @@ def fastest(values):
 EFFECT = Effect(
     name="servo_rate_limit",
     section="actuation",
-    summary="Fast strokes become triangles: the tail falls short where its command is too quick.",
+    summary="Fast strokes become triangular: the tail does not reach the commanded amplitude.",
     equation="d(xi)/dt = clip(towards cmd, -rate, rate)",
     source="Speed limit of a servo motor at its supply voltage (60 deg in 0.1 to 0.4 s)",
     parameters=(

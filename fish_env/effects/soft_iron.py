@@ -1,4 +1,4 @@
-"""Soft iron: magnetic material about the compass bends its heading twice in a turn."""
+"""Soft iron: magnetic material near the compass distorts its heading twice per turn."""
 
 from __future__ import annotations
 
@@ -16,12 +16,14 @@ def iron(values):
 EFFECT = Effect(
     name="soft_iron",
     section="measurement",
-    summary="The measured heading is ahead on two sides of a turn and behind on the other two.",
+    summary="The heading error changes sign four times in a full turn.",
     equation="measured yaw = psi + amplitude sin(2 psi + angle)",
     source="Quadrantal deviation of a compass: Bowditch, American Practical Navigator, chapter 6",
     parameters=(
         EffectParameter("amplitude", "rad", 0.0, 0.0, 0.5, (0.02, 0.2), "largest error"),
-        EffectParameter("angle", "rad", 0.0, -7.0, 7.0, (-3.0, 3.0), "where it is", shapes=True),
+        EffectParameter(
+            "angle", "rad", 0.0, -7.0, 7.0, (-3.0, 3.0), "phase of the error", shapes=True
+        ),
     ),
     geometry=iron,
     confusable_with=("attitude_misalignment",),

@@ -1,4 +1,4 @@
-"""Surface drag: near the surface the body also makes waves."""
+"""Surface drag: near the surface the body also makes waves, which adds drag."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ def raise_drag(factor, motion, fish, e):
 EFFECT = Effect(
     name="surface_drag",
     section="surroundings",
-    summary="The fish is slower near the surface, where its waves cost it drag.",
+    summary="The fish is slower near the surface, where making waves adds drag.",
     equation="C_D of both body planes x (1 + gain exp(-z/depth))",
     source="Hertel (1966), Structure, Form, Movement: drag of a body against its submergence",
     parameters=(
         EffectParameter("gain", "-", 0.0, 0.0, 20.0, (0.1, 3.0), "extra drag at the surface"),
         EffectParameter(
-            "depth", "m", 0.1, 0.005, 5.0, (0.03, 0.4), "depth at which it fades", shapes=True
+            "depth", "m", 0.1, 0.005, 5.0, (0.03, 0.4), "depth of decay by 1/e", shapes=True
         ),
     ),
     hooks={"body_drag": raise_drag},

@@ -1,4 +1,4 @@
-"""Swing loss: the tail swings less far the further its centre is held to one side."""
+"""Swing loss: the tail amplitude falls with the tail offset."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ def lose_swing(inputs, time, fish, e):
 EFFECT = Effect(
     name="swing_loss",
     section="actuation",
-    summary="A tail held to one side swings less far: the fish loses speed in a turn.",
+    summary="The amplitude falls with the tail offset: the fish loses speed in a turn.",
     equation="A1 -> A1 (1 - per_radian |xi1_bar|)",
     source="A tendon or linkage that shortens its stroke away from the centre",
     parameters=(
         EffectParameter(
-            "per_radian", "1/rad", 0.0, -1.0, 2.0, (0.1, 0.7), "share of the swing lost a radian"
+            "per_radian", "1/rad", 0.0, -1.0, 2.0, (0.1, 0.7), "share of A1 lost per radian"
         ),
     ),
     hooks={"inputs": lose_swing},

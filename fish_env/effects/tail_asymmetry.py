@@ -1,9 +1,9 @@
-"""Tail asymmetry: the tail swings further to one side.
+"""Tail asymmetry: the amplitude is larger on one side.
 
-The angle is exact: the half strokes meet with a jump of the tail's rate where the stroke changes
-sign. Within half a step of that instant the jump is spread as its mean over one step around the
-present. Such means add up to exactly what the angle gains, wherever in a step the rate jumps.
-The acceleration, which only the water's inertia sees, holds the whole jump as a wider pulse.
+The angle is exact. The tail's rate jumps where the stroke changes sign. Within half a step of the
+jump, the rate is replaced by its mean over one step about the present time. These means add up to
+the change of the angle, wherever in a step the rate jumps. The acceleration, which acts only on the
+inertia of the water, contains the whole jump as a wider pulse.
 """
 
 from __future__ import annotations
@@ -58,19 +58,19 @@ def stretch_half_strokes(tail, inputs, phase, time, fish, e, memory, since):
 
 @kernel
 def start_anywhere(inputs, tail, fish, e):
-    """Nothing is known of the length of the step before a run."""
+    """The length of the step before a run is unknown."""
     return (UNTOLD_STEP,)
 
 
 EFFECT = Effect(
     name="tail_asymmetry",
     section="actuation",
-    summary="One half stroke is larger: the fish turns, more so the faster it beats.",
+    summary="One half stroke is larger: the fish turns, more so at higher tail frequency.",
     equation="A1 -> A1 (1 + ratio) while sin(phi_t) > 0, A1 (1 - ratio) while sin(phi_t) < 0",
     source="A linkage or a servo that is stronger to one side",
     parameters=(
         EffectParameter(
-            "ratio", "-", 0.0, -1.0, 1.0, (-0.2, 0.2), "extra swing of the positive half stroke"
+            "ratio", "-", 0.0, -1.0, 1.0, (-0.2, 0.2), "added share of A1, sin(phi_t) > 0"
         ),
     ),
     hooks={"tail": stretch_half_strokes},

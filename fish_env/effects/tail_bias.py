@@ -1,4 +1,4 @@
-"""Tail bias: the tail's zero is not where the command's zero is."""
+"""Tail bias: the zero of the tail differs from the zero of its command."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def offset_tail(tail, inputs, phase, time, fish, e):
 EFFECT = Effect(
     name="tail_bias",
     section="actuation",
-    summary="The tail's centre is off: the fish turns although it is told to swim straight.",
+    summary="The tail has a constant offset: the fish turns when commanded to swim straight.",
     equation="cmd -> cmd + offset",
     source="A horn set a spline tooth off on the servo's shaft (25 teeth: 0.25 rad a tooth)",
     parameters=(

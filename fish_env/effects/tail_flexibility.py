@@ -27,7 +27,7 @@ def bend(tail, inputs, phase, time, fish, e, states):
 
 @kernel
 def start_unbent(inputs, tail, fish, e):
-    """The run starts with the tail unbent and at rest."""
+    """The run starts with the tail undeformed and at rest."""
     return tail.angle, 0.0
 
 
@@ -42,7 +42,7 @@ def fastest(values):
 EFFECT = Effect(
     name="tail_flexibility",
     section="actuation",
-    summary="A soft tail: it swings further near its resonance and trails beyond it.",
+    summary="A flexible tail: larger amplitude near its resonance, and phase lag above it.",
     equation="xi'' + 2 damping_ratio w xi' + w^2 xi = w^2 cmd, w = 2 pi natural_frequency",
     source="Pseudo-rigid-body model, Howell, Compliant Mechanisms, chapter 5",
     parameters=(

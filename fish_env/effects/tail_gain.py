@@ -1,4 +1,4 @@
-"""Tail gain: the tail swings further or less far than commanded."""
+"""Tail gain: the tail amplitude is larger or smaller than commanded."""
 
 from __future__ import annotations
 
@@ -24,11 +24,13 @@ def scale_amplitude(inputs, time, fish, e):
 EFFECT = Effect(
     name="tail_gain",
     section="actuation",
-    summary="The tail's swing is larger or smaller than commanded, at every frequency alike.",
+    summary="The tail amplitude differs from its command by a factor, the same at every frequency.",
     equation="A1 -> gain A1",
     source="Scale error of servo and linkage",
     parameters=(
-        EffectParameter("gain", "-", 1.0, 0.0, 3.0, (0.8, 1.1), "swing over commanded swing"),
+        EffectParameter(
+            "gain", "-", 1.0, 0.0, 3.0, (0.8, 1.1), "amplitude over commanded amplitude"
+        ),
     ),
     hooks={"inputs": scale_amplitude},
     confusable_with=(

@@ -4,7 +4,7 @@ The tail is a strip of length L = 2 r_c and depth S_t / L with virtual mass
 m = rho pi depth^2 / 4 per length. With a the unit vector from root to tip, n the tail's normal
 and w = g0 + sigma g1 the normal velocity at a distance sigma from the root, the water it carries
 has the impulse P n, P = m (L g0 + L^2/2 g1), and the angular impulse root x n P - z Q,
-Q = m (L^2/2 g0 + L^3/3 g1). What it feels is minus their rate of change, and at the tip
+Q = m (L^2/2 g0 + L^3/3 g1). The force on the tail is minus their rate of change, and at the tip
 -m u_tip w_tip n (momentum left in the wake) and m w_tip^2 / 2 forward along the tail (pressure).
 The parts with dV/dt and domega/dt are added mass and enter the mass matrix.
 """
@@ -70,7 +70,7 @@ def reactive_inertia(inertia, tail, fish, e):
 
 @kernel
 def reactive_wrench(motion, tail, inputs, centre, fish, e):
-    """All of the reactive force that does not depend on the body's accelerations."""
+    """The part of the reactive force that does not depend on the body's accelerations."""
     s = strip(tail, fish, e)
     length, half, third = s.length, 0.5 * s.length * s.length, s.length**3 / 3.0
     omega = Vector(motion.p, motion.q, motion.r)
@@ -118,7 +118,7 @@ def reactive_wrench(motion, tail, inputs, centre, fish, e):
 EFFECT = Effect(
     name="tail_reactive",
     section="hydrodynamics",
-    summary="The tail also throws water back: thrust from virtual mass, beside lift and drag.",
+    summary="The tail accelerates water: thrust from virtual mass, in addition to lift and drag.",
     equation=(
         "F = -d/dt int m w n dsigma - m u_tip w_tip n + (m w_tip^2 / 2) forward, "
         "m = scale rho pi depth^2 / 4"

@@ -1,6 +1,6 @@
-"""Tail stall: the tail's lift breaks down beyond an incidence.
+"""Tail stall: the lift of the tail falls beyond an angle of incidence.
 
-sin(alpha - onset) stands for alpha - onset, which it equals to third order near the onset.
+sin(alpha - onset) replaces alpha - onset; near the onset both are equal to third order.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ def lose_lift(coefficient, sine, fish, e):
 EFFECT = Effect(
     name="tail_stall",
     section="hydrodynamics",
-    summary="The tail loses lift at large incidence: hard strokes push less than they should.",
+    summary="The tail loses lift at large incidence: strong strokes give less thrust.",
     equation="C_L -> C_L (1 - loss / (1 + exp(-sin(alpha - onset) / width))), alpha in [0, pi/2]",
     source="Static stall of a low-aspect-ratio plate: Hoerner, Fluid-Dynamic Lift, chapter 4",
     parameters=(
         EffectParameter("loss", "-", 0.0, 0.0, 1.0, (0.1, 0.7), "share of the lift that is lost"),
         EffectParameter(
-            "onset", "rad", 0.9, 0.05, 1.5, (0.5, 1.2), "incidence of half the loss", shapes=True
+            "onset", "rad", 0.9, 0.05, 1.5, (0.5, 1.2), "incidence at half the loss", shapes=True
         ),
         EffectParameter(
             "width",
@@ -40,7 +40,7 @@ EFFECT = Effect(
             0.01,
             0.5,
             (0.05, 0.1),
-            "how gradual it is",
+            "width of the transition",
             shapes=True,
             probed=False,
         ),

@@ -1,4 +1,4 @@
-"""Tether: a cable that is taut beyond its slack length pulls the fish back to a point."""
+"""Tether: a cable pulls the fish to a point when it is longer than its slack length."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ def _anchor(axis: str, way: str) -> EffectParameter:
 EFFECT = Effect(
     name="tether",
     section="surroundings",
-    summary="A pull that grows with the distance from one place, whatever the heading.",
+    summary="A force towards one point that grows with distance, at every heading.",
     equation=(
         "F = -R^T stiffness max(0, 1 - slack/L) d, M = r_a x F, d = C_I + R r_a - anchor, "
         "L = |d|, r_a = (attach_x, 0, 0)"
     ),
     source="Hooke's law for a cable that carries no compression; Irvine, Cable Structures, 1981",
     parameters=(
-        EffectParameter("stiffness", "N/m", 0.0, 0.0, 20.0, (0.002, 0.1), "pull a metre"),
+        EffectParameter("stiffness", "N/m", 0.0, 0.0, 20.0, (0.002, 0.1), "force per metre"),
         _anchor("x", "north"),
         _anchor("y", "east"),
         _anchor("z", "down"),
@@ -55,7 +55,7 @@ EFFECT = Effect(
             0.0,
             100.0,
             (0.0, 1.0),
-            "length at which it is taut",
+            "length beyond which it pulls",
             shapes=True,
             probed=False,
         ),

@@ -1,4 +1,4 @@
-"""Wake fraction: the tail swims in water that the body drags along.
+"""Wake fraction: the tail swims in the wake of the body, where the water is slower.
 
 It acts on lift and drag of the tail. The reactive force (``tail_reactive``) keeps the speed of the
 body: its theory accounts for the water along the whole tail, not for the flow at one point.
@@ -24,7 +24,9 @@ EFFECT = Effect(
     equation="v_t is computed with (1 - fraction) V_x",
     source="Carlton, Marine Propellers and Propulsion, section 5: Taylor's wake fraction",
     parameters=(
-        EffectParameter("fraction", "-", 0.0, -0.5, 0.9, (0.05, 0.4), "speed lost at the tail"),
+        EffectParameter(
+            "fraction", "-", 0.0, -0.5, 0.9, (0.05, 0.4), "share of V_x lost at the tail"
+        ),
     ),
     hooks={"tail_inflow": slow_inflow},
     confusable_with=(

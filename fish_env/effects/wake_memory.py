@@ -1,7 +1,7 @@
 """Wake memory: lift and drag of the tail take time to follow its motion.
 
 Each component of the force is filtered in the body frame, which turns little within the time
-constant. A run starts without a wake: the filtered force is zero.
+constant.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ def lag_force(force, motion, tail, fish, e, states):
 
 @kernel
 def start_without_wake(inputs, tail, fish, e):
-    """No force yet: the wake of the first stroke has still to be made."""
+    """The run starts without a wake, so the filtered force is zero."""
     return 0.0, 0.0, 0.0
 
 
 def fastest(values):
-    """The lag itself; infinite when the effect is off."""
+    """Time constant of the lag; infinite when the effect is off."""
     return values["time_constant"] or float("inf")
 
 
 EFFECT = Effect(
     name="wake_memory",
     section="hydrodynamics",
-    summary="The tail's force lags its motion, as the wake behind it has to build up.",
+    summary="The force of the tail lags its motion, because the wake needs time to form.",
     equation="dF/dt = (quasi-steady F - F) / time_constant, each body component",
     source="Wagner's lift build-up as a first-order lag, Fung, Theory of Aeroelasticity, 6.7",
     parameters=(

@@ -1,4 +1,4 @@
-"""Water ingress: the hull fills slowly, and the water gathers at one place."""
+"""Water ingress: water leaks into the hull slowly and collects at one point."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def fill(centre, place, inputs, time, fish, e):
 EFFECT = Effect(
     name="water_ingress",
     section="hydrostatics",
-    summary="The fish grows heavier as the run goes on, and its trim changes.",
+    summary="The fish becomes heavier during the run, and its trim changes.",
     equation=(
         "m -> m + w, C_m -> (m C_m + w r)/(m + w), J_y, J_z -> J + w x^2, "
         "w = rate t, r = (x, 0, 0), t since the run's start"
@@ -24,7 +24,7 @@ EFFECT = Effect(
     source="Statics of a flooded compartment; a leak of 1 ml a minute is 1.7e-5 kg/s",
     parameters=(
         EffectParameter(
-            "rate", "kg/s", 0.0, -0.05, 0.05, (0.00001, 0.0005), "water that comes in a second"
+            "rate", "kg/s", 0.0, -0.05, 0.05, (0.00001, 0.0005), "water that enters per second"
         ),
         EffectParameter(
             "x",
@@ -33,7 +33,7 @@ EFFECT = Effect(
             -0.3,
             0.3,
             (-0.06, 0.06),
-            "where it gathers, ahead of O_b",
+            "where it collects, ahead of O_b",
             shapes=True,
             probed=False,
         ),

@@ -8,9 +8,9 @@ theta = omega t - k (x cos(heading) + y sin(heading)) + phase and omega = 2 pi f
     omega^2 = g k tanh(k H)
 
 In deep water both amplitudes fall as exp(-k z), with k = omega^2 / g. All drag and lift act on the
-velocity relative to U. Beside it the pressure gradient of the wave pushes the hull as it would push
-the water in its place: F = m_b DU/Dt, DU/Dt being the acceleration along the water's own path. The
-water that the hull carries adds M_A DU/Dt (``added_mass``).
+velocity relative to U. The pressure gradient of the wave also acts on the hull, as on the water
+that the hull displaces: F = m_b DU/Dt, with DU/Dt the acceleration along the path of the water. The
+effect ``added_mass`` adds M_A DU/Dt.
 """
 
 from __future__ import annotations
@@ -51,8 +51,8 @@ def wave_number(omega, tank_depth):
 def orbit(place, time, e):
     """Wave number (1/m), heading (cosine, sine), level and vertical amplitude (m/s), sin and cos.
 
-    The amplitudes are those at the depth of the place; above the surface, as at it. Sine and
-    cosine are those of the wave's phase there.
+    The amplitudes are those at the depth of the point; above the surface, those at the
+    surface. Sine and cosine are of the phase of the wave there.
     """
     omega = TWO_PI * e.frequency
     k = wave_number(omega, e.tank_depth)
@@ -110,7 +110,7 @@ def _shape(
 EFFECT = Effect(
     name="wave",
     section="surroundings",
-    summary="The fish is carried round with the swell, less the deeper it swims.",
+    summary="The fish moves with the orbital flow of the waves, less at greater depth.",
     equation=(
         "U_down = amplitude sinh(k(H-z))/sinh(kH) sin(theta), "
         "U_along = amplitude cosh(k(H-z))/sinh(kH) cos(theta), "
@@ -127,7 +127,7 @@ EFFECT = Effect(
         ),
         _shape("frequency", "Hz", 0.5, 0.0, 10.0, (0.2, 2.0), "wave frequency"),
         _shape("phase", "rad", 0.0, -7.0, 7.0, (-pi, pi), "phase at the origin at the start"),
-        _shape("heading", "rad", 0.0, -7.0, 7.0, (-3.0, 3.0), "where the wave runs to, from north"),
+        _shape("heading", "rad", 0.0, -7.0, 7.0, (-3.0, 3.0), "direction of travel, from north"),
         EffectParameter(
             "tank_depth",
             "m",

@@ -261,6 +261,7 @@ def _mapping_row(plan: Plan, entry: Entry, sources: Sequence[Source]) -> list[st
     values = np.concatenate([s.numbers(column.name) for s in sources if matches(spec, s)])
     words = column.name if len(plan.sources) == 1 else f"{entry.source}: {column.name}"
     words += f" times {column.factor:g}" if column.factor != 1.0 else ""
+    words += f" plus {column.offset:g} {entry.unit.name}" if column.offset != 0.0 else ""
     words += f", frame {column.frame}" if column.frame != plan.content["frame"] else ""
     words += f", {entry.between}" if entry.between != "hold" else ""
     lowest, highest = np.nanmin(values), np.nanmax(values)

@@ -229,6 +229,16 @@ def test_a_command_on_another_clock_holds_or_is_resampled_as_told():
     )
 
 
+def test_an_offset_of_a_column_is_kept(tmp_path):
+    content = two_clocks()
+    content["channels"] = {"yaw": {**CONTENT["channels"]["yaw"], "scale": -1, "offset": 0.25}}
+    imported = assemble(parse_plan(content, Path("m.yaml")), sources(), tmp_path)
+    kept = imported.description["channels"]["yaw"]
+    assert yaml.safe_load(yaml.safe_dump(kept)) == {"scale": -1, "offset": 0.25, "unit": "rad"}
+    found = imported.dataset.runs[0].channels["yaw"]
+    np.testing.assert_allclose(found[[0, -1]], 0.25 - 0.1 * TIME[[0, -1]])
+
+
 def test_a_clock_may_be_shifted():
     content = two_clocks(offset=0.5)
     np.testing.assert_allclose(offsets(content, sources(), [1.5, 1.52]), [0.0, 10.0])

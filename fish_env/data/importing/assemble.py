@@ -28,7 +28,7 @@ from fish_env.errors import DatasetError
 
 Columns = dict[str, FloatArray]
 
-_KEPT = ("sign", "scale", "unit", "frame")
+_KEPT = ("sign", "scale", "offset", "unit", "frame")
 _LATE = 1.5
 """Usual sample intervals by which a first command may come after the first sample unmentioned."""
 

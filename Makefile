@@ -167,7 +167,7 @@ $(CLIENTS)/.ready: pyproject.toml constraints-clients.txt
 	  --constraint constraints-clients.txt --editable ".[clients]"
 	@touch $@
 
-# CleanRL's last release needs a Gymnasium below 1.0, older than the range of this project.
+# CleanRL's last release needs a Gymnasium below 1.0 (PPO) and OpenAI gym 0.23 (SAC).
 $(CLEANRL)/.ready: pyproject.toml constraints-clients.txt
 	@echo "Installing robotic-fish and CleanRL into $(CLEANRL)"
 	@$(PYTHON) -m venv $(CLEANRL)
@@ -176,5 +176,6 @@ $(CLEANRL)/.ready: pyproject.toml constraints-clients.txt
 	  --constraint $(CLEANRL)/constraints.txt gymnasium==0.29.1 matplotlib numba numpy pandas pint \
 	  pyyaml rich scipy tensorboard threadpoolctl torch typer
 	@$(CLEANRL)/bin/python -m pip install --quiet --disable-pip-version-check --no-deps \
-	  --ignore-requires-python cleanrl==1.2.0 --editable .
+	  --ignore-requires-python cleanrl==1.2.0 gym==0.23.1 gym-notices==0.1.0 \
+	  stable-baselines3==1.2.0 --editable .
 	@touch $@

@@ -146,7 +146,7 @@ def located(name: str | Path, folder: Path | None = None) -> Path:
         return path
     except RuntimeError:
         raise Unreadable(
-            f"{shown(str(name))} names the home of a user who is not there, or links in a circle",
+            f"{shown(str(name))} names the home of an unknown user, or its links form a circle",
             "write the whole path",
         ) from None
     except (ValueError, OSError) as error:

@@ -127,7 +127,7 @@ def _not_started(settings: ClusterSettings, error: Exception) -> ConfigError:
             "with `ray start --head`, or leave the option out to use this machine"
         )
     if "AF_UNIX" in reason:
-        return ConfigError(f"--temp {settings.temp}: the path is too long for Ray; give a shorter")
+        return ConfigError(f"--temp {settings.temp}: the path is too long for Ray; shorten it")
     if "timed out" in reason:
         return ConfigError(
             f"Ray cannot start: this machine is too busy ({reason}); try again later"

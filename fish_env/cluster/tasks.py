@@ -135,7 +135,7 @@ def check_version(version: str) -> None:
     """
     if version != VERSION:
         raise WrongVersion(
-            f"{socket.gethostname()} has robotic-fish {VERSION}, the machine that asks {version}; "
+            f"{socket.gethostname()} has robotic-fish {VERSION}, the command {version}; "
             "results would differ. Install the same version on all machines"
         )
 

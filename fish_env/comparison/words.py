@@ -46,13 +46,13 @@ def _steady_sentence(comparison: SteadyComparison, observation: ObservationCompa
 
 def _gain(gain: float) -> str:
     if not math.isfinite(gain):
-        return "nothing to compare with"
+        return "no values to compare"
     if abs(gain - 1.0) < 0.02:
-        return "right in size on the whole"
+        return "right in size on average"
     size = "too small" if gain < 1.0 else "too large"
     if gain < 0.0:
         return f"of the opposite sign (factor {gain:.2f})"
-    return f"simulated {100 * abs(gain - 1.0):.0f} % {size} on the whole"
+    return f"simulated {100 * abs(gain - 1.0):.0f} % {size} on average"
 
 
 def _trend(trend: tuple[str, float] | None) -> str:

@@ -188,8 +188,8 @@ def _chance(diagnosis: Diagnosis) -> list[str]:
     asked = _unexplained(diagnosis)[0]
     return [
         f"The fitted runs indicate {_wrench(asked)} ({asked['rms']:.2g} "
-        f"{wrench_unit(asked['direction'])}), hardly more than chance does. It does not improve "
-        f"the prediction of other runs (log likelihood {gain:+.2g}), so it is taken for chance."
+        f"{wrench_unit(asked['direction'])}), little more than chance would. It does not improve "
+        f"the prediction of other runs (log likelihood {gain:+.2g}), so it counts as chance."
     ]
 
 

@@ -153,7 +153,7 @@ def _next_step(answer: Answer) -> str:
     if verdict in ("cause", "parameters", "partial"):
         return "simulate and train with extended.yaml, a fish file with what was found."
     if verdict == "outside_library":
-        return "read “Where the misfit sits”, then add an effect of your own from a Python file."
+        return "read “Location of the misfit”, then add an effect of your own from a Python file."
     return swim or "use the refitted coefficients; nothing needs to be added."
 
 
@@ -179,5 +179,5 @@ def _caveats(answer: Answer) -> str:
             f"{unsure} possible mistake{'s' * (unsure > 1)} in the data (see Input checks)"
         )
     if answer.get("doubts"):
-        found.append("some numbers are implausible (see About these numbers)")
+        found.append("some numbers are implausible (see Notes)")
     return f"Caveats: {'; '.join(found)}." if found else ""

@@ -1,4 +1,4 @@
-"""Are these runs fit to be diagnosed? What would mislead the search is refused, with its name."""
+"""Check that runs can be diagnosed. Data that would mislead the search are refused by name."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def _check_run(name: str, run: Run) -> None:
         present = values[np.isfinite(values)]
         if len(present) >= 10 and np.ptp(present) == 0.0:
             raise DatasetError(
-                f"{place}: {channel} is {present[0]:g} in every sample, no sensor is that still; "
+                f"{place}: {channel} is {present[0]:g} in every sample, as of a broken sensor; "
                 "leave its cells empty in this run, or leave out the run"
             )
         check_stuck(place, read, channel)
@@ -152,7 +152,7 @@ def _mass_in_disguise(causes: Sequence[Mapping[str, Any]]) -> str:
     if max(lows) >= min(highs) or max(lows) <= 0.0:
         return ""
     return (
-        f"An added mass that may be the same in every direction, {max(lows):.2g} to "
-        f"{min(highs):.2g} kg, is also what a fish heavier by as much looks like: weigh it, and "
-        "check mass.total and mass.buoyancy in its file."
+        f"The added mass, {max(lows):.2g} to {min(highs):.2g} kg, may be the same in every "
+        "direction. A fish that is heavier by this mass would look the same: weigh it, and check "
+        "mass.total and mass.buoyancy in its file."
     )

@@ -156,7 +156,7 @@ class Localisation:
         )
 
     def words(self) -> str:
-        """Where the misfit sits, in two sentences."""
+        """The location of the misfit, in two sentences."""
         worst = max(self.overall, key=lambda name: self.overall[name])
         said = (
             f"Over all samples the misfit is largest in {worst}: "
@@ -164,9 +164,9 @@ class Localisation:
         )
         place = self.sits_in
         if place is None:
-            return f"{said} It is spread evenly: no regime stands out."
+            return f"{said} The misfit is spread evenly over all regimes."
         return (
-            f"{said} It is most bound to its place in {place.channel} at "
+            f"{said} It depends most on the regime in {place.channel} at "
             f"{place.regime.replace('_', ' ')} {place.bin}: {np.sqrt(place.energy):.2f} times the "
             f"noise, against {np.sqrt(self.overall[place.channel]):.2f} in {place.channel} overall "
             f"(p = {place.p:.2g} over the whole table)."

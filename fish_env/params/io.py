@@ -138,7 +138,7 @@ def read_merged(file: Path, above: tuple[Path, ...]) -> dict[str, Any]:
     """Reads a file merged over its bases, its table paths made absolute."""
     if len(above) > MOST_BASES:
         raise ParameterError(
-            f"{above[0]}: base: more than {MOST_BASES} bases stand on each other; merge some"
+            f"{above[0]}: base: more than {MOST_BASES} files in a chain of bases; merge some"
         )
     if file in above:
         chain = " -> ".join(str(path) for path in (*above, file))

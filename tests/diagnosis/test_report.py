@@ -30,7 +30,7 @@ def test_the_page_has_every_part(full):
     page, _ = full
     for part in (
         "The simulation lacks servo_lag", "0.05 to 0.058", "rf-replay", "r01 (held out)",
-        "Where the misfit sits", "tail phase 0 to 45 deg", "never visited", "Ranking",
+        "Location of the misfit", "tail phase 0 to 45 deg", "never visited", "Ranking",
         "could not have shown: surface_drag", "tether (0.61)", "0.004 m/s", "Next experiment",
         "mass.total", "closes 96 %", "Error budget", "cm off", "Next:",
         "a note about this run", "one note",
@@ -100,7 +100,7 @@ def test_every_verdict_has_a_page_without_series(verdict, tmp_path):
     for line in (headline(said).verdict, headline(said).closed, headline(said).next_step):
         assert text(line) in page
     assert 'class="rf-replay"' not in page
-    assert ("What the extension gains" in page) == bool(said["gain"])
+    assert ("Gain on held-out data" in page) == bool(said["gain"])
 
 
 def test_only_what_the_words_need_is_needed(tmp_path):
@@ -111,7 +111,7 @@ def test_only_what_the_words_need_is_needed(tmp_path):
 
 def test_a_steady_table_is_shown_condition_by_condition(tmp_path):
     page = write_report(answer(), steady_series(), tmp_path).read_text()
-    assert "Condition by condition" in page
+    assert "Errors by condition" in page
     assert "f (held out)" in page
     assert 'class="rf-replay"' not in page
     assert (tmp_path / "figures" / "steady.svg").exists()

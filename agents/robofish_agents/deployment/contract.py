@@ -120,8 +120,8 @@ def make_contract(
         "history": {
             "frames": history.frames,
             "low_pass_s": list(history.low_pass_s),
-            "kept_inside": "the export filters by itself; hand over one observation a step",
-            "first": "the first observation counts as having been there for ever",
+            "kept_inside": "the export stores past observations; give it one observation per step",
+            "first": "before the first step, all past observations equal the first one",
         },
         "limits": {
             "shallowest_m": config.top,

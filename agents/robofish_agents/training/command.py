@@ -104,8 +104,8 @@ def _stopped(source: str, folder: Path, config: TrainConfig) -> str:
     if not (folder / CHECKPOINT).exists():
         return f"stopped before the first checkpoint; start anew: robofish train {source} {options}"
     return (
-        f"stopped; {folder / CHECKPOINT} keeps what was learnt until the last checkpoint. "
-        f"Go on with: robofish train {source} {options} --resume"
+        f"stopped; {folder / CHECKPOINT} keeps the training up to the last checkpoint. "
+        f"Continue with: robofish train {source} {options} --resume"
     )
 
 
@@ -115,9 +115,9 @@ def _report(console: Console, config: TrainConfig, outcome: Outcome) -> None:
     divided = ", ".join(f"{name} {100 * share:.0f} %" for name, share in parts.items())
     console.print(
         f"{progress.steps:,} steps in {progress.cpu_s:.1f} s of processor time "
-        f"({progress.wall_s:.1f} s on the clock): {progress.steps / progress.cpu_s:,.0f} a second; "
-        f"{divided}\n"
-        f"best on the side, after {outcome.best['steps']:,.0f} steps: success "
+        f"({progress.wall_s:.1f} s of wall-clock time): "
+        f"{progress.steps / progress.cpu_s:,.0f} a second; {divided}\n"
+        f"best evaluation, after {outcome.best['steps']:,.0f} steps: success "
         f"{100 * outcome.best['success_rate']:.0f} %\n"
         f"policy: {outcome.policy}  (robofish evaluate --agent {outcome.policy} --suite "
         f"{config.disturbances[-1]})",

@@ -197,8 +197,8 @@ def _derived_fault(one: Derived) -> InputFault:
     sources = ", ".join(one.sources)
     return InputFault(
         "derived", one.channel, None, "", None, 0.0, None, f"delete {one.channel} under channels",
-        f"{one.channel} was computed from {sources} and is no measurement of its own, so it is "
-        "left out", f"{one.channel} against {sources}", None, None, (), True, False, True,
+        f"{one.channel} was computed from {sources} and adds no information, so it is left "
+        "out", f"{one.channel} against {sources}", None, None, (), True, False, True,
     )  # fmt: skip
 
 

@@ -26,24 +26,24 @@ def unseen(answer: Answer, series: ReportSeries | SteadySeries | None, album: Al
     blind = [p["name"] for p in found if not p["excited"]]
     said = _blind_words(blind, len(found), "This table" if answer.get("kind") else "These runs")
     heads = (
-        "effect", "would be seen", "smallest size seen (power 0.8)", "a plausible robot has",
-        "absorbed by a refit", "looks most like",
+        "effect", "detectable", "smallest detectable size (power 0.8)", "plausible size",
+        "absorbed by a refit", "most similar effect",
     )  # fmt: skip
     order = sorted(found, key=lambda p: (p["excited"], p["name"]))
     parts = [paragraph(said), table(heads, [_seen(p) for p in order])]
     if all(p.get("confusability") for p in found):
         names = [p["name"] for p in found]
         cosines = np.array([[_cosine(p, name) for name in names] for p in found])
-        caption = "How alike the signals of two effects are, after a refit of the baseline."
+        caption = "Cosine between the signals of two effects, after a refit of the baseline."
         parts.append(figure(draw.draw_confusability(names, cosines, album), caption))
-    return section("What could not have been seen", *parts, key="unseen")
+    return section("Detectability", *parts, key="unseen")
 
 
 def _blind_words(blind: list[str], known: int, subject: str) -> str:
     if not blind:
-        return "Every known effect of a plausible size would have been seen."
+        return "Every known effect would have been detected at a plausible size."
     if len(blind) > MOST_NAMED:
-        return f"{subject} could not have shown {len(blind)} of {known} known effects, as follows."
+        return f"{subject} could not have shown {len(blind)} of {known} known effects, see below."
     return f"{subject} could not have shown: {', '.join(blind)}."
 
 

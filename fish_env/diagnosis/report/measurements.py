@@ -38,25 +38,25 @@ def measurements(answer: Answer, series: ReportSeries | SteadySeries | None, alb
     sentences = "".join(f"<li>{text(sentence)}</li>" for sentence in agreed)
     sentences += "".join(f"<li>{text(sentence)}</li>" for sentence in differing(answer))
     rows = [_floor(floor) for floor in answer.get("noise_floor", [])]
-    heads = ("channel", "noise in the filter (sd)", "from the data alone (sd)", "95 % interval",
+    heads = ("channel", "noise in the filter (sd)", "from differences (sd)", "95 % interval",
              "unit")  # fmt: skip
     return section(
-        "The measurements themselves",
+        "Measurements",
         f"<ul>{sentences}</ul>" if sentences else "",
         folded("Noise of each channel", table(heads, rows)),
-        folded("What differs between runs, and errors of sensors", _variation(answer)),
+        folded("Run-to-run variation and sensor errors", _variation(answer)),
         key="measurements",
     )
 
 
 def differing(answer: Answer) -> list[str]:
-    """What is beyond the usual between runs or in a sensor, and jitter of the sample times."""
+    """Run-to-run variation and sensor errors beyond the usual, and jitter of the sample times."""
     jitter_s = (answer.get("noise") or {}).get("disturbance", {}).get("jitter_sd", 0.0)
     found = [_beyond(entry) for entry in answer.get("run_variation", []) if entry["beyond_usual"]]
     if jitter_s > 0.0:
         found.append(
-            f"Samples are {1e3 * jitter_s:.1f} ms early or late (one standard deviation), all "
-            "channels alike."
+            f"Samples are {1e3 * jitter_s:.1f} ms early or late (one standard deviation), in "
+            "all channels."
         )
     return found
 
@@ -85,7 +85,7 @@ def _variation(answer: Answer) -> str:
         )
         for entry in answer.get("run_variation", [])
     ]  # fmt: skip
-    heads = ("what", "standard deviation", "usual", "least of a run", "largest", "unit")
+    heads = ("what", "standard deviation", "usual", "smallest", "largest", "unit")
     return table(heads, rows)
 
 

@@ -114,6 +114,6 @@ def draw_budget(budget: Plain, album: Album) -> Path:
         ax.set_yticks([])
         ax.spines["left"].set_visible(False)
         ax.grid(False)
-        ax.set_xlabel("share of the error of the simulation as given (%)")
+        ax.set_xlabel("share of the error of the original simulation (%)")
         figure.legend(loc="outside upper left", ncols=2)
         return saved(figure, album, "budget")

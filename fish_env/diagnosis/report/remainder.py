@@ -12,17 +12,17 @@ Answer = Mapping[str, Any]
 
 
 def asked_for(answer: Answer) -> str:
-    """Single wrenches that the data still ask for."""
+    """Single wrenches that the data still indicate."""
     rows = []
     for item in answer.get("unexplained", []):
         size = f"{number(item['rms'])} {wrench_unit(item['direction'])}"
         rows.append((text(item["direction"]), text(item["depends_on"]), size))
-    caption = "What the data still ask for, over and above the best explanation"
+    caption = "Forces and moments that the data indicate beyond the best explanation"
     return table(("force or moment in", "depends on", "rms"), rows, caption)
 
 
 def residual_model(answer: Answer) -> str:
-    """What is left as a sum of wrenches, and whether it holds on other runs."""
+    """The residual as a sum of wrenches, and whether it predicts other runs."""
     model = answer.get("residual_model")
     if not model:
         return ""
@@ -33,7 +33,7 @@ def residual_model(answer: Answer) -> str:
         within = f"{number(low)} to {number(high)}"
         scale = number(term["function_rms"])
         rows.append((text(term["direction"]), text(term["depends_on"]), scale, size, within))
-    caption = "An empirical model of the residual: coefficient × function / its rms, all together"
+    caption = "Empirical model of the residual: the sum of coefficient × function / rms"
     heads = ("force or moment in", "function", "its rms (SI units)", "coefficient", "95 % interval")
     return table(heads, rows, caption) + paragraph(_pushes(model) + _elsewhere(model["gain"]))
 
@@ -45,8 +45,8 @@ def _pushes(model: Answer) -> str:
     moments = " to ".join(f"{number(1e3 * size['moment_sd'])}" for size in sizes)
     beside = f" (beside {', '.join(model['beside'])})" if model["beside"] else ""
     return (
-        f"With it{beside}, the random forces that the data need go from {forces} mN, the random "
-        f"moments from {moments} mN m."
+        f"With it{beside}, the force of the disturbance changes from {forces} mN, and its moment "
+        f"from {moments} mN m."
     )
 
 
@@ -55,7 +55,7 @@ def _elsewhere(gain: Answer | None) -> str:
         return ""
     score, runs = gain["log_likelihood"], ", ".join(gain["final_runs"])
     low, high = score["ci95"]
-    worse = "worsens" if high < 0.0 else "is not shown to improve"
+    worse = "worsens" if high < 0.0 else "does not significantly improve"
     holds = "improves" if low > 0.0 else worse
     return (
         f" It {holds} the prediction of the held-out runs {runs}: one sample ahead, their log "

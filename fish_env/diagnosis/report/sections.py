@@ -53,8 +53,8 @@ def overview(answer: Answer, series: Series, album: Album) -> str:
     runs = series.runs[:MOST_PATHS]
     models = "the extended model" if runs[0].extended else "the refitted simulation"
     caption = (
-        f"Measured runs, the simulation as it was given, and {models}. Both swim alone over the "
-        f"whole run, from {SETTLED_S:g} s after its start."
+        f"Measured runs, the original simulation, and {models}. Both are simulated without "
+        f"measurements over the whole run, from {SETTLED_S:g} s after its start."
     )
     return figure(draw_paths(runs, album), caption, "rp-fit")
 
@@ -66,7 +66,7 @@ def budget(answer: Answer, series: Series, album: Album) -> str:
         return ""
     noun, count = _noun(answer), len(found["runs"])
     where = f"{count} {'held-out' if found['held_out'] else 'fitted'} {noun}{'s' * (count != 1)}"
-    caption = f"What the error of the simulation as given comes from, on {where}."
+    caption = f"Shares of the error of the original simulation, on {where}."
     picture = figure(draw_budget(found, album), caption, "rp-fit")
     return section("Error budget", picture, key="budget")
 
@@ -85,7 +85,7 @@ def cause_values(answer: Answer, series: Series, album: Album) -> str:
                 shown = (text(key), number(p["estimate"]), interval, text(p["unit"]))
                 rows.append((name, *shown, word))
     heads = ("cause", "parameter", "estimate", "95 % interval", "unit", "standing")
-    return section("What was found", table(heads, rows))
+    return section("Causes", table(heads, rows))
 
 
 def swimming(answer: Answer, series: Series, album: Album) -> str:
@@ -95,11 +95,11 @@ def swimming(answer: Answer, series: Series, album: Album) -> str:
     groups = [Group(_run_name(r.id, r.final), r.motions) for r in series.runs]
     notes = [f"{run.id}: {note}" for run in series.runs for note in run.notes]
     return section(
-        "How it swims",
+        "Replay",
         paragraph(
-            "Measured fish, and the models swimming alone over the whole run, from the state that "
-            f"the filter knows {SETTLED_S:g} s after the start. Small errors add up here; the "
-            "predictions further down start afresh every few seconds."
+            "The measured fish and the models, simulated over the whole run from the state that "
+            f"the filter estimates {SETTLED_S:g} s after the start. Small errors add up here. The "
+            "predictions below restart every few seconds."
         ),
         component(groups, series.fish, "runs"),
         *(paragraph(note, "rp-note") for note in notes),
@@ -131,7 +131,7 @@ def channels(answer: Answer, series: Series, album: Album) -> str:
             )
             drawn = figure(draw.draw_run(run, window, album), caption)
             parts.append(drawn if i == 0 else folded(_run_name(run.id, run.final), drawn))
-    return section("Channel by channel", *parts, key="channels")
+    return section("Errors by channel", *parts, key="channels")
 
 
 def steady(answer: Answer, series: Series, album: Album) -> str:
@@ -140,7 +140,7 @@ def steady(answer: Answer, series: Series, album: Album) -> str:
         return ""
     picture = figure(draw.draw_steady(series, album), "Predicted against measured steady motion.")
     return section(
-        "Condition by condition",
+        "Errors by condition",
         picture,
         folded("All conditions", _steady_table(series)),
         key="conditions",
@@ -170,7 +170,7 @@ def _cell(value: float) -> str:
 
 
 def gain(answer: Answer, series: Series, album: Album) -> str:
-    """How much better the extended model predicts runs that chose nothing."""
+    """How much better the extended model predicts held-out runs."""
     found = answer.get("gain")
     if not found:
         return ""
@@ -183,7 +183,7 @@ def gain(answer: Answer, series: Series, album: Album) -> str:
         heads = ("held-out run", "baseline fit (%)", "extended fit (%)", "gained")
         parts.append(table(heads, rows))
     parts.append(_errors(found))
-    return section("What the extension gains", *parts, key="gain")
+    return section("Gain on held-out data", *parts, key="gain")
 
 
 def _gain_words(found: Answer, noun: str) -> str:
@@ -229,11 +229,11 @@ def _errors(found: Answer) -> str:
         before, after = factor * pair["baseline"], factor * pair["extended"]
         rows.append((text(name), number(before), number(after), unit))
     heads = ("channel", "baseline RMSE", "extended RMSE", "unit")
-    return folded("Error by channel", table(heads, rows))
+    return folded("RMSE by channel", table(heads, rows))
 
 
 def where(answer: Answer, series: Series, album: Album) -> str:
-    """Where in the regime the misfit sits, and what was never visited."""
+    """Regimes with most misfit, and regimes that no run visited."""
     parts = []
     found = series.localisation if isinstance(series, ReportSeries) else None
     if found is not None:
@@ -242,8 +242,8 @@ def where(answer: Answer, series: Series, album: Album) -> str:
             parts.append(
                 figure(
                     draw.draw_regimes(found, album),
-                    "Error of the refitted baseline in each channel and regime. Framed: more than "
-                    "chance gives anywhere in the table. Hatched: never visited.",
+                    "Error of the refitted baseline in each channel and regime. Framed: larger "
+                    "than chance would produce in any cell. Hatched: no run visited it.",
                 )
             )
         by_regime: dict[str, list[str]] = {}
@@ -252,18 +252,18 @@ def where(answer: Answer, series: Series, album: Album) -> str:
         rows = [(text(regime), text(", ".join(bins))) for regime, bins in by_regime.items()]
         parts.append(table(("never visited", "bins"), rows))
     parts += [_farthest(answer), asked_for(answer), residual_model(answer)]
-    return section("Where the misfit sits", *parts, key="where")
+    return section("Location of the misfit", *parts, key="where")
 
 
 def _farthest(answer: Answer) -> str:
-    """Conditions of a table that the best explanation misses most."""
+    """Conditions of a table with the largest errors of the best explanation."""
     worst = (answer.get("floor") or {}).get("worst", [])
     rows = [
         (text(w["condition"]), text(w["observation"].replace("_", " ")), number(w["noise_sds"]))
         for w in worst
     ]
-    caption = "Farthest from the best explanation"
-    return table(("condition", "observation", "off by (noise sd)"), rows, caption)
+    caption = "Largest errors of the best explanation"
+    return table(("condition", "observation", "error (noise sd)"), rows, caption)
 
 
 def ranking(answer: Answer, series: Series, album: Album) -> str:
@@ -271,7 +271,7 @@ def ranking(answer: Answer, series: Series, album: Album) -> str:
     if not answer.get("ranking"):
         return ""
     caption = (
-        "How much better each refitted cause predicts what was left out of the fit. "
+        "How much better each refitted cause predicts the data left out of the fit. "
         "Full bars: accepted. Hatched bars: rejected."
         + (" Lines: 95 % intervals over runs." if many_fitted(answer) else "")
     )
@@ -306,7 +306,7 @@ def experiment(answer: Answer, series: Series, album: Album) -> str:
 
 
 def coefficients(answer: Answer, series: Series, album: Album) -> str:
-    """Every coefficient: before, after, and how surprising the move is."""
+    """Every coefficient: before, after, and the change in prior standard deviations."""
     rows = []
     found = answer.get("parameters", [])
     for p in sorted(found, key=lambda p: -abs(p.get("prior_sds_off", 0.0))):
@@ -326,12 +326,12 @@ def coefficients(answer: Answer, series: Series, album: Album) -> str:
         "found",
         "95 % interval",
         "unit",
-        "moved (prior sd)",
-        "smallest change found",
+        "change (prior sd)",
+        "smallest detectable change",
     )
     return section(
         "Coefficients",
-        folded(f"All {len(rows)}, most moved first", table(heads, rows)) if rows else "",
+        folded(f"All {len(rows)}, largest change first", table(heads, rows)) if rows else "",
     )
 
 
@@ -351,4 +351,4 @@ def about(answer: Answer, series: Series, album: Album) -> str:
         f"Seed {answer.get('seed', '?')}; {answer.get('runtime_s', 0.0):.0f} s. Numbers: "
         "diagnosis.json; figures as files: folder figures."
     )
-    return section("About these numbers", *(paragraph(line) for line in lines))
+    return section("Notes", *(paragraph(line) for line in lines))

@@ -43,10 +43,10 @@ from fish_env.params.schema import FishParams
 Progress = Callable[[str], None]
 FEWEST_CONDITIONS = 3
 FEWEST_FOR_FINAL = 6
-"""Conditions a table must have before a fifth of them are kept for held_out."""
+"""Conditions a table must have before a fifth of them are held out."""
 ABSENT = (
-    "effects that depend on place, heading or time, and those that leave averages as they are, "
-    "cannot be told from this table and were left out: {names}"
+    "left out, because this table cannot show effects that depend on place, heading or time, or "
+    "that do not change averages: {names}"
 )
 
 
@@ -105,7 +105,7 @@ def diagnose_table(
     causes = [c for c in causes_of(problem) if c.name not in absent]
     held_out = whole.on(final) if len(final) else None
     found = investigate(baseline, causes, rng, effort_of(quick), progress, held_out)
-    progress("how far the causes may go")
+    progress("computing intervals of the causes")
     attribution, verdict = with_intervals(found.attribution), found.verdict
     fits = baseline, attribution.accepted.fit
     shown = (*found.preconditions, *(unseen(name) for name in sorted(absent)))
@@ -125,8 +125,8 @@ def diagnose_table(
 def _check(table: Table) -> None:
     if len(table.conditions) < FEWEST_CONDITIONS:
         raise DatasetError(
-            f"{table.name}: {len(table.conditions)} condition(s) cannot tell one cause from "
-            f"another; measure at least {FEWEST_CONDITIONS}"
+            f"{table.name}: {len(table.conditions)} condition(s) are too few to distinguish "
+            f"causes; measure at least {FEWEST_CONDITIONS}"
         )
 
 
@@ -187,8 +187,8 @@ def _notes(
         notes.append(ABSENT.format(names=", ".join(sorted(absent))))
     if left.lack is None:
         notes.append(
-            "too few repeats to say what the noise floor is: it is an assumption, taken from what "
-            "the best fit leaves"
+            "too few repeats to estimate the noise floor: it is assumed to equal the residual of "
+            "the best fit"
         )
     if accepted.at_bounds:
         notes.append(f"estimates at a bound: {', '.join(accepted.at_bounds)}")

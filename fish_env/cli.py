@@ -304,6 +304,7 @@ def plot(
 @app.command()
 def paper(
     out: Annotated[Path, typer.Option(help="Folder for tables and pictures.")] = Path("out/paper"),
+    json: Json = None,
 ) -> None:
     """Repeat the four studies of the paper and check each of its statements.
 
@@ -311,9 +312,10 @@ def paper(
 
     **Example:** `robofish paper --out out/paper`
     """
+    from fish_env.commands.numbers import console_for
     from fish_env.commands.paper import run_paper
 
-    run_paper(Console(), out)
+    run_paper(console_for(json), out, json)
 
 
 @app.command()
@@ -363,10 +365,7 @@ add_commands(app)
 
 
 def main() -> None:
-    """Runs `robofish`. An error that we raise on purpose is one red line, exit status 2.
-
-    Ctrl-C is one yellow line, exit status 130.
-    """
+    """Runs `robofish`. Our errors are one red line and exit status 2; Ctrl-C is yellow and 130."""
     with warnings.catch_warnings():
         warnings.showwarning = lambda message, *_: _complain("yellow", f"robofish: {message}")
         # On its way out the interpreter would look for garbage among all that the compiler made,

@@ -8,8 +8,10 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 
-from fish_env.commands.options import Address, Cpus, Temp, TrustEffects
+from fish_env.commands.numbers import console_for, write_json
+from fish_env.commands.options import Address, Cpus, Json, Temp, TrustEffects
 from fish_env.errors import Interrupted, missing_extra
+from fish_env.files import check_outputs
 
 
 def sweep(
@@ -29,6 +31,7 @@ def sweep(
     cpus: Cpus = None,
     temp: Temp = None,
     trust_effects: TrustEffects = False,
+    json: Json = None,
 ) -> None:
     """Train under many seeds and settings, on all cores or on a Ray cluster.
 
@@ -43,11 +46,13 @@ def sweep(
         from robofish_agents.sweep.plan import plan
         from robofish_agents.sweep.run import FINISHED, TABLE, run_sweep
         from robofish_agents.training.command import in_words
+        from robofish_agents.training.config import files_behind
     except ModuleNotFoundError as error:
         raise missing_extra("A sweep", str(error.name), "ray") from error
 
-    console = Console()
+    console = console_for(json)
     trials = plan(config, seeds, settings or (), steps, trust_effects)
+    check_outputs([json], files_behind(config, trials[0].config))
     folder = out or Path("out/sweep") / trials[0].config.name
 
     def tell(name: str, row: dict[str, float]) -> None:
@@ -62,6 +67,8 @@ def sweep(
         ) from None
     finished = sum(row["state"] == FINISHED for row in rows)
     _report(console, rows, finished, str(folder / TABLE))
+    if json is not None:
+        write_json(console, json, {"trials": rows})
     if finished < len(rows):
         raise typer.Exit(1)
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from fish_env.commands.options import TrustEffects
+from fish_env.commands.options import Json, TrustEffects
 
 
 def train(
@@ -31,6 +32,7 @@ def train(
             show_default=False,
         ),
     ] = None,
+    json: Json = None,
 ) -> None:
     """Train a policy with Stable-Baselines3 or Ray RLlib.
 
@@ -40,11 +42,14 @@ def train(
 
     **Example:** `robofish train ppo-hold`
     """
-    from rich.console import Console
-
+    from fish_env.commands.numbers import console_for, write_json
     from robofish_agents.training.command import run
 
-    run(Console(), config, out, seed, steps, resume, trust_effects, engine)
+    console = console_for(json)
+    outcome = run(console, config, out, seed, steps, resume, trust_effects, engine, json)
+    if json is not None:
+        found = {"policy": str(outcome.policy), "best": outcome.best}
+        write_json(console, json, {**found, **asdict(outcome.progress)})
 
 
 def register(app: typer.Typer) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,6 +14,7 @@ from rich.console import Console
 from fish_env.commands.options import (
     Address,
     Cpus,
+    Json,
     MeasuredBeats,
     OtherFish,
     Quick,
@@ -19,7 +22,8 @@ from fish_env.commands.options import (
     Temp,
     TrustEffects,
 )
-from fish_env.errors import Interrupted
+from fish_env.errors import DatasetError, Interrupted
+from fish_env.files import check_outputs
 
 if TYPE_CHECKING:
     from fish_env.campaign import Options, Row
@@ -43,6 +47,7 @@ def campaign(
     cpus: Cpus = None,
     temp: Temp = None,
     trust_effects: TrustEffects = False,
+    json: Json = None,
 ) -> None:
     """Diagnose many data sets on all cores, or on the machines of a Ray cluster.
 
@@ -55,11 +60,28 @@ def campaign(
     from fish_env.campaign import Options
     from fish_env.campaign.run import FAILED
     from fish_env.cluster import ClusterSettings
+    from fish_env.commands.numbers import console_for, write_json
 
     options = Options(fish, seed, quick, measured_beats, trust_effects)
-    rows = diagnose_many(Console(), data, out, options, ClusterSettings(address, cpus, temp))
+    console = console_for(json)
+    if json is not None:
+        _check_json(json, data, out)
+    rows = diagnose_many(console, data, out, options, ClusterSettings(address, cpus, temp))
+    if json is not None:
+        write_json(console, json, {"cases": [asdict(row) for row in rows]})
     if any(row.state == FAILED for row in rows):
         raise typer.Exit(1)
+
+
+def _check_json(file: Path, patterns: Sequence[str], out: Path) -> None:
+    from fish_env.campaign import find_cases
+    from fish_env.campaign.run import TABLE
+    from fish_env.data import dataset_files
+
+    check_outputs([out / TABLE, file])
+    for case in find_cases(patterns):
+        with suppress(DatasetError):  # such a data set gets a row with the reason
+            check_outputs([file], dataset_files(case.source))
 
 
 def diagnose_many(

@@ -9,12 +9,19 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from fish_env.commands.numbers import write_json
 from fish_env.studies.paper import Statement, all_statements, run_study, with_servo_lag
-from fish_env.studies.paper.report import write_report
+from fish_env.studies.paper.report import study_json, write_report
 
 
-def run_paper(console: Console, out: Path) -> None:
-    """Runs the study, prints the statements and writes tables and pictures into a folder."""
+def run_paper(console: Console, out: Path, json_file: Path | None = None) -> None:
+    """Runs the study, prints the statements and writes tables and pictures into a folder.
+
+    Args:
+        console: Where the statements go.
+        out: The folder.
+        json_file: File for the content of `paper.json` once more.
+    """
     begun = time.monotonic()
     with console.status("starting") as status:
         study = run_study(lambda part: status.update(f"simulating: {part}"))
@@ -31,6 +38,8 @@ def run_paper(console: Console, out: Path) -> None:
     console.print(f"{held} of {len(statements)} statements are held by the model without effects")
     console.print(f"written: {', '.join(str(path) for path in written)}", soft_wrap=True)
     console.print(f"pictures: {len(pictures)} in {out} (png and pdf)", soft_wrap=True)
+    if json_file is not None:
+        write_json(console, json_file, study_json(study))
     console.print(f"{time.monotonic() - begun:.0f} s", style="dim")
 
 

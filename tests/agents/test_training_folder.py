@@ -1,5 +1,6 @@
 """A training's folder: refusals leave it as it was, and one training at a time uses it."""
 
+import json
 import os
 import signal
 import subprocess
@@ -93,6 +94,20 @@ def test_a_configuration_in_its_own_folder_stays(tmp_path, capsys):
     assert status == 2
     assert "config.yaml: is read and would be replaced" in error
     assert list(contents(tmp_path)) == [CONFIG]
+
+
+def test_numbers_of_a_training_and_what_they_may_not_replace(tmp_path, capsys):
+    file, numbers = tmp_path / "short.yaml", tmp_path / "numbers.json"
+    small = "num_envs: 8\nppo: {n_steps: 16, batch_size: 128, n_epochs: 1}\n"
+    file.write_text("algorithm: ppo\ntask: hold\ntotal_steps: 256\n" + small)
+    arguments = ("train", str(file), "--out", str(tmp_path / "out"), "--json")
+    status, _, error = run(capsys, *arguments, str(file))
+    assert status == 2
+    assert "short.yaml: is read and would be replaced" in error
+    assert run(capsys, *arguments, str(numbers))[0] == 0
+    found = json.loads(numbers.read_text())
+    assert Path(found["policy"]).is_file()
+    assert found["evaluations"][-1]["steps"] == found["steps"] == 256
 
 
 def test_two_trainings_in_one_folder_do_not_collide(tmp_path):

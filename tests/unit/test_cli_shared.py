@@ -2,12 +2,15 @@
 
 import io
 import json
+import shutil
 import sys
 from importlib.metadata import version
+from pathlib import Path
 
 import pytest
 
 from fish_env.files import check_outputs, write_text
+from fish_env.params import config_root
 from tests.command_line import run
 from tests.fixtures.measured_data import good_folder
 
@@ -17,7 +20,8 @@ CASE = {
     "schedule": [{"t": 0, "tail_amplitude": 0.3, "tail_frequency": 1.0}],
 }
 PRINTING = (
-    "compare", "diagnose", "effects", "evaluate", "fit", "info", "leaderboard", "swim",
+    "campaign", "compare", "diagnose", "effects", "evaluate", "fit", "info", "leaderboard", "paper",
+    "swim", "sweep", "train",
 )  # fmt: skip
 
 
@@ -55,6 +59,16 @@ def test_numbers_go_to_standard_output_alone(capsys):
     assert "servo_lag" in err
     _, out, _ = run(capsys, "leaderboard", "--json", "-")
     assert json.loads(out)["results"]
+
+
+def test_a_campaign_does_not_replace_its_data(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(config_root() / "datasets" / "demo-trials", "demo-trials")
+    for target in ("demo-trials/dataset.yaml", "demo-trials/dive.csv"):
+        status, _, err = run(capsys, "campaign", "demo-trials", "--out", "out", "--json", target)
+        assert status == 2
+        assert "is read and would be replaced" in err
+    assert not Path("out").exists()
 
 
 def test_info_as_numbers(tmp_path, capsys):

@@ -62,7 +62,8 @@ def run(
     resume: bool,
     trust_effects: bool = False,
     engine: str | None = None,
-) -> None:
+    json_file: Path | None = None,
+) -> Outcome:
     """Trains as the command line asks.
 
     Args:
@@ -74,11 +75,12 @@ def run(
         resume: go on with what is in the folder.
         trust_effects: run the effect files that the fish's file names.
         engine: library that learns, instead of the configuration's.
+        json_file: file that the caller writes with the outcome; refused if it is read.
     """
     config = load_train_config(source, trust_effects, seed=seed, total_steps=steps, engine=engine)
     folder = out or Path("out/train") / f"{config.name}-seed-{config.seed}"
     written = [file for file in outputs(folder) if not (resume and file.name == CONFIG)]
-    check_outputs(written, files_behind(source, config))
+    check_outputs([*written, json_file], files_behind(source, config))
     console.print(
         f"training {config.name}, seed {config.seed}, into {folder}",
         highlight=False,
@@ -94,6 +96,7 @@ def run(
         except KeyboardInterrupt:
             raise Interrupted(_stopped(source, folder, config)) from None
     _report(console, config, outcome)
+    return outcome
 
 
 def _stopped(source: str, folder: Path, config: TrainConfig) -> str:

@@ -114,7 +114,7 @@ def _open_loop(problem: SeriesProblem, fit: Fit) -> tuple[list[FloatArray], Seri
     pieces = [
         window
         for run, result in zip(problem.runs, filtered, strict=True)
-        for window in open_loop.windows(run, result, POLICY.prediction_window_s)
+        for window in open_loop.windows(run, result, POLICY.prediction_window_s, problem.channels)
     ]
     cut = problem.with_runs(pieces)
     return open_loop.errors(cut, fit.point, fit.noise), cut

@@ -77,26 +77,47 @@ def errors(problem: Predicting, point: Point, noise: NoiseModel) -> list[FloatAr
     ]
 
 
-def windows(run: RunData, filtered: Filtered, length_s: float) -> list[RunData]:
+def windows(
+    run: RunData, filtered: Filtered, length_s: float, channels: Sequence[str]
+) -> list[RunData]:
     """A run cut into windows that start from its filtered states.
 
     Effects with states of their own start where beating as commanded has left them. Time goes on
-    counting from the run's start, for effects that grow with it.
+    counting from the run's start, for effects that grow with it. How far a current of the run has
+    carried the fish before a window is part of where this begins: without the current, the window
+    is not as far off as the whole run would be.
+
+    Args:
+        run: the run.
+        filtered: its states.
+        length_s: of the windows (s).
+        channels: names of its channels.
     """
     edges = np.arange(0.0, run.duration - 0.5 * length_s, length_s)
     starts = np.searchsorted(run.clock, edges)
     ends = np.r_[starts[1:], len(run.clock) - 1]
     return [
-        _cut(run, filtered.states[first, : len(BASE_STATES)], first, last + 1)
+        _cut(run, filtered.states[first, : len(BASE_STATES)], first, last + 1, channels)
         for first, last in zip(starts, ends, strict=True)
         if last - first >= 3
     ]
 
 
-def _cut(run: RunData, state: FloatArray, first: int, last: int) -> RunData:
+def _cut(
+    run: RunData, state: FloatArray, first: int, last: int, channels: Sequence[str]
+) -> RunData:
     held = np.searchsorted(run.command_times, run.clock[first], side="right") - 1
+    window = run.cut(first, last)
+    if window.distortion is not None:
+        carried = run.current * (run.clock[first] - run.clock[0])
+        state, distortion = state.copy(), window.distortion.copy()
+        for axis, name in enumerate(("x", "y")):
+            if name in channels:
+                state[axis] += carried[axis]
+                distortion[:, list(channels).index(name)] -= carried[axis]
+        window = replace(window, distortion=distortion)
     return replace(
-        run.cut(first, last),
+        window,
         command_times=np.ascontiguousarray(run.command_times[max(held, 0) :]),
         command_values=np.ascontiguousarray(run.command_values[max(held, 0) :]),
         state0=np.ascontiguousarray(state),

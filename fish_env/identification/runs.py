@@ -16,7 +16,14 @@ from fish_env.identification.channels import BY_NAME, Device, Kind, devices_of
 from fish_env.identification.first_state import first_state
 from fish_env.identification.late_rows import in_earlier_rows, rows_to_spare
 from fish_env.identification.state_blocks import PHASE_COLUMN
-from fish_env.identification.variation import BEAT, COUNT, SAG, SENSOR_ERRORS, device_ages
+from fish_env.identification.variation import (
+    BEAT,
+    COUNT,
+    CURRENT,
+    SAG,
+    SENSOR_ERRORS,
+    device_ages,
+)
 
 PHASE = PHASE_COLUMN
 UNTOLD_S = 0.15
@@ -113,6 +120,11 @@ class RunData:
     moved: IntArray = field(default_factory=lambda: np.zeros(len(Device), np.int64))
     usual_substeps: IntArray | None = None
     phase_found: bool = False
+
+    @property
+    def current(self) -> FloatArray:
+        """(2,) speed at which the water carries the fish in this run, north and east (m/s)."""
+        return self.sensor_errors[list(CURRENT)]
 
     @property
     def known_wrench(self) -> FloatArray:

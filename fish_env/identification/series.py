@@ -166,7 +166,8 @@ class SeriesProblem(Problem):
     ) -> tuple[SeriesProblem, Sequence[Filtered], IntArray]:
         """Windows from filtered states over which the fish swims alone (see the protocol)."""
         pairs = zip(self.runs, filtered, strict=True)
-        cut = [windows(run, f, POLICY.prediction_window_s) for run, f in pairs]
+        length, names = POLICY.prediction_window_s, self.channels
+        cut = [windows(run, f, length, names) for run, f in pairs]
         problem = self.with_runs([window for own in cut for window in own])
         corners = bool(filtered and filtered[0].corners)
         still = [without_feedback(w, corners=corners, sd=noise.sensor_sd) for w in problem.runs]

@@ -72,6 +72,10 @@ SENSOR_ERRORS = (
 unit takes away beside making it late; the picture of a camera some metres above the water shrinks
 with depth, by the refractive index and its height. Water that drifts carries the fish along: to the
 sensors it is as if their frame moved."""
+CURRENT = tuple(
+    next(i for i, error in enumerate(SENSOR_ERRORS) if error.name == f"current_{axis}")
+    for axis in ("north", "east")
+)
 EVERY = (*VARIATIONS, *SENSOR_ERRORS)
 USUAL = np.array([variation.usual for variation in EVERY])
 UPRIGHT = ("z", "roll", "pitch", "w", "p", "q")

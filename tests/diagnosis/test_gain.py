@@ -10,6 +10,7 @@ from fish_env.diagnosis.gain import Gain, Pair, measure_gain
 from fish_env.identification import SeriesProblem, open_loop
 from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.runs import RunData
+from fish_env.identification.variation import CURRENT, SENSOR_ERRORS
 from fish_env.inference.gain import WORST, by_window, gap_closed, reachable_share, squared_errors
 from fish_env.inference.problem import Point
 from fish_env.params import load_fish
@@ -63,7 +64,7 @@ def test_windows_cover_a_run_once_and_start_from_filtered_states():
     states = np.arange(len(run.clock))[:, None] * np.ones(20)
     filtered = open_loop.without_feedback(run)
     filtered = type(filtered)(**{**filtered.__dict__, "states": states})
-    pieces = open_loop.windows(run, filtered, 3.0)
+    pieces = open_loop.windows(run, filtered, 3.0, ("z",))
     assert [piece.clock[0] for piece in pieces] == pytest.approx([0.0, 3.0, 6.0])
     assert [piece.state0[0] for piece in pieces] == [0.0, 30.0, 60.0]
     for piece in pieces:
@@ -75,8 +76,22 @@ def test_windows_cover_a_run_once_and_start_from_filtered_states():
 def test_windows_know_the_command_that_holds_when_they_begin():
     run = run_of()
     filtered = open_loop.without_feedback(run, states=20)
-    begun = [piece.command_values[0, 0] for piece in open_loop.windows(run, filtered, 3.0)]
+    begun = [piece.command_values[0, 0] for piece in open_loop.windows(run, filtered, 3.0, ("z",))]
     assert begun == [0.0, 0.0, 5.0]
+
+
+def test_a_window_begins_where_a_current_has_carried_the_fish():
+    """Without the current it is off by what this does within the window, not since the start."""
+    run, north = run_of(), 0.02
+    errors = np.zeros(len(SENSOR_ERRORS))
+    errors[CURRENT[0]] = north
+    drift = north * run.clock[:, None]
+    run = replace(run, sensor_errors=errors, distortion=drift)
+    filtered = open_loop.without_feedback(run, states=20)
+    for piece in open_loop.windows(run, filtered, 3.0, ("x",)):
+        since = piece.clock - piece.clock[0]
+        np.testing.assert_allclose(piece.distortion[:, 0], north * since, atol=1e-12)
+        assert piece.state0[0] == pytest.approx(north * piece.clock[0])
 
 
 def test_a_window_does_not_begin_with_a_soft_tail_unbent():
@@ -94,7 +109,9 @@ def test_a_window_does_not_begin_with_a_soft_tail_unbent():
     truth = Point(np.zeros(0), {f"effects.tail_flexibility.{n}": v for n, v in soft.items()})
     noise = NoiseModel(np.full(len(problem.channels), 1e-3), 1e-4, 1e-6, 1.0)
 
-    pieces = open_loop.windows(problem.runs[0], problem.filtered(truth, noise)[0], 3.0)[1:]
+    pieces = open_loop.windows(
+        problem.runs[0], problem.filtered(truth, noise)[0], 3.0, problem.channels
+    )[1:]
     unbent = [replace(piece, swimming=False) for piece in pieces]
     left, before = (
         np.sqrt(np.mean(np.concatenate(open_loop.errors(problem.with_runs(w), truth, noise)) ** 2))

@@ -35,7 +35,7 @@ from fish_env.identification.run_numbers import renumbered
 from fish_env.identification.runs import FINER, RunData, prepare_run
 from fish_env.identification.sensor_errors import slopes_of_runs
 from fish_env.identification.sensors import largest_jitter_of, largest_noise
-from fish_env.identification.tail_drive import TailDrive
+from fish_env.identification.tail_drive import LATE, TailDrive
 from fish_env.identification.variation import EVERY, USUAL, VARIATIONS
 from fish_env.identification.variation_slopes import swum_slopes
 from fish_env.inference.estimate.fit import Fit
@@ -65,6 +65,7 @@ class SeriesProblem(Problem):
 
     known: dict[str, Effect]
     drive: TailDrive
+    hidden_by_drive = LATE
     out_of_step = ("frequency_scale", "battery_sag", "clock_scale", "clock_skew")
     interchangeable = ALIKE
     variations = EVERY

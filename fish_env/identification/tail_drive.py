@@ -10,6 +10,8 @@ from fish_env.model.effect import Effect
 
 SCALE = "effects.frequency_scale.scale"
 RATE = "effects.battery_sag.rate"
+LATE = ("servo_lag", "servo_delay", "servo_rate_limit", "tail_flexibility", "wake_memory")
+"""Effects that make the tail or its force late."""
 ORDINARY = 4e-3
 """Share of the beat that a servo is off by, usually."""
 BESIDE = (-6e-3, -3e-3, 0.0, 3e-3, 6e-3)

@@ -28,6 +28,7 @@ from fish_env.inference.rivals import explained_away, rivals_of, tied
 from fish_env.inference.screening import Screen, screen
 from fish_env.inference.search import refits, restart_from_winner
 from fish_env.inference.shortlist import like, newly_shown, shortlisted
+from fish_env.inference.trials import tried_out
 
 
 @dataclass(frozen=True)
@@ -129,7 +130,7 @@ def extended(
             test says that something is missing.
     """
     search = Search(causes, rng, effort, report, relaxed_log_p)
-    found, together = search.measured(begun), effort.retries
+    found, together = search.hidden(search.measured(begun)), effort.retries
     while len(found.accepted.causes) < POLICY.most_causes:
         if found.accepted.causes and together:
             found, together = search.together(found), False
@@ -194,6 +195,20 @@ class Search:
             begun, accepted=accepted, shown=after,
             gain=nothing.score - accepted.score,
         )  # fmt: skip
+
+    def hidden(self, begun: Attribution) -> Attribution:
+        """With an effect that a swamping disturbance hides; the same without, or beside causes.
+
+        No screen shows it, and what makes up for it would be found instead.
+        """
+        nothing = begun.accepted
+        if nothing.causes or not (self.effort.retries and disturbance_at_limit(nothing.fit)):
+            return begun
+        more = tried_out(nothing, begun.shown, self.report)
+        if more is None:
+            return begun
+        after = screen(more.fit, self.causes, self.rng)
+        return replace(begun, accepted=more, shown=after, gain=nothing.score - more.score)
 
     def together(self, found: Attribution) -> Attribution:
         """With further effects that are needed beside those found, and what the runs differ in."""

@@ -16,6 +16,7 @@ from fish_env.inference.rivals import rivals_of
 from fish_env.inference.screening import Screen, screen
 from fish_env.inference.search import substituted, without
 from fish_env.inference.shortlist import shortlisted
+from fish_env.inference.trials import tried_out
 
 LINEAR_DOUBT = 3.0 * POLICY.evidence_doubt
 """Cost of a substitute in the linear model that a fit may yet make good."""
@@ -61,7 +62,8 @@ def pursue(
         if not disturbance_at_limit(current.fit):
             break
         kept = _beside_drive(current, shown)
-        more = pursued(current, kept, report, least, relaxed_log_p, most=1)
+        more = tried_out(current, kept, report)
+        more = more or pursued(current, kept, report, least, relaxed_log_p, most=1)
         if more is current:
             break
         shown = screen(more.fit, causes, rng)

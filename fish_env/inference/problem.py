@@ -51,6 +51,7 @@ class Problem(Protocol):
         known: effects by name.
         baseline: coefficients with their priors.
         effects: names of effects that are free from the start.
+        hidden_by_drive: effects that put a drive out of step, and that a disturbance may hide.
         longest_step: longest simulation step (s).
         longest_run: length of the longest run (s).
         run_count: number of runs.
@@ -65,6 +66,7 @@ class Problem(Protocol):
     known: Mapping[str, Effect]
     baseline: Coefficients
     effects: tuple[str, ...] = ()
+    hidden_by_drive: tuple[str, ...] = ()
     out_of_step: tuple[str, ...] = ()
     interchangeable: tuple[frozenset[str], ...] = ()
     variations: tuple[RunVariation, ...] = ()

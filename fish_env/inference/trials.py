@@ -1,0 +1,80 @@
+"""Effects that a swamping disturbance hides from the linear model, each tried in a fit of its own.
+
+Where runs differ in their drive, a lag puts all of them out of step, each by another amount. The
+disturbance then grows until it follows everything, and no slope under it shows a lag. A fit does:
+from a lag of some size and under a small disturbance its few steps end far below a fit without it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+from fish_env.inference.adequacy import beyond_plausible
+from fish_env.inference.estimate.fit import Fit, fit
+from fish_env.inference.explanation import FEW_RUNS, Explanation, fitted_again, reached
+from fish_env.inference.parallel import side_by_side
+from fish_env.inference.policy import POLICY
+from fish_env.inference.problem import Point
+from fish_env.inference.screening import Screen
+from fish_env.inference.starts import probed
+
+STEPS = 4
+"""Of each trial: a lag that is right is found in three."""
+
+
+def tried_out(
+    current: Explanation, shown: Screen, report: Callable[[str], None]
+) -> Explanation | None:
+    """The explanation with the hidden effect that explains most; None where none explains more.
+
+    Args:
+        current: causes accepted so far, beside a large misfit.
+        shown: all causes against it.
+        report: told what is being done.
+    """
+    problem = current.fit.problem
+    hidden = [s for s in shown.best() if s.cause.name in problem.hidden_by_drive]
+    swamped = problem.drive.uneven and problem.swamped(current.fit.noise)
+    if not hidden or not swamped:
+        return None
+    report(f"trying {', '.join(s.cause.name for s in hidden)} in fits of their own")
+    tasks = [partial(_trial, current, "", {})]
+    tasks += [partial(_trial, current, s.cause.name, v) for s in hidden for v in probed(problem, s)]
+    without, *found = side_by_side(tasks)
+    best = min((f for f in found if f), key=lambda f: f.objective, default=None)
+    if best is None:
+        return None
+    if without and best.objective > without.objective - POLICY.evidence_doubt:
+        return None
+    (name,) = {*best.effects} - {*current.fit.effects}
+    report(f"fitting {name}")
+    fresh = problem.with_variation(np.zeros_like(problem.variation), best.point, best.noise)
+    whole = fitted_again(fresh, best, best.noise)
+    if whole is None or beyond_plausible(whole, name):
+        return None
+    more = Explanation((*current.causes, name), whole)
+    return more if more.score < current.score - POLICY.evidence_doubt else None
+
+
+def _trial(current: Explanation, name: str, values: dict[str, float]) -> Fit | None:
+    """A few steps on a few runs, from a nominal vehicle and a small disturbance.
+
+    Coefficients and runs' own numbers of the present fit have gone far to make up for what is
+    missing.
+
+    Args:
+        current: causes accepted so far.
+        name: effect to add; none if empty.
+        values: where its parameters begin.
+    """
+    own = current.fit
+    few = own.problem.subset(FEW_RUNS)
+    effects = (*own.effects, name) if name else own.effects
+    begin = Point(few.start.z, {**own.point.effects, **values})
+    noise = few.default_noise()
+    fresh = few.with_variation(np.zeros_like(few.variation), begin, noise)
+    start = (effects, begin, noise, own.released)
+    return reached(lambda: fit(fresh, *start, iterations=STEPS, rounds=1))

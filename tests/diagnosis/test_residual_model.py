@@ -153,6 +153,6 @@ def test_the_report_tells_it():
     doubtful = {"estimate": 4.0, "ci95": [-10.0, 18.0]}
     model = RESIDUAL | {"gain": RESIDUAL["gain"] | {"log_likelihood": doubtful}}
     weak = full | {"residual_model": model}
-    assert "not shown to improve" in shown(weak)
+    assert "does not significantly improve" in shown(weak)
     bad = RESIDUAL["gain"] | {"log_likelihood": {"estimate": -40.0, "ci95": [-60.0, -20.0]}}
-    assert "worse" in shown(full | {"residual_model": RESIDUAL | {"gain": bad}})
+    assert "worsens" in shown(full | {"residual_model": RESIDUAL | {"gain": bad}})

@@ -9,7 +9,6 @@ from typing import Any
 
 from rich.console import Console
 
-from fish_env.comparison.errors import plain
 from fish_env.files import STANDARD, write_text
 from fish_env.version import versioned
 
@@ -34,6 +33,8 @@ def write_json(console: Console, file: Path, content: Mapping[str, Any] | list[A
     Raises:
         OutputError: The file cannot be written.
     """
+    from fish_env.comparison.errors import plain  # slow to import, and every command imports this
+
     content = versioned(content) if isinstance(content, Mapping) else content
     write_text(file, json.dumps(plain(content), indent=1, allow_nan=False) + "\n")
     if str(file) != STANDARD:

@@ -62,8 +62,9 @@ def sensor_slopes(
     for device in np.unique(devices).tolist():
         age = 0.0 if ages is None else float(ages[device])
         at = {channels[i]: i for i in np.flatnonzero(devices == device).tolist()}
-        _put_mounting(found, at, motion.ago(age))
-        _put_camera(found, at, motion.ago(age))
+        seen = motion.ago(age)
+        _put_mounting(found, at, seen)
+        _put_camera(found, at, seen)
         for name in at.keys() & {*_ATTITUDE, *_RATES}:
             _put(found, at, name, "inertial_smoothing", motion.reshaped(name, age))
     found[:, :, [_INDEX[name] for name in _absent(channels)]] = 0.0

@@ -13,7 +13,7 @@ from fish_env.params import load_fish
 from tests.hidden import suite
 from tests.hidden.cases import make_case as make_plain
 from tests.hidden.realistic import cases, hidden, sensors
-from tests.hidden.realistic.budget import ALL, COARSE, WINDOW, Windows, budget
+from tests.hidden.realistic.budget import ALL, STEPS, WINDOW, Windows, budget
 from tests.hidden.realistic.catalogue import (
     ALONE,
     DIRT,
@@ -295,7 +295,7 @@ def test_two_things_share_a_misfit_by_adding_and_leaving_out():
     ]
     case, drawn, shares = budget_of(pieces)
     assert "outliers" not in shares
-    windows = Windows.of(case, drawn)
+    windows = Windows.of(case, drawn, STEPS[0])
 
     def off(present):
         pairs = [(windows.channels(i, present), windows.channels(i, case.names)) for i in range(2)]
@@ -322,8 +322,8 @@ def test_the_truth_that_starts_anew_is_the_truth(acting, looser):
     pieces = [hidden.piece(name, "small", values, RUNS) for name, values in acting.items()]
     case = case_of(pieces)
     drawn = draw_run(case, 0, np.random.default_rng(0))
-    anew = Windows.of(case, [drawn]).channels(0, case.names)
-    fish, times = swimmer(case, drawn, 0, case.names, COARSE)
+    anew = Windows.of(case, [drawn], STEPS[0]).channels(0, case.names)
+    fish, times = swimmer(case, drawn, 0, case.names, STEPS[0])
     motion = sensors.Motion(times, fish.run(float(times[-1]), times))
     values = case.values(0, case.names)
     whole = sensors.sampled(motion, sensors.systematic(motion, values), drawn.stamps * 1.02, values)
@@ -335,7 +335,7 @@ def test_nothing_is_left_of_an_effect_that_is_left_out():
     """A play of next to no size: what it leaves in the drive's memory would be all there is."""
     case = case_of([hidden.piece("servo_backlash", "main", {"gap": 1e-6}, RUNS)])
     drawn = draw_run(case, 1, np.random.default_rng(0))
-    windows = Windows.of(case, [drawn])
+    windows = Windows.of(case, [drawn], STEPS[0])
     without, truth = windows.channels(0, ()), windows.channels(0, case.names)
     assert np.sqrt(np.mean((without["r"] - truth["r"]) ** 2)) < 0.01
     assert np.sqrt(np.mean((without["x"] - truth["x"]) ** 2)) < 0.001
@@ -345,7 +345,7 @@ def test_a_phase_that_has_run_away_is_taken_from_the_truth_in_every_window():
     slow = hidden.piece("frequency_scale", "main", {"scale": 0.98}, RUNS)
     case = case_of([slow])
     drawn = draw_run(case, 0, np.random.default_rng(0))
-    windows = Windows.of(case, [drawn])
+    windows = Windows.of(case, [drawn], STEPS[0])
     off = [windows.channels(0, present)["yaw"] for present in ((), case.names)]
     late = slice(-int(WINDOW * 25), None)
     # After 27 s the beat alone would be half a turn behind; within a window it is not.

@@ -22,8 +22,10 @@ from tests.hidden.servo import LIMIT, PHASE, PLAY
 from tests.hidden.simulate import Swim
 
 ALL = "all"
-COARSE = 0.012
-"""s. Grid of motions that are only compared with each other: a third of the time."""
+STEPS = (0.012, 0.006, 0.003)
+"""s. Grids of motions that are only compared with each other. The first takes a third of the time
+of the log's grid. A short lag of the servo makes the motion diverge on it (8 ms did): then the next
+is taken."""
 WINDOW = 3.0
 """s, true time. How long a simulation runs on before it starts anew from the truth."""
 
@@ -49,18 +51,21 @@ class Windows:
         case: fish and hidden things.
         runs: the runs as drawn.
         marks: the truth at the begin of each window, by run.
+        step: grid of the motions, s.
         motions: what was swum already, by run and pieces.
     """
 
     case: Case
     runs: Sequence[Drawn]
+    step: float
     marks: list[list[Mark]]
     motions: dict[tuple[int, frozenset[str]], Motion]
 
     @classmethod
-    def of(cls, case: Case, runs: Sequence[Drawn]) -> Windows:
+    def of(cls, case: Case, runs: Sequence[Drawn], step: float) -> Windows:
         """Swims the truth once, and marks it."""
-        return cls(case, runs, [marks_of(case, drawn, i) for i, drawn in enumerate(runs)], {})
+        marks = [marks_of(case, drawn, i, step) for i, drawn in enumerate(runs)]
+        return cls(case, runs, step, marks, {})
 
     def channels(self, run: int, present: Collection[str]) -> Channels:
         """The log of a run without noise, in which some of the pieces act."""
@@ -72,10 +77,10 @@ class Windows:
         return sampled(self.motions[key], systematic(self.motions[key], values), when, values)
 
     def _swim(self, run: int, present: Collection[str]) -> Motion:
-        fish, times = swimmer(self.case, self.runs[run], run, present, COARSE)
+        fish, times = swimmer(self.case, self.runs[run], run, present, self.step)
         scale = clocks(self.case.values(run, present))[1]
         marks = self.marks[run]
-        ends = [mark.stamp * scale for mark in marks[1:]] + [float(times[-1]) + COARSE]
+        ends = [mark.stamp * scale for mark in marks[1:]] + [float(times[-1]) + self.step]
         states = []
         for mark, end in zip(marks, ends, strict=True):
             begin = mark.stamp * scale
@@ -97,9 +102,9 @@ def start_anew(fish: Swim, mark: Mark, begin: float) -> None:
     fish.table[:, PHASE] += mark.phase - fish.phase_at(begin)
 
 
-def marks_of(case: Case, drawn: Drawn, run: int) -> list[Mark]:
+def marks_of(case: Case, drawn: Drawn, run: int, step: float) -> list[Mark]:
     """The truth at the begin of each window of a run."""
-    fish, times = swimmer(case, drawn, run, case.names, COARSE)
+    fish, times = swimmer(case, drawn, run, case.names, step)
     scale = clocks(case.values(run, case.names))[1]
     marks = []
     for begin in np.arange(0.0, float(times[-1]) - 0.5 * WINDOW, WINDOW):
@@ -121,7 +126,16 @@ def budget(
         runs: the runs as drawn.
         noise: one-sigma noise of the measured channels.
     """
-    windows, every = Windows.of(case, runs), case.names
+    for step in STEPS:
+        shares = shares_of(Windows.of(case, runs, step), noise)
+        if all(np.isfinite(list(of_piece.values())).all() for of_piece in shares.values()):
+            return shares
+    raise RuntimeError("the motion diverges on every grid")
+
+
+def shares_of(windows: Windows, noise: Mapping[str, float]) -> dict[str, dict[str, float]]:
+    """The shares on one grid; not a number where a motion diverges on it."""
+    runs, every = windows.runs, windows.case.names
     truth = [windows.channels(run, every) for run in range(len(runs))]
 
     def misfit(present: Collection[str]) -> dict[str, float]:

@@ -17,7 +17,7 @@ INTRODUCTION = """\
 # Catalogue of effects
 
 This page lists effects of real fish that the [baseline model](model.md) leaves out. `make docs`
-writes it from the declarations of the effects. `robofish effects` prints the same list.
+writes it from the declarations of the effects. `robofish effects` prints a table of them.
 
 Every effect is off at its neutral values and then changes nothing, to the last bit. Switch effects
 on in a fish file, in Python, or in the environment:
@@ -40,6 +40,8 @@ through the water and *omega* the angular velocity, both in the body frame. "Pla
 that a robotic fish of 29 cm and 2 kg may show, and "possible" the range that is accepted. Effects
 of one section that act on the same quantity act in the order of this page. You can add [your own
 effect](your-own.md#your-own-effect) in a Python file.
+
+The first line of each entry says what one observes.
 """
 UNSEARCHED = "It can be simulated, and fitted on demand. `robofish diagnose` does not test it."
 
@@ -56,8 +58,11 @@ def page() -> str:
 
 
 def _overview(effects: list[Effect]) -> str:
-    rows = [f"| [`{e.name}`](#{e.name}) | {e.section} | {_cell(e.summary)} |" for e in effects]
-    return "\n".join(["| effect | section | what one observes |", "| --- | --- | --- |", *rows, ""])
+    rows = []
+    for section in SECTIONS:
+        links = ", ".join(f"[`{e.name}`](#{e.name})" for e in effects if e.section == section)
+        rows += [f"| [{section}](#{section}) | {links} |"] * bool(links)
+    return "\n".join(["| section | effects |", "| --- | --- |", *rows, ""])
 
 
 def _entry(effect: Effect) -> str:

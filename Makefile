@@ -10,7 +10,7 @@ CLEANRL := .venv-cleanrl
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint docs bench benchmark-diagnosis benchmark-realistic benchmark-power benchmark-time benchmark-agents benchmark-loop clients measure-export fuzz check-release walks clean
+.PHONY: help setup demo test lint docs bench benchmark-diagnosis benchmark-realistic benchmark-power benchmark-time benchmark-agents benchmark-loop clients measure-export fuzz check-release walks clone-to-verdict clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 28
@@ -72,6 +72,9 @@ check-release: setup  ## build the wheel twice and compare, and go through the c
 
 walks: setup  ## go from raw logs and from nothing to an answer, as the pages say, and time it
 	$(BIN)/python -m scripts.walks
+
+clone-to-verdict: setup  ## time git clone, installation and demonstration up to the verdict
+	$(BIN)/python -m scripts.clone_to_verdict
 
 measure-export: setup  ## compare exported policies with the NumPy policy, over a million observations
 	$(BIN)/python -m scripts.measure_export

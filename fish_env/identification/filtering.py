@@ -18,6 +18,7 @@ from fish_env.identification.applied_wrench import EFFECT as APPLIED_WRENCH
 from fish_env.identification.channels import Device, codes_of
 from fish_env.identification.jitter import channel_rates
 from fish_env.identification.noise_model import NoiseModel
+from fish_env.identification.noise_scoring import Replayed
 from fish_env.identification.runs import RunData
 from fish_env.identification.state_blocks import N_ERROR, N_MOVING
 from fish_env.identification.variation import (
@@ -274,8 +275,8 @@ class RunFilter:
 
     def replay(
         self, filtered: Sequence[Filtered], made_with: NoiseModel, noise: NoiseModel
-    ) -> float:
-        """Log likelihood of all runs under another noise model, linearised.
+    ) -> Replayed:
+        """Likelihood of all runs under another noise model, linearised.
 
         Args:
             filtered: results that kept their slopes.
@@ -283,20 +284,25 @@ class RunFilter:
             noise: the other noise model.
         """
         entry = self.kernels.entry("replay_run")
+        ends = np.cumsum([len(run.clock) for run in self.runs])
+        innovations = np.zeros((ends[-1], len(self.channels)))
+        whitening = np.zeros((ends[-1], len(self.channels), len(self.channels)))
 
-        def one(job: tuple[RunData, FloatArray, Filtered]) -> float:
-            data, rates, result = job
+        def one(job: tuple[RunData, FloatArray, Filtered, int]) -> float:
+            data, rates, result, end = job
             assert result.slopes is not None
-            slopes = result.slopes
+            slopes, own = result.slopes, slice(end - len(data.clock), end)
             value = entry(
                 data.clock, data.corrected, slopes.motion, slopes.channels, slopes.raw,
                 result.gains, result.shares, result.wrench, made_with.correlation_s,
                 noise.sensor_sd**2, noise.jitter_sd * rates, data.covariance0,
                 noise.wrench_variance, noise.correlation_s, noise.phase_sd**2,
+                innovations[own], whitening[own],
             )  # fmt: skip
             return float(value)
 
-        return sum(_threads().map(one, zip(self.runs, self.rates, filtered, strict=True)))
+        jobs = zip(self.runs, self.rates, filtered, ends.tolist(), strict=True)
+        return Replayed(sum(_threads().map(one, jobs)), innovations, whitening)
 
     def innovations(
         self,

@@ -9,12 +9,12 @@ from math import comb
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.optimize import minimize
 
 from fish_env.arrays import FloatArray
 from fish_env.data.schema import Dataset
 from fish_env.identification.filtering import Filtered, RunFilter
 from fish_env.identification.noise_model import NoiseModel
+from fish_env.identification.noise_scoring import Replayed, climb
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point
 from fish_env.params.schema import FishParams
@@ -32,8 +32,9 @@ ORDER = 4
 WINDOW = 30
 QUANTILE = 0.15
 GAIN = 0.1
-"""The disturbance is found when a step gains no more log likelihood, or e times as much of one of
-its numbers would not."""
+"""The noise model is found when a step gains no more log likelihood."""
+LEAST_SENSOR_SHARE = 1e-3
+"""Of the largest noise of a channel, the least one."""
 
 
 def white_noise_sd(dataset: Dataset, channel: str) -> float:
@@ -171,33 +172,50 @@ def fitted_noise(
     """
     allowed = JITTER_SD_RANGE[0], min(JITTER_SD_RANGE[1], problem.largest_jitter_s)
     plausible = replace(disturbance_range(problem.fish), jitter=allowed)
-    wide = plausible.widened(POLICY.largest_disturbance)
     found = noise
     for _ in range(3):
         runs, made_with = problem.filtered(point, found, keep_slopes=True), found
         # The lean filter will do: covariances are replayed, and no effect is computed again.
         replay = partial(problem.lean_filter.replay, runs, made_with)
-        small = replace(
-            small_disturbance(found.sensor_sd),
-            phase_sd=found.phase_sd,
-            jitter_sd=found.jitter_sd,
-            spread=found.spread,
-        )
-        start = max((found, small), key=replay)
-        found = fit_noise(replay, start, plausible, 45, largest_sensor_sd)
-        jittery = jitter_worth_fitting(replay, found, plausible)
-        if jittery.jitter_sd != found.jitter_sd:
-            found = fit_noise(replay, jittery, plausible, 45, largest_sensor_sd)
-        if found.jitter_sd and plausible.left_by(found):
-            # Something is missing, and jitter could absorb it.
-            still = replace(found, jitter_sd=0.0)
-            found = fit_noise(replay, still, plausible, 45, largest_sensor_sd)
-        if plausible.left_by(found):
-            # What is missing shows in whitened residuals only if the noise is as large as it is.
-            start = max((found, start), key=replay)
-            found = fit_noise(replay, start, wide, 45, largest_sensor_sd)
+        found = _searched(replay, found, plausible, largest_sensor_sd)
         if made_with.is_close(found, 0.4):
             break
+    return found
+
+
+def _searched(
+    replay: Callable[[NoiseModel], Replayed],
+    present: NoiseModel,
+    plausible: DisturbanceRange,
+    largest_sensor_sd: FloatArray | None,
+) -> NoiseModel:
+    """Noise model of largest likelihood about one evaluation of the runs."""
+
+    def value(noise: NoiseModel) -> float:
+        return replay(noise).log_likelihood
+
+    small = replace(
+        small_disturbance(present.sensor_sd),
+        phase_sd=present.phase_sd,
+        jitter_sd=present.jitter_sd,
+        spread=present.spread,
+    )
+    start = max((present, small), key=value)
+    found = fit_noise(replay, start, plausible, largest_sensor_sd)
+    without, jittery = found, jitter_worth_fitting(value, found, plausible)
+    if jittery.jitter_sd != found.jitter_sd:
+        found = fit_noise(replay, jittery, plausible, largest_sensor_sd)
+    if found.jitter_sd and plausible.left_by(found):
+        # Something is missing, and jitter could absorb it.
+        if without.jitter_sd:
+            still = replace(without, jitter_sd=0.0)
+            without = fit_noise(replay, still, plausible, largest_sensor_sd)
+        found = without
+    if plausible.left_by(found):
+        # What is missing shows in whitened residuals only if the noise is as large as it is.
+        wide = plausible.widened(POLICY.largest_disturbance)
+        start = max((found, start), key=value)
+        found = fit_noise(replay, start, wide, largest_sensor_sd)
     return found
 
 
@@ -222,20 +240,18 @@ def jitter_worth_fitting(
 
 
 def fit_noise(
-    log_likelihood: Callable[[NoiseModel], float],
+    replay: Callable[[NoiseModel], Replayed],
     start: NoiseModel,
     within: DisturbanceRange,
-    evaluations: int = 40,
     largest_sensor_sd: FloatArray | None = None,
 ) -> NoiseModel:
     """Maximum likelihood of the noise model, from a start.
 
     Args:
-        log_likelihood: of a noise model, the parameters of the fish being fixed.
+        replay: what a noise model makes of innovations, the parameters of the fish being fixed.
         start: first guess; a phase that follows its command, or is relaxed, does so still, and
             sample times without jitter have none.
         within: what the disturbance may be.
-        evaluations: effort for the three numbers of the disturbance.
         largest_sensor_sd: (C,) bound on each channel's noise; the noise is then fitted too.
             Without it the sensors keep theirs: a misfit of the model must not pass for noise.
     """
@@ -245,48 +261,18 @@ def fit_noise(
         names, limits = [*names, "phase_sd"], [*limits, PHASE_SD_RANGE]
     if start.jitter_sd > 0.0:
         names, limits = [*names, "jitter_sd"], [*limits, within.jitter]
-    bounds = np.log(limits)
+    sensors = largest_sensor_sd is not None
+    if largest_sensor_sd is not None:
+        limits += [(LEAST_SENSOR_SHARE * largest, largest) for largest in largest_sensor_sd]
 
-    def model(x: FloatArray, sensor: FloatArray) -> NoiseModel:
+    def model(x: FloatArray) -> NoiseModel:
         # The exponential of a bound's logarithm may lie beyond the bound.
         values = [float(np.clip(np.exp(v), *b)) for v, b in zip(x, limits, strict=True)]
-        numbers: dict[str, Any] = dict(zip(names, values, strict=True))
-        return replace(start, sensor_sd=sensor, **numbers)
+        numbers: dict[str, Any] = dict(zip(names, values, strict=False))
+        own = np.array(values[len(names) :]) if sensors else start.sensor_sd
+        return replace(start, sensor_sd=own, **numbers)
 
-    def disturbance(noise: NoiseModel, effort: int) -> NoiseModel:
-        known = np.log([getattr(noise, name) for name in names])
-        found = minimize(
-            lambda x: -log_likelihood(model(x, noise.sensor_sd)),
-            np.clip(known, *bounds.T),
-            method="L-BFGS-B",
-            bounds=bounds,
-            options={"maxfun": effort, "eps": 1e-4, "gtol": GAIN, "ftol": GAIN / scale},
-        )
-        return model(found.x, noise.sensor_sd)
-
-    scale = max(abs(log_likelihood(start)), 1.0)
-    noise = disturbance(start, evaluations)
-    if largest_sensor_sd is None:
-        return noise
-    noise = _sensors(log_likelihood, noise, largest_sensor_sd)
-    return disturbance(noise, evaluations // 2)
-
-
-def _sensors(
-    log_likelihood: Callable[[NoiseModel], float], noise: NoiseModel, largest: FloatArray
-) -> NoiseModel:
-    """One Newton step in the log of each channel's noise, from three likelihoods a channel."""
-    sensor = noise.sensor_sd.copy()
-    centre = log_likelihood(noise)
-    step = 0.15
-    for i in range(len(sensor)):
-        values = []
-        for sign in (-1.0, 1.0):
-            trial = noise.sensor_sd.copy()
-            trial[i] *= np.exp(sign * step)
-            values.append(log_likelihood(replace(noise, sensor_sd=trial)))
-        slope = (values[1] - values[0]) / (2 * step)
-        curve = (values[1] - 2 * centre + values[0]) / step**2
-        move = -slope / curve if curve < 0 else np.sign(slope) * 0.3
-        sensor[i] = min(sensor[i] * np.exp(np.clip(move, -0.5, 0.5)), largest[i])
-    return replace(noise, sensor_sd=sensor)
+    lower, upper = np.log(limits).T
+    known = [getattr(start, name) for name in names] + (list(start.sensor_sd) if sensors else [])
+    begin = np.clip(np.log(known), lower, upper)
+    return model(climb(lambda x: replay(model(x)), begin, lower, upper, GAIN))

@@ -30,7 +30,7 @@ from fish_env.model.composed import entry_point
 @entry_point
 def replay_run(
     clock, measured, f_in, h_in, raw_in, k_in, share_in, d_in, decay_in_s, noise_variance,
-    smear, covariance0, wrench_variance, wrench_decay_s, phase_walk,
+    smear, covariance0, wrench_variance, wrench_decay_s, phase_walk, e_out, w_out,
 ):  # fmt: skip
     """Log likelihood (without its constant) of a run under another noise model.
 
@@ -50,6 +50,8 @@ def replay_run(
         wrench_variance: (6,) stationary variance of the wrench.
         wrench_decay_s: its correlation time (s).
         phase_walk: variance that the tail phase gains in a second (rad^2/s).
+        e_out: (T, C) whitened innovations.
+        w_out: (T, C, C) whitening.
     """
     channels = measured.shape[1]
     p = widened(covariance0)
@@ -80,6 +82,7 @@ def replay_run(
             p, h_in[sample], measured[sample], noise_variance, smear[sample], s, w, seen, gain
         )  # fmt: skip
         take_into_covariance(p, w, share_in[sample], gain)
+        w_out[sample] = w
         log_likelihood -= 0.5 * log_det
         for i in range(channels):
             total = raw_in[sample, i]
@@ -90,6 +93,7 @@ def replay_run(
             total = 0.0
             for j in range(i + 1):
                 total += w[i, j] * e[j]
+            e_out[sample, i] = total
             log_likelihood -= 0.5 * total * total
         for i in range(N_ERROR):
             total = stray[i]

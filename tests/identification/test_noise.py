@@ -1,5 +1,7 @@
 """The noise floor from data alone."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,8 +13,10 @@ from fish_env.identification.noise import (
     white_noise_sd,
 )
 from fish_env.identification.noise_model import NoiseModel
+from fish_env.identification.noise_scoring import Replayed
+from fish_env.identification.series import SeriesProblem
 from fish_env.params import load_fish
-from tests.identification.synthetic import SENSOR_SD, Setup, simulate
+from tests.identification.synthetic import PATHS, SENSOR_SD, Setup, simulate
 
 WIDE = DisturbanceRange((1e-4, 5.0), (1e-6, 0.5), (0.05, 30.0))
 
@@ -24,50 +28,76 @@ def test_white_noise_is_an_upper_bound_and_close(channel):
     assert 0.85 * SENSOR_SD[channel] < found < 1.6 * SENSOR_SD[channel]
 
 
-def test_the_search_climbs_to_the_largest_likelihood():
-    def peak(noise):
-        x = np.log([noise.force_sd / 0.02, noise.moment_sd / 3e-4, noise.correlation_s / 0.4])
-        return -50.0 * float(x @ x)
+def three_sizes(noise):
+    """Standard deviations that a toy's innovations have under a noise model."""
+    return np.array([noise.force_sd, noise.moment_sd, noise.correlation_s])
 
+
+def toy(rms, sizes=three_sizes, asked=None):
+    """What a noise model makes of innovations of known size: likeliest is the one that has it."""
+    values = np.asarray(rms) * np.where(np.arange(400) % 2, 1.0, -1.0)[:, None]
+
+    def replay(noise):
+        if asked is not None:
+            asked.append(noise)
+        sd = sizes(noise)
+        white = values / sd
+        value = -0.5 * np.sum(white**2) - len(values) * np.sum(np.log(sd))
+        return Replayed(
+            float(value), white, np.broadcast_to(np.diag(1.0 / sd), (400, *[len(sd)] * 2))
+        )
+
+    return replay
+
+
+@pytest.mark.parametrize("wanted", [(0.02, 3e-4, 0.4), (2e-4, 2e-6, 20.0), (1.0, 0.1, 0.1)])
+def test_the_search_climbs_to_the_largest_likelihood(wanted):
     start = NoiseModel(np.array([0.001]), 3e-3, 1e-4, 1.0)
-    found = fit_noise(peak, start, WIDE, 80)
-    assert found.force_sd == pytest.approx(0.02, rel=0.1)
-    assert found.moment_sd == pytest.approx(3e-4, rel=0.1)
-    assert found.correlation_s == pytest.approx(0.4, rel=0.1)
+    found = fit_noise(toy(wanted), start, WIDE)
+    np.testing.assert_allclose(three_sizes(found), wanted, rtol=0.03)
     np.testing.assert_array_equal(found.sensor_sd, start.sensor_sd)
 
 
 def test_where_nothing_is_to_be_gained_it_ends_soon():
-    asked = []
-
-    def flat_top(noise):
-        asked.append(noise)
-        x = np.log([noise.force_sd / 3e-3, noise.moment_sd / 1e-4, noise.correlation_s])
-        return -9000.0 - float(x @ x)
-
+    asked: list[NoiseModel] = []
     start = NoiseModel(np.array([0.001]), 3e-3, 1e-4, 1.0)
-    found = fit_noise(flat_top, start, WIDE, 80)
+    found = fit_noise(toy((3e-3, 1e-4, 1.0), asked=asked), start, WIDE)
     assert found.force_sd == pytest.approx(3e-3, rel=0.01)
-    assert len(asked) <= 20
+    assert len(asked) <= 5
 
 
 def test_sensor_noise_only_goes_down_from_its_bound():
-    def wants(size):
-        return lambda noise: -50.0 * float(np.log(noise.sensor_sd[0] / size) ** 2)
-
     start = NoiseModel(np.array([0.001]), 3e-3, 1e-4, 1.0)
-    larger = fit_noise(wants(0.01), start, WIDE, 10, start.sensor_sd)
-    smaller = fit_noise(wants(0.0008), start, WIDE, 10, start.sensor_sd)
-    assert larger.sensor_sd[0] == 0.001
-    assert smaller.sensor_sd[0] == pytest.approx(0.0008, rel=0.05)
+
+    def of(size):
+        replay = toy([size], lambda noise: noise.sensor_sd)
+        return fit_noise(replay, start, WIDE, start.sensor_sd).sensor_sd[0]
+
+    assert of(0.01) == 0.001
+    assert of(0.0008) == pytest.approx(0.0008, rel=0.01)
 
 
 def test_a_disturbance_does_not_grow_beyond_what_a_tank_makes():
-    def grows(noise):
-        return 100.0 * float(np.log(noise.force_sd) + np.log(noise.correlation_s))
-
     within = disturbance_range(load_fish("zheng-2021-a"))
     start = NoiseModel(np.array([0.001]), 3e-3, 1e-4, 1.0)
-    found = fit_noise(grows, start, within, 120)
-    assert found.force_sd == pytest.approx(0.0196, rel=0.02)
+    found = fit_noise(toy((5.0, 1e-4, 100.0)), start, within)
+    assert found.force_sd == within.force[1]
+    assert found.moment_sd == pytest.approx(1e-4, rel=0.03)
     assert found.correlation_s == within.correlation[1]
+
+
+def test_no_number_of_the_disturbance_could_be_better():
+    """On a real filter: a little more or less of any has a smaller likelihood."""
+    setup = Setup(runs=4)
+    problem = SeriesProblem(simulate(setup), paths=PATHS)
+    filtered = problem.filtered(problem.start, setup.noise, keep_slopes=True)
+
+    def replay(noise):
+        return problem.lean_filter.replay(filtered, setup.noise, noise)
+
+    found = fit_noise(replay, replace(setup.noise, force_sd=0.01, correlation_s=0.2), WIDE)
+    best = replay(found).log_likelihood
+    for name in ("force_sd", "moment_sd", "correlation_s"):
+        for factor in (0.8, 1.25):
+            other = replace(found, **{name: factor * getattr(found, name)})
+            assert replay(other).log_likelihood < best

@@ -117,7 +117,7 @@ def test_a_tail_that_is_late_does_not_put_the_filter_out_of_step():
     turns = [np.einsum("tc,tc->t", r.gains[:, -1], np.nan_to_num(r.slopes.raw)) for r in results]
     assert np.abs(np.concatenate(turns)).max() <= LARGEST_TURN + 1e-12
     assert min(r.shares.min() for r in results) < 0.5
-    again = early.lean_filter.replay(results, random_walk, random_walk)
+    again = early.lean_filter.replay(results, random_walk, random_walk).log_likelihood
     assert again == pytest.approx(sum(r.log_likelihood for r in results), rel=1e-9)
     free = early.filtered(problem.start, replace(random_walk, phase_sd=0.3))
     assert min(r.shares.min() for r in free) == 1.0, "relaxed noise finds a phase wherever it is"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +30,7 @@ from fish_env.data.importing import (
 )
 from fish_env.data.importing.correction import corrected
 from fish_env.data.importing.grouping import matches, safe_id
+from fish_env.data.importing.guess import UNKNOWN_START
 from fish_env.data.importing.plan import Content, Entry
 from fish_env.data.importing.writing import used_content
 from fish_env.data.writing import check_free
@@ -53,6 +54,7 @@ class Told:
         frame: "ned" or "enu".
         name: Name of the dataset.
         run_column: Column that tells runs apart.
+        start: "rest" or "unknown", for all runs.
     """
 
     fish: str | None = None
@@ -116,6 +118,9 @@ def import_logs(
         return _write(console, plan, imported, out)
     name = told.name or safe_id(out.resolve().name)
     guess = guess_mapping(sources, name, told.applied({}).get("fish"), told.frame)
+    if told.start is not None:
+        assumed = tuple(words for words in guess.assumptions if words != UNKNOWN_START)
+        guess = replace(guess, assumptions=assumed)
     if ask is not None and not yes:
         return _converse(console, guess, told.applied(guess.content), sources, out, ask)
     content = told.applied(guess.content)

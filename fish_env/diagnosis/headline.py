@@ -12,6 +12,8 @@ from fish_env.inference.policy import POLICY
 Answer = Mapping[str, Any]
 EXPERIMENT_FILE = "next_experiment.csv"
 MOST_NAMED = 3
+LONGEST_FIX = 160
+"""Longest lines to write that the next step quotes, in characters."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,8 @@ def many_fitted(answer: Answer) -> bool:
 
 def _verdict(answer: Answer) -> str:
     if answer["verdict"] == "inputs":
-        told = " ".join(fault["words"] for fault in answer.get("inputs", ()) if fault["decisive"])
+        faults = [fault for fault in answer.get("inputs", ()) if fault["decisive"]]
+        told = " ".join(fault["words"].partition(" Write ")[0] for fault in faults)
         rest = _verdict({**answer, "verdict": answer.get("verdict_once_corrected", "no_misfit")})
         return f"{told or 'The data or their description are wrong.'} Once corrected: {rest}"
     named = _joined(map(_cause, answer["causes"]), "and")
@@ -141,9 +144,11 @@ def _next_step(answer: Answer) -> str:
             swim += f"; {seen}" + (f" and {more} more" if more > 0 and "show" in seen else "")
         swim += "."
     if verdict == "inputs":
-        faults = [f for f in answer.get("inputs", ()) if f["decisive"]]
-        fixes = "; ".join(f"`{fault['fix']}`" for fault in faults)
-        return f"correct dataset.yaml ({fixes}) and diagnose again."
+        fixes = [f["fix"] for f in answer.get("inputs", ()) if f["decisive"] and f["fix"]]
+        written = "; ".join(f"`{fix}`" for fix in fixes)
+        if len(written) > LONGEST_FIX:
+            written = "`fix` under `inputs` in diagnosis.json"
+        return f"write {written or 'what is right'} into dataset.yaml and diagnose again."
     if answer.get("quick") and verdict in ("outside_library", "partial"):
         return "diagnose again without --quick."
     if verdict == "ambiguous":

@@ -203,7 +203,7 @@ def _notes(
         if commands is None:
             notes.append("tail and block are not in the file and drawn at rest")
         elif tail_phase is None:
-            notes.append("tail drawn as commanded, from an unknown phase")
+            notes.append("the tail is drawn as commanded, from an unknown phase")
         else:
-            notes.append("tail drawn as commanded")
+            notes.append("the tail is drawn as commanded")
     return tuple(notes)

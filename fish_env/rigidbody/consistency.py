@@ -239,7 +239,7 @@ def _words(
         other = f", or {LOOKS_ALIKE[effect]}" if effect in LOOKS_ALIKE else ""
         return f"{effect}{other}: the channels contradict each other by {', '.join(sizes)}."
     limits = [f"{name} {e.detectable:.2g} {_unit(e)}".rstrip() for name, e in parameters.items()]
-    return f"{effect}: not seen; found with power 0.8 would have been {', '.join(limits)}."
+    return f"{effect}: not seen; a size of {', '.join(limits)} is found with power 0.8."
 
 
 def _unit(estimate: Estimate) -> str:

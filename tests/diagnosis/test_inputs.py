@@ -226,9 +226,9 @@ def test_the_answer_says_it_under_every_verdict():
     quiet = {"gain": None, "causes": [], "budget": None, "preconditions": [], "unexplained": [],
              "alternatives": []}  # fmt: skip
     answer = {**quiet, "inputs": entries, "verdict_once_corrected": "no_misfit"}
-    bound = headline({**answer, "verdict": "inputs"}).verdict
-    assert bound.startswith("r has the wrong sign. Write `channels: {r: {unit: rad/s, sign: -1}}`")
-    assert "Once corrected: No model error is detectable" in bound
+    bound = headline({**answer, "verdict": "inputs"})
+    assert bound.verdict.startswith("r has the wrong sign. Once corrected: No model error")
+    assert bound.next_step.startswith("write `channels: {r: {unit: rad/s, sign: -1}}` into")
     assert "channels: {r: {unit: rad/s, sign: -1}}" in input_checks(answer, None, None)
     assert input_checks({"inputs": []}, None, None) == ""
 

@@ -70,6 +70,13 @@ def test_nothing_is_asked_of_a_network_and_nothing_breaks_out(full):
     assert "three.js authors" in page
 
 
+def test_bars_are_told_apart_without_colour(full):
+    page, _ = full
+    misfit = page[page.index('id="channels"') :].partition("</svg>")[0]
+    assert "<pattern" in misfit
+    assert "stroke: var(--rf-card)" in misfit
+
+
 def test_the_network_check_notices_a_link():
     assert NETWORK.search('<img src="https://example.org/a.png">')
     assert not NETWORK.search('<use href="#a"/><path clip-path="url(#b)"/>')

@@ -53,6 +53,9 @@ class Candidate:
     frame: str = ""
 
 
+UNKNOWN_START = "start and tail_phase: estimated from each run, unless --start rest is given"
+
+
 @dataclass(frozen=True)
 class Guess:
     """A guessed mapping.
@@ -114,7 +117,7 @@ def guess_mapping(
     }
     if commands:
         said.append("a command holds until the next (between: hold; or linear)")
-    said.append("start and tail_phase: estimated from each run, unless --start rest is given")
+    said.append(UNKNOWN_START)
     return Guess(content, tuple(said), _left_out(kinds, chosen.values(), times, run_column))
 
 

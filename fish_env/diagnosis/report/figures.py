@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 BASELINE, EXTENDED = VERMILION, BLUE
+HATCH = "#fefefe"
+"""Colour of hatches. The page gives them the colour of its ground; it makes white transparent."""
 Plain = Mapping[str, Any]
 MAPS, PITCH = 4, 1.15
 """Maps of regimes beside each other, and from one to the next in widths of a map."""
@@ -106,7 +108,7 @@ def draw_run(run: RunSeries, window_s: float, album: Album) -> Path:
             bottom.set_xlabel("time (s)")
             bottom.tick_params(labelbottom=True)
         handles, words = axes[0, 0].get_legend_handles_labels()
-        figure.legend(handles, words, loc="outside upper center", ncols=3)
+        figure.legend(handles, words, loc="outside upper left", ncols=3)
         return saved(figure, album, f"run_{file_name(run.id)}")
 
 
@@ -190,7 +192,7 @@ def draw_ranking(answer: Plain, album: Album) -> Path:
         for i, (row, gain) in enumerate(zip(rows, gains, strict=True)):
             found = row["name"] in accepted
             colour, hatch = (EXTENDED, "") if found else ("#8a8a8a", "//")
-            ax.barh(i, gain, height=0.66, ec="white", lw=0, color=colour, hatch=hatch)
+            ax.barh(i, gain, height=0.66, ec=HATCH, lw=0, color=colour, hatch=hatch)
             if row.get("ci95") and over_runs:
                 ax.plot(row["ci95"], [i, i], color=MEASURED, lw=1.4, marker="|")
         names = [row["name"].removeprefix(PARAMETER) for row in rows]
@@ -229,7 +231,7 @@ def draw_misfit(answer: Plain, album: Album) -> Path:
         width = 0.38 if extended else 0.6
         shift = width / 2 if extended else 0.0
         before = [pair["baseline"] for pair in pairs]
-        ax.bar(place - shift, before, width, color=BASELINE, hatch="//", ec="white", lw=0,
+        ax.bar(place - shift, before, width, color=BASELINE, hatch="//", ec=HATCH, lw=0,
                label="refitted baseline")  # fmt: skip
         if extended:
             after = [pair["extended"] for pair in pairs]
@@ -238,8 +240,8 @@ def draw_misfit(answer: Plain, album: Album) -> Path:
         ax.set_xticks(place, [name.replace("_", " ") for name in names])
         ax.set_ylabel("error (noise sd)")
         ax.grid(axis="x", visible=False)
-        ax.legend(loc="upper right", ncols=3)
-        ax.set_ylim(0.0, 1.25 * max([*before, 1.0]))
+        figure.legend(loc="outside upper left", ncols=3)
+        ax.set_ylim(0.0, 1.05 * max([*before, 1.0]))
         return saved(figure, album, "misfit")
 
 
@@ -258,7 +260,7 @@ def draw_gain(runs: Mapping[str, tuple[float, float]], album: Album) -> Path:
         ax.set_ylim(len(runs) - 0.5, -0.5)
         ax.axvline(100.0, color=MEASURED, lw=1.0, ls=":")
         ax.set_xlabel("fit of predictions over windows (%, 100: perfect)")
-        figure.legend(loc="outside upper center", ncols=2)
+        figure.legend(loc="outside upper left", ncols=2)
         return saved(figure, album, "gain")
 
 
@@ -307,5 +309,5 @@ def draw_steady(series: SteadySeries, album: Album) -> Path:
             ax.set_xlabel(f"measured {label(name)}")
             ax.set_ylabel(f"predicted {label(name)}")
         handles, words = axes[0].get_legend_handles_labels()
-        figure.legend(handles, words, loc="outside upper center", ncols=4)
+        figure.legend(handles, words, loc="outside upper left", ncols=2)
         return saved(figure, album, "steady")

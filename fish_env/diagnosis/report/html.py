@@ -11,6 +11,7 @@ THEMED = {
     "#000000": "currentColor",
     "#222222": "currentColor",
     "#ffffff": "none",
+    "#fefefe": "var(--rf-card)",
     "#dddddd": "var(--rf-rule)",
     "#0072b2": "var(--rp-extended)",
     "#d55e00": "var(--rp-baseline)",
@@ -21,6 +22,11 @@ THEMED = {
 def text(value: object) -> str:
     """Any value, safe inside HTML."""
     return html.escape(str(value))
+
+
+def marked(words: str) -> str:
+    """A sentence whose parts between backticks are code."""
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", text(words))
 
 
 def number(value: float | None) -> str:

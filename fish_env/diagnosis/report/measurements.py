@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from fish_env.diagnosis.report.figures import Album
-from fish_env.diagnosis.report.html import folded, number, section, table, text
+from fish_env.diagnosis.report.html import folded, marked, number, section, table, text
 from fish_env.diagnosis.report.series import ReportSeries, SteadySeries
 from fish_env.diagnosis.report.units import shown_unit
 
@@ -15,21 +15,21 @@ Answer = Mapping[str, Any]
 
 def input_checks(answer: Answer, series: ReportSeries | SteadySeries | None, album: Album) -> str:
     """What is wrong with the data or their description, and the line that puts it right."""
-    rows = []
-    for fault in answer.get("inputs", ()):
-        gain, interval = fault["gain"], fault["ci95"]
-        value = "–" if fault["value"] is None else f"{number(fault['value'])} {fault['unit']}"
-        rows.append(
-            (
-                text(fault["target"]), text(fault["kind"].replace("_", " ")), text(value),
-                f"{number(interval[0])} to {number(interval[1])}" if interval else "–",
-                f"<code>{text(fault['fix'])}</code>",
-                f"{number(gain['before'])} to {number(gain['after'])}" if gain else "–",
-                "certain" if fault["decisive"] else "possible",
-            )
-        )  # fmt: skip
-    heads = ("what", "mistake", "value", "95 % interval", "write", "disagreement", "standing")
-    return section("Input checks", table(heads, rows) if rows else "", key="inputs")
+    faults = answer.get("inputs", ())
+    if not faults:
+        return ""
+    sentences = "".join(f"<li>{marked(fault['words'])}</li>" for fault in faults)
+    lines = [
+        (
+            text(fault["target"]), f"<code>{text(fault['fix'])}</code>",
+            "certain" if fault["decisive"] else "possible",
+        )
+        for fault in faults if fault["fix"]
+    ]  # fmt: skip
+    written = table(("what", "write into dataset.yaml", "standing"), lines)
+    return section(
+        "Input checks", f"<ul>{sentences}</ul>", folded("Lines to write", written), key="inputs"
+    )
 
 
 def measurements(answer: Answer, series: ReportSeries | SteadySeries | None, album: Album) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fish_env.diagnosis.report.figures import BASELINE, EXTENDED, LOOKS, Album, saved, sheet
+from fish_env.diagnosis.report.figures import BASELINE, EXTENDED, HATCH, LOOKS, Album, saved, sheet
 from fish_env.diagnosis.report.series import RunSeries
 from fish_env.diagnosis.report.units import label, shown_unit
 from fish_env.inference.hypotheses import PARAMETER
@@ -28,6 +28,7 @@ BUDGET_NAMES = {
     "coefficients": "re-estimated coefficients",
     "run_variation": "run-to-run variation",
 }
+RESIDUAL = "residual"
 SHADES = (
     (EXTENDED, ""), (BASELINE, "//"), ("#009e73", ".."), ("#cc79a7", "xx"), ("#e69f00", "--"),
 )  # fmt: skip
@@ -64,7 +65,7 @@ def draw_paths(runs: Sequence[RunSeries], album: Album) -> Path:
         for ax, name in zip(axes[:, 0], names, strict=True):
             ax.set_ylabel(name)
         handles, words = axes[0, 0].get_legend_handles_labels()
-        figure.legend(handles, words, loc="outside upper center", ncols=3)
+        figure.legend(handles, words, loc="outside upper left", ncols=3)
         return saved(figure, album, "paths")
 
 
@@ -99,21 +100,21 @@ def draw_budget(budget: Plain, album: Album) -> Path:
     parts = {item["name"].removeprefix(PARAMETER): item["share"] for item in budget["shares"]}
     shares = {BUDGET_NAMES.get(n, n): max(v, 0.0) for n, v in parts.items()}
     shares = dict(sorted(shares.items(), key=lambda pair: -pair[1]))
-    shares["left"] = max(budget["left"], 0.0)
+    shares[RESIDUAL] = max(budget["left"], 0.0)
     total, begin = sum(shares.values()) or 1.0, 0.0
     with sheet(7.0, 1.1 + 0.2 * -(-len(shares) // 2)) as figure:
         ax = figure.subplots()
         for (name, share), (colour, hatch) in zip(shares.items(), cycle(SHADES)):
-            if name == "left":
+            if name == RESIDUAL:
                 colour, hatch = "#dddddd", ""
             percent = 100.0 * share / total
-            ax.barh(0, percent, left=begin, ec="white", lw=0.8, height=0.8,
+            ax.barh(0, percent, left=begin, ec=HATCH, lw=0.8, height=0.8,
                     label=f"{name}: {percent:.0f} %", color=colour, hatch=hatch)  # fmt: skip
             begin += percent
         ax.set_xlim(0.0, 100.0)
         ax.set_yticks([])
         ax.spines["left"].set_visible(False)
         ax.grid(False)
-        ax.set_xlabel("share of the error of the original simulation (%)")
+        ax.set_xlabel("share of the error (%)")
         figure.legend(loc="outside upper left", ncols=2)
         return saved(figure, album, "budget")

@@ -13,6 +13,7 @@ from fish_env.diagnosis.report.figures import Album
 from fish_env.diagnosis.report.html import (
     figure,
     folded,
+    marked,
     number,
     paragraph,
     section,
@@ -41,7 +42,7 @@ def verdict(answer: Answer, series: Series, album: Album) -> str:
     return (
         f'<header class="rp-verdict rp-{text(name)}"><p class="rp-facts">{text(facts(answer))}</p>'
         f"<h1>{text(said.verdict)}</h1>{paragraph(said.closed, 'rp-words')}"
-        f'<p class="rp-words"><b>Next:</b> {text(said.next_step)}</p>'
+        f'<p class="rp-words"><b>Next:</b> {marked(said.next_step)}</p>'
         f"{paragraph(said.caveats, 'rp-note')}</header>"
     )
 

@@ -125,7 +125,8 @@ Robofish.Replay = class {
     for (const track of this.tracks) {
       for (const note of track.notes) owners.set(note, [...(owners.get(note) ?? []), track.name]);
     }
-    return [...owners].map(([note, names]) => `${names.join(", ")}: ${note}.`).join(" ");
+    const sentence = (words) => words[0].toUpperCase() + words.slice(1);
+    return [...owners].map(([note, names]) => `${sentence(note)} (${names.join(", ")}).`).join(" ");
   }
 
   fillTracks(dark) {

@@ -67,7 +67,7 @@ benchmark-loop: setup  ## measure hidden fish, diagnose, learn on what was found
 	$(BIN)/python -m scripts.measure_to_policy
 
 check-release: setup  ## build the wheel twice and compare, and go through the checklists of a release
-	$(BIN)/python -m scripts.check_wheels
+	$(BIN)/python -m scripts.check_wheels --record
 	$(BIN)/python -m scripts.check_project
 
 walks: setup  ## go from raw logs and from nothing to an answer, as the pages say, and time it

@@ -2,18 +2,23 @@
 
 Each copy holds the files under version control, as they are in the working tree, with other times
 and in a folder of another name. So neither times nor places may stand in the wheel.
+`--record` writes the digest into results/wheels-<date>.json.
 """
 
 from __future__ import annotations
 
+import argparse
 import hashlib
 import os
+import platform
 import shutil
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 from zipfile import ZipFile
+
+from scripts.results import RESULTS, write_dated
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -69,6 +74,9 @@ def differences(one: Path, other: Path) -> list[str]:
 
 def main() -> int:
     """Builds twice, compares, and prints the digest."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--record", action="store_true", help="write a dated result")
+    told = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="wheels-") as folder:
         wheels = []
         for name, time_s in (("first", 1_000_000_000.0), ("second-copy", 1_700_000_000.0)):
@@ -76,12 +84,19 @@ def main() -> int:
             copy_of(ROOT, tree, time_s)
             wheels.append(build(tree, Path(folder) / f"{name}-wheel"))
         found = differences(*wheels)
-        if found:
-            print("The wheels of two clean builds differ in:", *found, sep="\n  ")
-            return 1
-        digest = hashlib.sha256(wheels[0].read_bytes()).hexdigest()
+        content = wheels[0].read_bytes()
+    digest = hashlib.sha256(content).hexdigest()
+    if found:
+        print("The wheels of two clean builds differ in:", *found, sep="\n  ")
+    else:
         print(f"{wheels[0].name}: two clean builds give the same bytes, sha256 {digest}")
-    return 0
+    if told.record:
+        result = {
+            "wheel": wheels[0].name, "same_bytes": not found, "differences": found,
+            "bytes": len(content), "sha256": digest, "python": platform.python_version(),
+        }  # fmt: skip
+        print(write_dated(RESULTS, "wheels", result))
+    return 1 if found else 0
 
 
 if __name__ == "__main__":

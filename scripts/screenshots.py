@@ -15,8 +15,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-PHONE_PX = 390
-DESKTOP_PX = (1280, 2400)
+WIDTHS_PX = {"desktop": 1280, "phone": 390}
 BROWSERS = ("chromium", "chromium-browser", "google-chrome")
 
 
@@ -50,13 +49,35 @@ def browse(page: str, *options: str) -> None:
         subprocess.run(command, check=True, capture_output=True, timeout=180)
 
 
+def framed(page: str, picture: Path, width: int, height: int) -> None:
+    """A picture of a page in a frame.
+
+    A window of Chromium is at least 500 px wide, and its pictures of WebGL are empty.
+
+    Args:
+        page: address.
+        picture: file to write.
+        width: of the frame (px).
+        height: of the frame (px).
+    """
+    with tempfile.TemporaryDirectory(prefix="frame-") as folder:
+        frame = Path(folder) / "frame.html"
+        frame.write_text(
+            f'<body style="margin:0"><iframe src="{page}" width="{width}" height="{height}"'
+            ' style="border:0"></iframe>',
+            encoding="utf-8",
+        )
+        options = ("--allow-file-access-from-files", f"--window-size={max(width, 500)},{height}")
+        browse(frame.as_uri(), *options, f"--screenshot={picture}")
+
+
 def pictures(page: Path, out: Path, height: int = 5000) -> list[Path]:
     """Makes the pictures of one page.
 
     Args:
         page: HTML file.
         out: folder; the names begin with that of the page and of its folder.
-        height: of the picture of a phone (px).
+        height: of the pictures of a desktop and of a phone (px).
 
     Returns:
         The files.
@@ -64,18 +85,8 @@ def pictures(page: Path, out: Path, height: int = 5000) -> list[Path]:
     out.mkdir(parents=True, exist_ok=True)
     address = page.resolve().as_uri()
     stem = str(out.resolve() / f"{page.resolve().parent.name}-{page.stem}")
-    width, tall = DESKTOP_PX
-    browse(address, f"--window-size={width},{tall}", f"--screenshot={stem}-desktop.png")
-    # A window of Chromium is at least 500 px wide, so the phone is a frame in a page.
-    with tempfile.TemporaryDirectory(prefix="phone-") as folder:
-        frame = Path(folder) / "phone.html"
-        frame.write_text(
-            f'<body style="margin:0"><iframe src="{address}" width="{PHONE_PX}" height="{height}"'
-            ' style="border:0"></iframe>',
-            encoding="utf-8",
-        )
-        options = (f"--window-size=500,{height}", "--allow-file-access-from-files")
-        browse(frame.as_uri(), *options, f"--screenshot={stem}-phone.png")
+    for name, width in WIDTHS_PX.items():
+        framed(address, Path(f"{stem}-{name}.png"), width, height)
     browse(address, "--no-pdf-header-footer", f"--print-to-pdf={stem}.pdf")
     for name, options in {"print": (), "grey": ("-gray",)}.items():
         command = [program("pdftoppm"), "-r", "70", "-png", *options, f"{stem}.pdf"]
@@ -88,7 +99,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("pages", nargs="+", type=Path, metavar="PAGE", help="HTML files")
     parser.add_argument("--out", type=Path, default=Path("out/screenshots"))
-    parser.add_argument("--height", type=int, default=5000, help="of the phone's picture (px)")
+    parser.add_argument("--height", type=int, default=5000, help="of pictures (px)")
     told = parser.parse_args()
     for page in told.pages:
         print(*pictures(page, told.out, told.height), sep="\n")

@@ -38,9 +38,11 @@ def finished(own: Fit) -> Fit:
         ):
             break
         again = fit(own.problem, own.effects, own.point, own.noise, own.released, rounds=2)
-        if again.objective > own.objective:
+        gained = own.objective - again.objective
+        if gained > 0.0:
+            own = again
+        if gained < POLICY.converged:
             break
-        own = again
     return own
 
 

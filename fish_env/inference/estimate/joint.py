@@ -34,8 +34,10 @@ from fish_env.inference.problem import Problem
 SHARES = (1.0, 0.4)
 DAMPINGS = (0.03, 0.3, 3.0, 30.0)
 """Of a step that is too long: parts of it first, then damped ones (Marquardt, 1963)."""
-ENOUGH = 1.0
-"""Decrease of -2 log likelihood below which steps follow its roughness."""
+ENOUGH, FORESEEN = 1.0, 0.1
+"""Decrease of -2 log likelihood below which steps follow its roughness, and the share of what the
+linear model foresees below which it is of no use: where one run has a sharp corner, most of what is
+foreseen lies beyond it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +103,7 @@ def descend_jointly(
         if better is None:
             break
         gained, at = at.value - better.value, better
-        if gained < ENOUGH:
+        if gained < max(ENOUGH, FORESEEN * predicted):
             break
     at = _agreed(at, free, noise)
     marginal = marginal_of(at.problem, free.unpack(at.vector), noise, at.filtered)

@@ -6,7 +6,9 @@ Robofish.Stage = class {
     this.holder = holder;
     this.shape = shape;
     this.follow = false;
-    this.renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true });
+    // Keeps what was drawn, for printing and pictures of the page.
+    const options = { antialias: true, alpha: true, preserveDrawingBuffer: true };
+    this.renderer = new THREE.WebGLRenderer(options);
     this.renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
     this.renderer.domElement.setAttribute("role", "img");
     this.renderer.domElement.setAttribute("aria-label", "fish swimming in three dimensions");

@@ -72,7 +72,7 @@ class Result:
     def _repr_html_(self) -> str:
         """The title, the findings and the table."""
         listed = "".join(f"<li>{escape(sentence)}</li>" for sentence in self.sentences())
-        table = self.to_dataframe().to_html(index=False, max_rows=20)
+        table = self.to_dataframe().to_html(index=False, max_rows=20, float_format="{:.4g}".format)
         return f"<p><b>{escape(self.title())}</b></p><ul>{listed}</ul>{table}"
 
 

@@ -201,15 +201,15 @@ def _searched(
         spread=present.spread,
     )
     start = max((present, small), key=value)
-    found = fit_noise(replay, start, plausible, largest_sensor_sd)
+    found = fit_noise(replay, start, plausible, largest_sensor_sd, False)
     without, jittery = found, jitter_worth_fitting(value, found, plausible)
     if jittery.jitter_sd != found.jitter_sd:
-        found = fit_noise(replay, jittery, plausible, largest_sensor_sd)
+        found = fit_noise(replay, jittery, plausible, largest_sensor_sd, False)
     if found.jitter_sd and plausible.left_by(found):
         # Something is missing, and jitter could absorb it.
         if without.jitter_sd:
             still = replace(without, jitter_sd=0.0)
-            without = fit_noise(replay, still, plausible, largest_sensor_sd)
+            without = fit_noise(replay, still, plausible, largest_sensor_sd, False)
         found = without
     if plausible.left_by(found):
         # What is missing shows in whitened residuals only if the noise is as large as it is.
@@ -244,6 +244,7 @@ def fit_noise(
     start: NoiseModel,
     within: DisturbanceRange,
     largest_sensor_sd: FloatArray | None = None,
+    to_the_end: bool = True,
 ) -> NoiseModel:
     """Maximum likelihood of the noise model, from a start.
 
@@ -254,6 +255,7 @@ def fit_noise(
         within: what the disturbance may be.
         largest_sensor_sd: (C,) bound on each channel's noise; the noise is then fitted too.
             Without it the sensors keep theirs: a misfit of the model must not pass for noise.
+        to_the_end: search to the end, also where a disturbance is far beyond its range.
     """
     names = ["force_sd", "moment_sd", "correlation_s"]
     limits = [within.force, within.moment, within.correlation]
@@ -275,4 +277,4 @@ def fit_noise(
     lower, upper = np.log(limits).T
     known = [getattr(start, name) for name in names] + (list(start.sensor_sd) if sensors else [])
     begin = np.clip(np.log(known), lower, upper)
-    return model(climb(lambda x: replay(model(x)), begin, lower, upper, GAIN))
+    return model(climb(lambda x: replay(model(x)), begin, lower, upper, GAIN, 0 if to_the_end else 2))

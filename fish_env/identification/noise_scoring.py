@@ -22,6 +22,8 @@ from fish_env.inference.estimate.box_qp import minimise_in_box
 STEP = 1e-3
 """By which a parameter, the logarithm of a size, is moved for a difference."""
 MOST_STEPS = 8
+BEYOND = 50.0
+"""Log likelihood per unit of a logarithm with which a parameter pushes beyond its bound."""
 LONGEST = 2.0
 """Of a step in a logarithm: from a quiet tank to one at the limit in two or three."""
 
@@ -47,8 +49,12 @@ def climb(
     lower: FloatArray,
     upper: FloatArray,
     least_gain: float,
+    watched: int = 0,
 ) -> FloatArray:
     """Parameters (n,) of largest likelihood within bounds, from a start.
+
+    The search ends as soon as one of the watched parameters is seen to belong beyond its bound:
+    where the others would be the largest is then of no use.
 
     Args:
         replay: of parameters (n,), logarithms of sizes.
@@ -56,10 +62,13 @@ def climb(
         lower: (n,) bounds.
         upper: (n,) bounds.
         least_gain: log likelihood for which a step is worth while.
+        watched: how many of the first parameters are watched.
     """
     at, here = start, replay(start)
     for _ in range(MOST_STEPS):
         system = _system(replay, at, here, upper)
+        if np.any((at >= upper)[:watched] & (system.score[:watched] > BEYOND)):
+            break
         low, high = np.maximum(lower - at, -LONGEST), np.minimum(upper - at, LONGEST)
         bold = minimise_in_box(system.expected, -system.score, low, high).step
         if system.gain(bold) < least_gain:

@@ -80,7 +80,10 @@ measure-export: setup  ## compare exported policies with the NumPy policy, over 
 	$(BIN)/python -m scripts.measure_export
 
 clients: $(CLIENTS)/.ready $(CLEANRL)/.ready  ## run libraries of reinforcement learning on the environment
-	CLEANRL_PYTHON=$(CURDIR)/$(CLEANRL)/bin/python $(CLIENTS)/bin/python -m pytest tests/clients/client_*.py
+	mkdir -p out
+	CLEANRL_PYTHON=$(CURDIR)/$(CLEANRL)/bin/python $(CLIENTS)/bin/python -m pytest \
+	  --junitxml=out/clients.xml tests/clients/client_*.py
+	$(CLIENTS)/bin/python -m scripts.record_clients out/clients.xml
 
 FUZZ_EXAMPLES ?= 2000
 fuzz: setup  ## try FUZZ_EXAMPLES hostile inputs in each test of the readers (2000: about an hour)

@@ -70,7 +70,7 @@ def _run_sentences(comparison: RunsComparison) -> list[str]:
         overall = mean_errors(comparison.runs)
         worst = max(paths, key=lambda run: float(np.nanmax(run.path_error_m)))
         sentences.append(
-            f"path: over {len(paths)} runs the simulated position is off by "
+            f"path: over {len(paths)} run{'s' * (len(paths) > 1)} the simulated position is off by "
             f"{overall['path_error_mean_m']:.3g} m on average, and by "
             f"{overall['path_error_largest_m']:.3g} m at most (run {worst.id})."
         )

@@ -69,6 +69,8 @@ def _draw_channel(ax: Axes, run: RunComparison, name: str) -> None:
     ax.plot(run.time_s, factor * run.measured[name], ".", ms=2.5, color=MEASURED, label="measured")
     ax.plot(run.time_s, factor * run.simulated[name], color=SIMULATED, label="simulated")
     ax.set_ylabel(label(name))
+    if name == "z":
+        ax.invert_yaxis()  # depth downwards, as in reports
     fit = run.errors[name].fit_percent
     ax.set_title(f"fit {fit:.0f} %" if np.isfinite(fit) else "", loc="right", fontsize=8, pad=2)
 

@@ -1,0 +1,54 @@
+"""Writes results/clients-<date>.json from the tests of `make clients`.
+
+Run it with the Python of the libraries: `.venv-clients/bin/python -m scripts.record_clients FILE`,
+where FILE is what `pytest --junitxml=FILE tests/clients/client_*.py` wrote.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter, defaultdict
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+from scripts.bench.harness import machine, versions
+from scripts.results import RESULTS, write_dated
+
+LIBRARIES = (
+    "gymnasium", "stable-baselines3", "rl_zoo3", "ray", "tianshou", "torchrl", "minari", "d3rlpy",
+    "torch", "numpy",
+)  # fmt: skip
+
+
+def outcomes(file: Path) -> tuple[dict[str, dict[str, int]], float]:
+    """How many tests of each file passed, failed or were skipped, and the seconds of all.
+
+    Args:
+        file: report of pytest in JUnit's format.
+    """
+    counts: defaultdict[str, Counter[str]] = defaultdict(Counter)
+    root, seconds = ElementTree.parse(file).getroot(), 0.0
+    for case in root.iter("testcase"):
+        found = {child.tag for child in case} & {"failure", "error", "skipped"}
+        counts[case.get("classname", "?").rpartition(".")[2]][min(found, default="passed")] += 1
+        seconds += float(case.get("time", 0.0))
+    return {name: dict(counter) for name, counter in sorted(counts.items())}, round(seconds, 1)
+
+
+def main() -> None:
+    """Reads the report and writes the result."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("file", type=Path, help="report of pytest in JUnit's format")
+    told = parser.parse_args()
+    tests, seconds = outcomes(told.file)
+    content: dict[str, Any] = {
+        "tests": tests, "seconds": seconds, "versions": versions(LIBRARIES), "machine": machine(),
+        "package": metadata.version("robotic-fish"),
+    }  # fmt: skip
+    print(write_dated(RESULTS, "clients", content))
+
+
+if __name__ == "__main__":
+    main()

@@ -33,6 +33,8 @@ WINDOW = 30
 QUANTILE = 0.15
 GAIN = 0.1
 """The noise model is found when a step gains no more log likelihood."""
+FELT = 0.1
+"""Of the largest believable disturbance: how long a weaker one lasts no run tells."""
 LEAST_SENSOR_SHARE = 1e-3
 """Of the largest noise of a channel, the least one."""
 
@@ -106,6 +108,9 @@ class DisturbanceRange:
             found.append(f"a disturbing force of {1e3 * noise.force_sd:.0f} mN or more")
         if noise.moment_sd > 0.98 * self.moment[1]:
             found.append(f"a disturbing moment of {1e3 * noise.moment_sd:.2g} mN m or more")
+        strength = max(noise.force_sd / self.force[1], noise.moment_sd / self.moment[1])
+        if noise.correlation_s > 0.98 * self.correlation[1] and strength > FELT:
+            found.append(f"a disturbance that stays for {noise.correlation_s:.0f} s or more")
         return tuple(found)
 
 

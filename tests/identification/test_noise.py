@@ -101,3 +101,12 @@ def test_no_number_of_the_disturbance_could_be_better():
         for factor in (0.8, 1.25):
             other = replace(found, **{name: factor * getattr(found, name)})
             assert replay(other).log_likelihood < best
+
+
+def test_a_disturbance_that_never_ends_is_a_misfit_with_another_name():
+    within = disturbance_range(load_fish("zheng-2021-a"))
+    felt = NoiseModel(np.array([0.001]), 0.4 * within.force[1], 1e-5, within.correlation[1])
+    assert any("stays for 10 s" in words for words in within.left_by(felt))
+    assert not within.left_by(replace(felt, correlation_s=2.0))
+    faint = replace(felt, force_sd=0.02 * within.force[1])
+    assert not within.left_by(faint), "how long a faint one lasts no run tells"

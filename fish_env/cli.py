@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import atexit
 import gc
+import os
 import sys
 import warnings
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, NoReturn
 
 import typer
 from rich.console import Console
@@ -381,12 +382,22 @@ def _run() -> None:
         _complain("yellow", f"robofish: {error}")
         raise SystemExit(INTERRUPTED) from None
     except RoboticFishError as error:
+        if isinstance(error.__cause__, BrokenPipeError):
+            _leave_broken_pipe()
         _complain("red", f"robofish: {error}")
         raise SystemExit(2) from None
+    except BrokenPipeError:
+        _leave_broken_pipe()
     except OSError as error:
         named = f"{error.filename}: " if error.filename else ""
         _complain("red", f"robofish: {named}{error.strerror or error}")
         raise SystemExit(2) from None
+
+
+def _leave_broken_pipe() -> NoReturn:
+    """Ends quietly, as other programs do whose reader, such as `head`, has seen enough."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    raise SystemExit(1)
 
 
 def _complain(colour: str, text: str) -> None:

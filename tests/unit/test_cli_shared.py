@@ -3,6 +3,7 @@
 import io
 import json
 import shutil
+import subprocess
 import sys
 from importlib.metadata import version
 from pathlib import Path
@@ -139,3 +140,13 @@ def test_compare_leads_with_its_findings_and_names_diagnose(tmp_path, capsys):
     assert (status, err) == (0, "")
     assert 0 < out.index("•") < out.index("By condition") < out.index("robofish diagnose")
     assert "[/red]" in out
+
+
+def test_a_reader_that_has_seen_enough_is_no_error(tmp_path):
+    case = tmp_path / "case.json"
+    case.write_text(json.dumps({**CASE, "duration_s": 60.0}))
+    robofish = [sys.executable, "-m", "fish_env.cli", "simulate", str(case), "--rate", "100"]
+    with subprocess.Popen(robofish, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        process.stdout.readline()
+        process.stdout.close()
+        assert process.stderr.read() == b""

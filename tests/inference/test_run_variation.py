@@ -75,9 +75,19 @@ def test_what_all_runs_have_in_common_is_no_variation_unless_it_may_be_shared(se
     assert found.sd[1] == pytest.approx(np.sqrt(np.mean(values[:, 1] ** 2)), rel=0.2)
 
 
-def test_nothing_shared_is_far_beyond_the_usual():
-    far, _ = likelihood(0, (0.0, 0.0), mean=20.0)
-    assert fit_spread(far, variations(True)).sd[1] == pytest.approx(variations(True)[1].largest)
+def test_what_runs_share_far_beyond_the_usual_is_left_to_causes():
+    far, _ = likelihood(0, (0.0, 0.0), mean=8.0)
+    assert fit_spread(far, variations(True)).sd[1] == pytest.approx(1.0)
+    near, _ = likelihood(0, (0.0, 0.0), mean=2.0)
+    assert fit_spread(near, variations(True)).sd[1] > 1.5
+
+
+def test_what_differs_by_much_about_something_shared_has_a_large_spread():
+    """As do sensors that are fixed anew before every run; but no spread is beyond its limit."""
+    far, values = likelihood(0, (0.0, 1.8), mean=8.0)
+    assert fit_spread(far, variations(True)).sd[1] == pytest.approx(values[:, 1].std(), rel=0.2)
+    wild, _ = likelihood(0, (0.0, 9.0), mean=20.0)
+    assert fit_spread(wild, variations(True)).sd[1] == pytest.approx(variations(True)[1].largest)
 
 
 @pytest.mark.parametrize(("mean", "taken"), [(-1.5, True), (1.5, False)])

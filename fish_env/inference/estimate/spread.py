@@ -164,7 +164,9 @@ def fit_spread(likelihood: Likelihood, variations: Sequence[RunVariation]) -> Sp
 
     Spreads are added one at a time, the most indicated first, while one gains enough. The prior of
     each is half-normal with the usual spread as its scale: what is far beyond it has to be plain.
-    What cannot be negative is left out where it would be: something else is then meant.
+    What cannot be negative is left out where it would be: something else is then meant. What runs
+    share is a cause where it is far beyond the usual: the spread is then no larger than runs differ
+    by, or than is usual, and what that leaves shows.
 
     Args:
         likelihood: of spreads in units of the usual ones.
@@ -191,8 +193,26 @@ def fit_spread(likelihood: Likelihood, variations: Sequence[RunVariation]) -> Sp
             refused |= {*np.flatnonzero(wrong).tolist()}
             active = [k for k in active if k not in refused]
             sd, best = _largest(likelihood, largest, active, sd) if active else (0.0 * sd, none)
+    limited = _without_causes(likelihood.predicted(sd)[0], variations, largest)
+    if np.any(sd > limited):
+        sd, best = _largest(likelihood, limited, active, np.minimum(sd, limited))
     values, errors = likelihood.predicted(sd)
     return Spread(sd * usual, none - best, values * usual, errors * usual)
+
+
+def _without_causes(
+    values: FloatArray, variations: Sequence[RunVariation], largest: FloatArray
+) -> FloatArray:
+    """(K,) largest spreads where what runs share is left to causes.
+
+    Args:
+        values: (R, K) predictions, in usual spreads.
+        variations: what the runs may differ in.
+        largest: (K,) largest spreads otherwise.
+    """
+    shared = np.array([variation.shared for variation in variations], bool)
+    cause = shared & (np.abs(values.mean(axis=0)) > POLICY.beyond_usual)
+    return np.where(cause, np.clip(values.std(axis=0), 1.0, largest), largest)
 
 
 def _negative(values: FloatArray, errors: FloatArray) -> BoolArray:

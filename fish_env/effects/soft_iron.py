@@ -22,7 +22,7 @@ EFFECT = Effect(
     parameters=(
         EffectParameter("amplitude", "rad", 0.0, 0.0, 0.5, (0.02, 0.2), "largest error"),
         EffectParameter(
-            "angle", "rad", 0.0, -7.0, 7.0, (-3.0, 3.0), "phase of the error", shapes=True
+            "angle", "rad", 0.0, -7.0, 7.0, (-np.pi, np.pi), "phase of the error", shapes=True
         ),
     ),
     geometry=iron,

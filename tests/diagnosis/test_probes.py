@@ -187,3 +187,9 @@ def test_a_tail_that_runs_out_of_step_is_probed_within_a_beat(name):
     assert mildest == pytest.approx(next_one / 3.0)
     beats = 2.0 * 30.0 * mildest * (1.0 if name == "frequency_scale" else 0.5 * 30.0)
     assert 2.0 * np.pi * beats < 1.0
+
+
+def test_a_compass_that_bends_is_seen_at_every_phase():
+    """Its error is a sine and a cosine of twice the heading: either may be all there is."""
+    (both,) = probes_of(catalogue()["soft_iron"])
+    assert sorted(probe["angle"] for probe in both) == [0.0, pytest.approx(np.pi / 2)]

@@ -282,4 +282,6 @@ def fit_noise(
     lower, upper = np.log(limits).T
     known = [getattr(start, name) for name in names] + (list(start.sensor_sd) if sensors else [])
     begin = np.clip(np.log(known), lower, upper)
-    return model(climb(lambda x: replay(model(x)), begin, lower, upper, GAIN, 0 if to_the_end else 2))
+    return model(
+        climb(lambda x: replay(model(x)), begin, lower, upper, GAIN, 0 if to_the_end else 2)
+    )

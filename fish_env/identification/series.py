@@ -225,8 +225,8 @@ class SeriesProblem(Problem):
 
     @property
     def starts_known(self) -> bool:
-        """Whether the tail's phase at the start of every run is known."""
-        return all(run.phase_known for run in self.runs)
+        """Whether the tail's phase at the start of every run is known, or its own number has it."""
+        return all(r.phase_known or (r.phase_found and self.drive.uneven) for r in self.runs)
 
     def relaxed_noise(self, noise: NoiseModel) -> NoiseModel:
         """The noise model with a random-walk tail phase."""
@@ -238,7 +238,7 @@ class SeriesProblem(Problem):
 
     def starting_grid(self, name: str) -> tuple[Mapping[str, float], ...]:
         """Sizes of an effect that drifts in phase, close enough to put it in step again."""
-        if not self.starts_known:
+        if not all(run.phase_known for run in self.runs):
             return self.drive.beside(self.known[name])
         return phase_grid(self.known[name], max(run.beats for run in self.runs))
 

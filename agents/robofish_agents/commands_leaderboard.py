@@ -1,4 +1,4 @@
-"""`robofish leaderboard`: how the agents compare on the frozen suites."""
+"""`robofish leaderboard`: results of the agents on the frozen suites."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The environment's part in `robofish demo`: a PID controller swims it, and says how well."""
+"""The part of `robofish demo` with the environment under a PID controller."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def _swims(env: Env, task: str, console: Console) -> dict[int, Episode]:
 
 
 def in_words(swims: list[Episode], config: EnvConfig) -> list[str]:
-    """Sentences that say how well depth, heading and speed were kept at the end of the swims."""
+    """Returns sentences with the errors of depth, heading and speed at the end of the episodes."""
     limits = config.tree["success"]
     count = sum(episode.succeeded for episode in swims)
     return [

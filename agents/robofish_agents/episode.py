@@ -19,11 +19,11 @@ Float32Array = npt.NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Episode:
-    """What happened after each control step.
+    """Values after each control step.
 
     Attributes:
         info: key of the environment's ``info`` -> (T,), SI and radians.
-        targets: (T, 5) actuator positions asked for (rad, rad, Hz, m, rad).
+        targets: (T, 5) targets of the actuators (rad, rad, Hz, m, rad).
         actuators: (T, 5) actuator positions reached.
         period_s: control period (s).
     """
@@ -39,11 +39,11 @@ class Episode:
 
     @property
     def succeeded(self) -> bool:
-        """It ended having held depth, heading and speed for the last ten seconds."""
+        """Whether depth, heading and speed were within limits in the last ten seconds."""
         return bool(self["is_success"][-1] == 1.0)
 
     def last(self, seconds: float) -> Episode:
-        """The end of the episode."""
+        """Values at the end of the episode."""
         steps = round(seconds / self.period_s)
         info = {key: values[-steps:] for key, values in self.info.items()}
         return Episode(info, self.targets[-steps:], self.actuators[-steps:], self.period_s)
@@ -61,7 +61,7 @@ def swim(
     report: Callable[[], object] = lambda: None,
     finished: Callable[[], bool] = lambda: False,
 ) -> Episode:
-    """Swims one episode to its end.
+    """Runs one episode to its end.
 
     Args:
         env: ``RoboticFish3D-v0``, with its time limit.
@@ -69,7 +69,7 @@ def swim(
         seed: seed of the episode.
         options: reset options, see the environment.
         report: called after each step.
-        finished: asked after each step whether to end the episode before its time.
+        finished: called after each step; True ends the episode early.
     """
     fish = env.unwrapped
     assert isinstance(fish, RoboticFish3DEnv)

@@ -1,4 +1,4 @@
-"""Keeps what a fish did while it swam, for films and replay pages."""
+"""Records the motion of a fish for videos and replay pages."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ REPLAY_HZ = 50.0
 
 
 class Keeper:
-    """Call it after each step of an episode.
+    """Records an episode; call it after each step.
 
     Args:
         fish: the environment below its wrappers.
-        scenes: whether to keep what a film needs.
+        scenes: whether to record what a video needs.
     """
 
     def __init__(self, fish: RoboticFish3DEnv, scenes: bool) -> None:
@@ -33,7 +33,7 @@ class Keeper:
         self._goals: list[list[float]] = []
 
     def __call__(self) -> None:
-        """Keep the present state."""
+        """Records the present state."""
         self._states.append(list(self.fish.state.values()))
         self._inputs.append(self.fish.actuators)
         scene = self.fish.scene()
@@ -43,7 +43,7 @@ class Keeper:
             self.scenes.append(scene)
 
     def trajectory(self) -> Trajectory:
-        """The motion, with straight lines between control steps."""
+        """Returns the motion, linear between control steps."""
         period = self.fish.options.config.control_period
         known = np.linspace(period, period * len(self._states), len(self._states))
         times = np.arange(known[0], known[-1], 1.0 / REPLAY_HZ)
@@ -60,7 +60,7 @@ class Keeper:
         )
 
     def write_video(self, path: Path) -> Path:
-        """Writes a film.
+        """Writes a video.
 
         Raises:
             MissingExtraError: what draws it is not installed.
@@ -81,7 +81,7 @@ class Keeper:
 
 
 def _one_sign(states: FloatArray, first: int) -> FloatArray:
-    """Quaternions that do not jump to their negatives, so that lines between them are short."""
+    """Returns quaternions without jumps to their negatives, for interpolation."""
     quaternions = states[:, first : first + 4]
     turns = np.sign((quaternions[1:] * quaternions[:-1]).sum(axis=1))
     quaternions[1:] *= np.cumprod(np.where(turns == 0, 1.0, turns))[:, None]

@@ -1,4 +1,4 @@
-"""Pictures of an episode: what it was to hold and how it held it, what the actuators did, where."""
+"""Pictures of an episode: goals and tracking, actuators, and path."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _GOAL: dict[str, Any] = {"color": BLACK, "ls": "--", "lw": 1.1, "label": "goal"}
 
 
 def draw_tracking(episode: Episode, config: EnvConfig, title: str, folder: Path, name: str) -> Path:
-    """Depth, heading and speed against their goals; the bands are what counts as success."""
+    """Draws depth, heading and speed with their goals; bands are the limits of success."""
     success = config.tree["success"]
     time, goal_speed = episode["time_s"], episode["goal_speed"]
     goal_heading = np.unwrap(episode["goal_heading"])
@@ -64,7 +64,7 @@ def _against_goal(
 
 
 def draw_actuators(episode: Episode, config: EnvConfig, folder: Path, name: str) -> Path:
-    """What was asked of each actuator and where it was, over its whole range."""
+    """Draws target and position of each actuator, over its whole range."""
     with drawing(7.2, 6.6) as figure:
         axes = figure.subplots(len(ACTUATORS), 1, sharex=True)
         for column, (ax, (label, unit, factor)) in enumerate(zip(axes, ACTUATORS, strict=True)):
@@ -88,7 +88,7 @@ def draw_path(
     name: str,
     waypoints: FloatArray | None = None,
 ) -> Path:
-    """The path in three dimensions.
+    """Draws the path in three dimensions.
 
     With waypoints (n, 3) north, east, depth (m): the legs between them. Without: the last goal,
     depth as a plane, heading as an arrow.

@@ -14,24 +14,24 @@ Float32Array = npt.NDArray[np.float32]
 
 
 class Agent(Protocol):
-    """What swims a batch of fish: lane i sees observation i alone, and answers with action i."""
+    """Controls a batch of fish: action i depends on observation i alone."""
 
     def reset(self, count: int) -> None:
-        """Episodes of ``count`` fish begin: forget the last ones."""
+        """Begins the episodes of ``count`` fish."""
 
     def act(self, observations: Float32Array) -> Float32Array:
-        """Actions (N, 5) in [-1, 1] for observations (N, 33) of the environment."""
+        """Returns actions (N, 5) in [-1, 1] for observations (N, 33) of the environment."""
 
 
 def load_agents(name: str, task: str) -> list[Agent]:
-    """The agents of a name: one, or one for each training seed of a learned policy.
+    """Loads the agents of a name: one, or one for each training seed of a learned policy.
 
     Args:
         name: ``pid``, ``mppi``, ``pretrained``, or the path of a policy or of a folder of them.
         task: for which a pretrained policy is chosen.
 
     Raises:
-        ConfigError: no such agent; says which there are.
+        ConfigError: no such agent; names those there are.
     """
     if name == "pid":
         from robofish_agents.controllers.pid import PIDController

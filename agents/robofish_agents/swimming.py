@@ -1,4 +1,4 @@
-"""`robofish swim`: one episode of an agent, its pictures, film and replay page."""
+"""`robofish swim`: one episode of an agent, with pictures, video and replay page."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ SLOWNESS = 1.5
 
 @dataclass(frozen=True)
 class Wish:
-    """What `robofish swim` was asked for; see its options."""
+    """Options of `robofish swim`."""
 
     agent: str
     task: str
@@ -52,7 +52,7 @@ class Wish:
 
 
 def swim_and_show(console: Console, wish: Wish) -> Episode:
-    """Swims an episode, says how it went, and writes what was asked for.
+    """Runs an episode, prints its result, and writes the files that the options name.
 
     Raises:
         ConfigError: an unknown agent, task or suite, or a path that is none.
@@ -169,11 +169,11 @@ def _in_words(episode: Episode, follower: PathFollower | None) -> str:
 
 
 def numbers_of(wish: Wish, episode: Episode) -> dict[str, Any]:
-    """What an episode came to, as numbers.
+    """Returns the result of an episode as numbers.
 
     Args:
-        wish: what was asked for.
-        episode: what was swum.
+        wish: options of the command.
+        episode: the episode.
     """
     end = episode.last(10.0)
     return {

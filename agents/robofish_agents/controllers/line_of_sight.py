@@ -1,7 +1,7 @@
-"""Line-of-sight guidance outside the environment: follow a list of waypoints, however long.
+"""Line-of-sight guidance outside the environment, for any number of waypoints.
 
 The geometry is that of :mod:`fish_env.envs.guidance`, which guides the fish of the task ``path``.
-Here legs meet in corners without arcs, as for a robot that is told its position.
+Here legs meet in corners without arcs. The position of the robot has to be known.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from fish_env.errors import ConfigError
 
 @dataclass(frozen=True)
 class Guided:
-    """What a point on a path asks for.
+    """References of guidance at a point on a path.
 
     Attributes:
-        heading: to steer (rad, NED).
+        heading: desired heading (rad, NED).
         depth: of the path abeam of the fish (m).
         depth_rate: at which that changes when swum at the given speed (m/s).
-        cross_track: distance to starboard of the path (m).
+        cross_track: cross-track error, positive to starboard of the path (m).
         leg: number of the present leg, from 0.
-        finished: the last waypoint lies behind.
+        finished: whether the last waypoint is passed.
     """
 
     heading: float
@@ -49,7 +49,7 @@ class LineOfSight:
         integral: gain of the integral of the cross-track error (m/s); 0 switches it off.
 
     Raises:
-        ConfigError: waypoints or distances that make no path.
+        ConfigError: the waypoints or distances do not define a path.
     """
 
     def __init__(
@@ -72,12 +72,12 @@ class LineOfSight:
         self.reset()
 
     def reset(self) -> None:
-        """Begin at the first leg."""
+        """Begins at the first leg."""
         self.leg = 0
         self._drift = 0.0
 
     def guide(self, position: npt.ArrayLike, speed: float, period_s: float) -> Guided:
-        """What to steer now.
+        """Returns the references of this control step.
 
         Args:
             position: north, east, depth of the fish (m).
@@ -107,7 +107,7 @@ class LineOfSight:
         )
 
     def _on_leg(self, place: FloatArray) -> tuple[float, float]:
-        """Distances along the present leg and to starboard of it (m)."""
+        """Returns the distances along the present leg and to starboard of it (m)."""
         start, end = self.points[self.leg : self.leg + 2, :2]
         ahead = (end - start) / self._lengths[self.leg]
         offset = place[:2] - start

@@ -3,8 +3,8 @@
 Each control step, candidates around the last plan are simulated over a horizon, and the new plan is
 their mean, weighted by the exponential of their cost (Williams et al., "Information-Theoretic
 Model Predictive Control", IEEE Transactions on Robotics 34, 2018). A plan is a few knots with
-straight lines between, so that few candidates cover it. What the last prediction got wrong corrects
-the trim, the buoyancy and the tail's zero that are believed.
+straight lines between, so that few candidates are enough. The error of the last prediction corrects
+the estimates of trim, buoyancy and the zero of the tail.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ UNKNOWN_LIMITS = np.array([0.002, 0.006, 0.15])
 
 @dataclass(frozen=True)
 class MPPISettings:
-    """How far and how often MPPI looks.
+    """Settings of MPPI.
 
     Attributes:
         candidates: sequences simulated in each control step.
@@ -37,12 +37,12 @@ class MPPISettings:
         knots: points of a plan, evenly spaced over the horizon.
         spread: (5,) standard deviation of a knot of each action.
         temperature: costs are compared in units of this share of their standard deviation.
-        final: how many times the last step counts.
-        learning: (3,) share of a wrong prediction that each unknown takes up.
-        start: (5,) action that plans begin with.
+        final: weight of the last step.
+        learning: (3,) share of the prediction error that corrects each unknown.
+        start: (5,) action of the first plan.
         dt: physics step of the prediction (s).
         costs: what errors cost.
-        seed: of the candidates.
+        seed: seed of the candidates.
     """
 
     candidates: int = 64
@@ -60,10 +60,10 @@ class MPPISettings:
 
 
 class MPPIController:
-    """Controls a batch of fish; all are offered the same candidates around their own plans.
+    """Controls a batch of fish. All use the same random candidates, around their own plans.
 
     Args:
-        fish: name or file of the fish that is believed to swim.
+        fish: name or file of the fish whose model is used.
         settings: see :class:`MPPISettings`.
     """
 
@@ -78,14 +78,14 @@ class MPPIController:
         self.reset(1)
 
     def reset(self, count: int) -> None:
-        """Episodes of ``count`` fish begin: forget plans and what was learnt."""
+        """Resets plans and estimates at the start of the episodes of ``count`` fish."""
         self._plans = np.tile(np.array(self.settings.start), (count, self.settings.knots, 1))
         self._unknown = np.zeros((len(UNKNOWNS), count))
         self._expected: FloatArray | None = None
         self._rng = np.random.default_rng(self.settings.seed)
 
     def act(self, observations: npt.ArrayLike) -> Float32Array:
-        """Actions (N, 5) for observations (N, 33)."""
+        """Returns actions (N, 5) for observations (N, 33)."""
         seen = Seen.of(observations)
         self._learn(seen)
         candidates = self._candidates()
@@ -98,7 +98,7 @@ class MPPIController:
         return np.asarray(chosen, np.float32)
 
     def _learn(self, seen: Seen) -> None:
-        """Explain the part of the last prediction that did not come true by what is unknown."""
+        """Corrects the unknowns by the error of the last prediction."""
         if self._expected is None:
             return
         wrong = np.stack([seen.pitch_rate, seen.heave, seen.yaw_rate]) - self._expected
@@ -107,7 +107,7 @@ class MPPIController:
         self._unknown = np.clip(self._unknown + step, -limits, limits)
 
     def _candidates(self) -> FloatArray:
-        """Plans (N, K, knots, 5) around the last one, moved on by a control period."""
+        """Returns plans (N, K, knots, 5) around the last one, shifted by a control period."""
         given = self.settings
         shape = (given.candidates, given.knots, len(given.spread))
         offsets = self._rng.standard_normal(shape) * np.array(given.spread)
@@ -116,7 +116,7 @@ class MPPIController:
         return np.asarray(np.clip(plans[:, None] + offsets, -1.0, 1.0))
 
     def _weights(self, cost: FloatArray) -> FloatArray:
-        """Shares (N, K) of the candidates in the new plans."""
+        """Returns the weights (N, K) of the candidates in the new plans."""
         best = cost.min(axis=1, keepdims=True)
         scale = self.settings.temperature * cost.std(axis=1, keepdims=True) + 1e-9
         weights = np.exp((best - cost) / scale)
@@ -124,6 +124,6 @@ class MPPIController:
 
 
 def _hat(at: FloatArray, knots: int) -> FloatArray:
-    """Matrix (len(at), knots) that interpolates straight between knots; beyond them, the last."""
+    """Returns a matrix (len(at), knots) for linear interpolation; beyond the knots, the last."""
     inside = np.clip(at, 0.0, knots - 1.0)
     return np.maximum(0.0, 1.0 - np.abs(inside[:, None] - np.arange(knots)))

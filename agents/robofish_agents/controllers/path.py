@@ -1,4 +1,4 @@
-"""Any agent follows a path: guidance says where to steer, and that is shown to it as its goal."""
+"""Path following for any agent: guidance replaces the goal that the agent observes."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Float32Array = npt.NDArray[np.float32]
 def with_goal(
     observation: Float32Array, depth_by: float, depth_rate: float, heading_by: float
 ) -> Float32Array:
-    """An observation (33,) as it were with another goal.
+    """Returns an observation (33,) with another goal.
 
     Args:
         observation: of an environment whose goals are constant.
@@ -35,7 +35,7 @@ def with_goal(
 class PathFollower:
     """Lets an agent follow a path in one environment, whose goals must be constant.
 
-    It reads the fish's position from the environment, as a camera above the tank would tell it.
+    It reads the fish's position from the environment, as a camera above the tank would measure it.
 
     Args:
         agent: what swims.
@@ -48,14 +48,14 @@ class PathFollower:
         self.guided: list[Guided] = []
 
     def reset(self, count: int) -> None:
-        """An episode of one fish begins."""
+        """Begins an episode of one fish."""
         assert count == 1
         self.agent.reset(1)
         self.path.reset()
         self.guided = []
 
     def act(self, observations: Float32Array) -> Float32Array:
-        """Action (1, 5) for an observation (1, 33)."""
+        """Returns the action (1, 5) for an observation (1, 33)."""
         (observation,) = observations
         state = self.env.state
         place = [state[name] for name in "xyz"]
@@ -72,6 +72,6 @@ class PathFollower:
 
 
 def heading_of(state: dict[str, float]) -> float:
-    """Heading (rad, NED) of a state."""
+    """Returns the heading (rad, NED) of a state."""
     w, x, y, z = (state[name] for name in ("qw", "qx", "qy", "qz"))
     return float(np.arctan2(2.0 * (x * y + w * z), 1.0 - 2.0 * (y * y + z * z)))

@@ -1,7 +1,7 @@
 """Cascaded PID: depth through pitch through the weight block, heading through the tail offset.
 
-It sees what any agent sees, the observation vector of ``RoboticFish3D-v0``, and needs no model of
-the fish beyond the signs: a block further aft raises the nose, a positive tail offset turns the
+It uses the observation vector of ``RoboticFish3D-v0``, as any agent does. Of the fish it needs only
+the signs: a block further aft raises the nose, a positive tail offset turns the
 fish to port. The gains come from configs/controllers/pid.yaml, which scripts/tune_pid.py writes.
 """
 
@@ -40,12 +40,12 @@ class PIDGains:
     """Gains in physical units; outputs are actions in [-1, 1].
 
     Attributes:
-        depth: climb rate asked for per metre of depth error (1/s).
+        depth: desired climb rate per metre of depth error (1/s).
         depth_integral: block action per metre and second of depth error.
-        depth_windup: block action that the integral of depth may amount to.
-        climb_limit: largest climb rate asked for (m/s), beside that of the goal.
-        climb_damping: climb rate taken off what is asked for, per climb rate.
-        pitch: block action per radian of pitch asked for.
+        depth_windup: limit of the integral of depth, in block action.
+        climb_limit: largest desired climb rate (m/s), in addition to that of the goal.
+        climb_damping: reduction of the desired climb rate per climb rate.
+        pitch: block action per radian of desired pitch.
         pitch_error: block action per radian of pitch error.
         pitch_rate: block action per pitch rate (s/rad).
         heading: offset action per radian of heading error.
@@ -86,7 +86,7 @@ GAIN_NAMES = tuple(field.name for field in fields(PIDGains))
 
 @cache
 def tuned_gains() -> PIDGains:
-    """The gains that come with the package."""
+    """Returns the gains that come with the package."""
     return load_gains(config_root() / "controllers" / "pid.yaml")
 
 
@@ -94,7 +94,7 @@ def load_gains(path: Path) -> PIDGains:
     """Reads gains from a YAML file.
 
     Raises:
-        ConfigError: no such file, or not exactly a number for each gain.
+        ConfigError: the file is missing, or does not have one number for each gain.
     """
     if not path.is_file():
         raise ConfigError(f"{path}: no such file; scripts/tune_pid.py writes one")
@@ -108,7 +108,7 @@ def load_gains(path: Path) -> PIDGains:
 
 
 class PIDController:
-    """Controls a batch of fish, each with integrals of its own.
+    """Controls a batch of fish. Each fish has its own integrals.
 
     Args:
         gains: default: those that come with the package.
@@ -126,11 +126,11 @@ class PIDController:
         self.reset(1)
 
     def reset(self, count: int) -> None:
-        """Episodes of ``count`` fish begin: forget the integrals."""
+        """Resets the integrals at the start of the episodes of ``count`` fish."""
         self._depth, self._heading, self._speed = np.zeros((3, count))
 
     def act(self, observations: npt.ArrayLike) -> Float32Array:
-        """Actions (N, 5) for observations (N, 33)."""
+        """Returns actions (N, 5) for observations (N, 33)."""
         seen = Seen.of(observations)
         actions = np.zeros((len(seen.depth_error), 5))
         block = self._block_displacement(seen)

@@ -1,4 +1,4 @@
-"""What a model of the fish says will happen: candidate actions in, costs over a horizon out.
+"""Predicts the costs of candidate actions over a horizon with a model of the fish.
 
 All candidates of all fish are advanced in one call of the batched physics. Two simplifications:
 goals go on as they change now, and the tail beat over which heading and speed are averaged keeps
@@ -30,7 +30,7 @@ INTEGRALS = ("heading_cosine_integral", "heading_sine_integral", "surge_integral
 
 @dataclass(frozen=True)
 class Costs:
-    """What errors cost: weight (sqrt(1 + (e/margin)^2) - 1), a parabola near zero, then a line.
+    """Costs of errors: weight (sqrt(1 + (e/margin)^2) - 1), quadratic near zero, then linear.
 
     Attributes:
         weights: of depth, heading and speed errors.
@@ -45,7 +45,7 @@ class Costs:
     change: float = 0.02
 
     def of(self, errors: FloatArray) -> FloatArray:
-        """Cost of depth, heading and speed errors (3, ...)."""
+        """Returns the cost of depth, heading and speed errors (3, ...)."""
         shape = (3,) + (1,) * (errors.ndim - 1)
         scaled = errors / np.reshape(self.margins, shape)
         terms = np.sqrt(1.0 + scaled**2) - 1.0
@@ -53,10 +53,10 @@ class Costs:
 
 
 class Prediction:
-    """Predicts with one fish's model, whatever fish really swims.
+    """Predicts with the model of one fish, even if another fish swims.
 
     Args:
-        fish: name or file of the fish that is believed to swim.
+        fish: name or file of the fish whose model is used.
         steps: steps of the horizon.
         stride: control periods in one of them.
         dt: physics step (s); it may be coarser than the environment's.
@@ -78,7 +78,7 @@ class Prediction:
         self._rows = {name: i - self._first_row for i, name in enumerate(names)}
 
     def total(self, seen: Seen, actions: FloatArray, unknown: FloatArray) -> FloatArray:
-        """Costs (steps, N, K) of actions.
+        """Returns the costs (steps, N, K) of actions.
 
         Args:
             seen: what N fish see.
@@ -95,14 +95,14 @@ class Prediction:
         return np.asarray(cost + FAILURE_COST * failed)
 
     def watched_after(self, seen: Seen, actions: FloatArray, unknown: FloatArray) -> FloatArray:
-        """The watched states (3, N) one control period after actions (N, 5)."""
+        """Returns the watched states (3, N) one control period after actions (N, 5)."""
         trace, _ = self._swim(seen, actions[None, :, None], unknown)
         return np.asarray(trace[1, [self._rows[name] for name in WATCHED], :, 0])
 
     def _swim(
         self, seen: Seen, actions: FloatArray, unknown: FloatArray
     ) -> tuple[FloatArray, BoolArray]:
-        """States from depth on, (steps + 1, rows, N, K), and where they are failures."""
+        """Returns states from depth on, (steps + 1, rows, N, K), and where they are failures."""
         steps, fish, candidates, _ = actions.shape
         lanes = fish * candidates
         start = np.repeat(self._state(seen), candidates, axis=1)
@@ -137,7 +137,7 @@ class Prediction:
         return self._model.records(changed)
 
     def _state(self, seen: Seen) -> FloatArray:
-        """States (states, N) as seen; headings count from the present goal."""
+        """Returns the observed states (states, N); headings are relative to the present goal."""
         names = self._model.kernels.state_names
         euler = np.stack([-seen.heading_error_instant, seen.pitch, seen.roll], axis=1)
         rows = {
@@ -158,7 +158,7 @@ class Prediction:
         return state
 
     def _errors(self, seen: Seen, trace: FloatArray) -> FloatArray:
-        """Depth, heading and speed errors after each step, (3, steps, N, K)."""
+        """Returns depth, heading and speed errors after each step, (3, steps, N, K)."""
         ahead = self.period * np.arange(1, self.steps + 1)[:, None]
         depth = trace[:, self._rows["z"]]
         goal_depth = depth[0, :, 0] + seen.depth_error + seen.goal_depth_rate * ahead
@@ -175,7 +175,7 @@ class Prediction:
     def _beat_means(self, seen: Seen, trace: FloatArray) -> FloatArray:
         """Cosine and sine of the heading, and the surge speed, over a beat: (3, steps, N, K).
 
-        Before now the fish is taken to have kept the means that it sees.
+        Past values are assumed to equal the observed means.
         """
         first = self._rows[INTEGRALS[0]]
         integrals = trace[:, first : first + len(INTEGRALS)]

@@ -1,4 +1,4 @@
-"""The observation vector of the environment back in physical units, for controllers."""
+"""Converts the observation vector of the environment to physical units, for controllers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fish_env.envs.layout import OBSERVATION
 
 
 class Seen(NamedTuple):
-    """What a fish knows, each (N,), SI and radians; see ``fish_env.envs.layout.OBSERVATION``.
+    """What is observed, each (N,), SI and radians; see ``fish_env.envs.layout.OBSERVATION``.
 
     Errors are goal minus measured. Angular rates are in the body frame. Actuator positions and the
     last action, each (N, 5), are shares of their ranges, -1 to 1.
@@ -40,12 +40,12 @@ class Seen(NamedTuple):
     last_action: FloatArray
 
     def depth(self, top: float, bottom: float) -> FloatArray:
-        """Depth (m) in a tank where the fish may swim between these depths (m)."""
+        """Returns the depth (m), from the depths (m) between which the fish may swim."""
         return (top + bottom) / 2 + (bottom - top) / 2 * self.tank_depth
 
     @classmethod
     def of(cls, observations: npt.ArrayLike) -> Seen:
-        """From observations (N, 33); ``tank_depth`` stays -1 (top) to 1 (bottom).
+        """Converts observations (N, 33); ``tank_depth`` stays -1 (top) to 1 (bottom).
 
         Raises:
             ValueError: another number of columns.

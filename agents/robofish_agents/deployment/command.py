@@ -1,4 +1,4 @@
-"""What `robofish export` does."""
+"""Implementation of `robofish export`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def run_export(
     config: Path | None,
     json: Path | None,
 ) -> dict[str, Any]:
-    """Exports a policy, and names what was written.
+    """Exports a policy, and prints the files that were written.
 
     Args:
         console: where the files are named.

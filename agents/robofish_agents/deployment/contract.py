@@ -1,4 +1,4 @@
-"""What the user of an exported policy must know, as JSON: order, units, rate, limits, history."""
+"""The contract of an exported policy as JSON: order, units, rate, limits and history."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ Settings = str | Path | Mapping[str, Any] | None
 
 
 def contract_path(file: str | Path) -> Path:
-    """Returns where the contract of an exported file stands: beside it, with .json added."""
+    """Returns the path of the contract: that of the exported file with .json added."""
     return Path(f"{file}.json")
 
 
@@ -81,7 +81,7 @@ def _of_card(card: Mapping[str, Any]) -> dict[str, Any]:
 def make_contract(
     policy: PolicyFile, config: EnvConfig, interface: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Collects what the user of an exported policy must know.
+    """Makes the contract of an exported policy.
 
     Args:
         policy: the policy.
@@ -150,7 +150,7 @@ def name_of(text: str) -> str:
 
 
 def _scale(text: str, scale: str, config: EnvConfig) -> dict[str, Any]:
-    """What is subtracted and what the rest is divided by, in a unit."""
+    """Returns the subtrahend and the divisor of an observation, in a unit."""
     if scale == "half of the tank":
         half, middle = (config.bottom - config.top) / 2, (config.bottom + config.top) / 2
         return {"unit": "m", "subtract": middle, "divide_by": half}

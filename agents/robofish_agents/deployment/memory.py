@@ -1,4 +1,4 @@
-"""What an exported policy keeps between two steps."""
+"""Values that an exported policy keeps between two steps."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Memory:
 
     @classmethod
     def of(cls, policy: PolicyFile) -> Memory:
-        """What a policy needs."""
+        """Returns the memory that a policy needs."""
         history = policy.history
         constants = np.array(history.low_pass_s, float)
         shares = -np.expm1(-history.period_s / constants)
@@ -38,5 +38,5 @@ class Memory:
 
     @property
     def size(self) -> int:
-        """Numbers in all."""
+        """Total number of values."""
         return self.rows * len(OBSERVATION)

@@ -1,4 +1,4 @@
-"""Weights of eight bits: a quarter of the memory, at the price of small errors in the actions."""
+"""Weights of eight bits: a quarter of the memory, with small errors in the actions."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def quantise(weight: Float32Array) -> tuple[npt.NDArray[np.int8], Float32Array]:
 def with_int8_weights(policy: PolicyFile) -> PolicyFile:
     """Returns the policy that the C header with weights of eight bits computes.
 
-    Use it to see what rounding costs before it is on a robot.
+    Use it to measure the effect of rounding before the policy is on a robot.
 
     Args:
         policy: the policy as it was trained.

@@ -1,1 +1,1 @@
-"""Frozen sets of episodes, what is measured on them, and how sure the numbers are."""
+"""Frozen sets of episodes, their metrics, and confidence intervals."""

@@ -1,4 +1,4 @@
-"""What is measured on paths and at places, beside the metrics of all tasks."""
+"""Metrics of paths and places, in addition to those of all tasks."""
 
 from __future__ import annotations
 
@@ -32,6 +32,6 @@ GOAL_METRICS: dict[str, dict[str, Callable[[Record], FloatArray]]] = {
 
 
 def measure_task(record: Record, task: str) -> dict[str, FloatArray]:
-    """All metrics of a task, each (N,); NaN where one does not apply to an episode."""
+    """Returns all metrics of a task, each (N,); NaN where one does not apply to an episode."""
     own = {name: function(record) for name, function in GOAL_METRICS.get(task, {}).items()}
     return measure(record, task) | own

@@ -1,4 +1,4 @@
-"""How sure a mean over episodes and training seeds is."""
+"""Confidence intervals of means over episodes and training seeds."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Interval(NamedTuple):
 
 
 def bootstrap(values: FloatArray) -> Interval:
-    """Percentile bootstrap of the mean over training seeds and episodes.
+    """Computes the percentile bootstrap of the mean over training seeds and episodes.
 
     Both are drawn with replacement, each seed together with the same drawn episodes, as all seeds
     swim the same ones (Efron and Tibshirani, An Introduction to the Bootstrap, chapters 8 and 13).
@@ -49,7 +49,7 @@ def bootstrap(values: FloatArray) -> Interval:
 
 
 def rate(values: FloatArray) -> Interval:
-    """A share of episodes, zeros and ones (seeds, episodes).
+    """Computes the interval of a share of episodes, from zeros and ones (seeds, episodes).
 
     The wider of the bootstrap and Wilson's interval for the number of episodes: a hundred successes
     in a hundred leave no width to a bootstrap, but are no certainty.

@@ -1,4 +1,4 @@
-"""How metrics are shown: label, and how many of the unit shown make one of the metric's."""
+"""Labels of metrics, and factors from their SI units to the units that are shown."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tables of results: agents below each other, suites side by side."""
+"""Tables of results: a row for each agent, a column for each suite."""
 
 from __future__ import annotations
 
@@ -43,12 +43,12 @@ MISSING = "not measured"
 
 
 def overview(results: Sequence[Result]) -> str:
-    """What SHOWN names, on every suite, as Markdown: a table for each family of tasks."""
+    """Returns the metrics of SHOWN on every suite as Markdown: a table for each family of tasks."""
     return _tables(results, _overview_cell)
 
 
 def by_metric(results: Sequence[Result], metric: str) -> str:
-    """One metric with its 95 % intervals on every suite, as Markdown.
+    """Returns one metric with its 95 % intervals on every suite, as Markdown.
 
     Raises:
         ConfigError: no such metric.

@@ -1,4 +1,4 @@
-"""What is measured on each episode. `docs/evaluation.md` says the same in words."""
+"""Metrics of an episode, as `docs/evaluation.md` defines them."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ STEP_RESPONSE_TASK = "hold"
 
 
 def success_rate(record: Record) -> FloatArray:
-    """1 where the whole episode was swum and its last 10 s were within all limits."""
+    """Returns 1 where the episode was complete and its last 10 s were within all limits."""
     return np.asarray(record.info["is_success"][-1] * record.alive[-1])
 
 
 def failure_rate(record: Record) -> FloatArray:
-    """1 where the fish left the tank, tumbled or diverged."""
+    """Returns 1 where the fish left the tank or tumbled, or the simulation diverged."""
     return np.asarray(record.info["failure"][-1] > 0, float)
 
 
@@ -47,7 +47,7 @@ def cost_of_transport(record: Record) -> FloatArray:
 
 
 def action_change(record: Record) -> FloatArray:
-    """Mean absolute change of an action from step to step; 2 would be end to end each time."""
+    """Returns the mean absolute change of an action between steps; 2 is the whole range."""
     change = np.abs(np.diff(record.actions, axis=0)).mean(axis=2)
     both = record.alive[1:]
     return np.asarray((change * both).sum(axis=0) / np.maximum(both.sum(axis=0), 1))
@@ -92,7 +92,7 @@ def settling(record: Record, channel: str) -> FloatArray:
 
 
 def overshoot(record: Record, channel: str) -> FloatArray:
-    """Largest error on the other side, as a share of the first error."""
+    """Returns the largest error of the other sign, as a share of the first error."""
     beyond = np.maximum(0.0, -_errors(record, channel).min(axis=0))
     return np.where(_begins_outside(record, channel), beyond, np.nan)
 
@@ -123,6 +123,6 @@ STEP_METRICS: dict[str, Callable[[Record], FloatArray]] = {
 
 
 def measure(record: Record, task: str) -> dict[str, FloatArray]:
-    """All metrics of a task, each (N,); NaN where one does not apply to an episode."""
+    """Returns all metrics of a task, each (N,); NaN where one does not apply to an episode."""
     wanted = METRICS | (STEP_METRICS if task == STEP_RESPONSE_TASK else {})
     return {name: function(record) for name, function in wanted.items()}

@@ -1,4 +1,4 @@
-"""Swims all episodes of a suite side by side and keeps what is needed to judge them."""
+"""Runs all episodes of a suite in parallel and records what the metrics need."""
 
 from __future__ import annotations
 
@@ -30,14 +30,14 @@ EARTH_GRAVITY = 9.81
 
 @dataclass(frozen=True)
 class Record:
-    """Episodes over time. After its end an episode keeps its last values, with ``alive`` False.
+    """Episodes over time. After its end an episode keeps its last values and ``alive`` is False.
 
     Attributes:
         info: key of the environment's ``info`` -> (T, N), SI and radians.
         first: the same at the start, (N,).
         reward: (T, N).
         actions: (T, N, 5), clipped to [-1, 1] as the environment does.
-        alive: (T, N), True for the steps that were swum.
+        alive: (T, N), True for the steps before the end of the episode.
         period_s: control period (s).
         weight: (N,) of the fish (N).
         limits: success limits of the environment (depth in m, heading in rad, ...).
@@ -54,7 +54,7 @@ class Record:
 
     @property
     def episodes(self) -> int:
-        """How many."""
+        """Number of episodes."""
         return int(self.reward.shape[1])
 
 
@@ -66,9 +66,9 @@ def swim_suite(
     threads: int | None = None,
     report: Callable[[], object] = lambda: None,
 ) -> Record:
-    """Swims the first ``count`` episodes of a suite, all at once.
+    """Runs the first ``count`` episodes of a suite in parallel.
 
-    An episode does not depend on how many are swum beside it, as long as the agent's lanes do not
+    An episode does not depend on the number of parallel episodes, if the agent's lanes do not
     depend on each other.
 
     Args:

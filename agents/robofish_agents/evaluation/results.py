@@ -35,8 +35,8 @@ class Result:
         suite_version: version of the suite.
         task: ``hold``, ``track``, ``path`` or ``station``.
         environment: id of the environment.
-        seeds: training seeds that the means are over; 1 for what was not trained.
-        episodes: how many, for each seed.
+        seeds: number of training seeds; 1 for agents without training.
+        episodes: number of episodes for each seed.
         metrics: metric -> mean and 95 % interval; None where it applies to no episode.
     """
 
@@ -62,16 +62,16 @@ def evaluate(
     """Measures an agent on a suite.
 
     Args:
-        name: what to call it.
+        name: name of the agent in the result.
         agents: one, or one for each training seed.
         suite: which episodes.
         task: one of the suite's.
-        count: only the first so many episodes; default: all.
+        count: number of episodes, from the first; default: all.
         threads: threads of the environment.
         report: called after each control step.
 
     Raises:
-        ConfigError: the suite's episodes are not what they were when it was frozen.
+        ConfigError: the episodes of the suite have changed since it was frozen.
     """
     suite.check(task)
     measured = [

@@ -40,7 +40,7 @@ class Suite:
 
     Attributes:
         name: short name.
-        version: changed whenever the episodes change; numbers of two versions do not compare.
+        version: changes with the episodes; do not compare numbers of two versions.
         summary: what is difficult about it.
         seed: episode i is seeded with seed + i.
         episodes: how many.
@@ -60,7 +60,7 @@ class Suite:
 
     @property
     def tasks(self) -> list[str]:
-        """The tasks that it has episodes of."""
+        """Tasks of the suite."""
         return [task for task in TASKS if task in self.fingerprint]
 
     def make(
@@ -76,7 +76,7 @@ class Suite:
         )
 
     def check(self, task: str) -> None:
-        """Refuse to measure on episodes that are no longer those of the file.
+        """Refuses a suite whose episodes are no longer those of the file.
 
         Raises:
             ConfigError: the environment now starts other episodes, or the suite has none of the

@@ -1,4 +1,4 @@
-"""From a Stable-Baselines3 policy to a :class:`PolicyFile`: numbers alone, no PyTorch."""
+"""Converts a policy of Stable-Baselines3 to a :class:`PolicyFile`, which needs no PyTorch."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ def export_policy(
     task: str,
     card: Mapping[str, Any],
 ) -> PolicyFile:
-    """The deterministic policy of a model, with its normalisation.
+    """Returns the deterministic policy of a model, with its normalisation.
 
     Raises:
-        ConfigError: a network that a policy file cannot say.
+        ConfigError: a policy file cannot hold such a network.
     """
     if isinstance(model, PPO):
         policy: Any = model.policy

@@ -38,10 +38,10 @@ class PolicyFile:
 
     Attributes:
         network: forward pass.
-        history: which part of the past it sees.
+        history: past observations that it sees.
         task: task it was trained for.
         environment: id and version of the environment.
-        card: where it comes from: configuration, seed, training time, scores.
+        card: origin: configuration, seed, training time, scores.
     """
 
     network: Network
@@ -52,7 +52,7 @@ class PolicyFile:
 
 
 def write_policy(policy: PolicyFile, path: Path) -> None:
-    """Writes a policy; the file is there whole or not at all."""
+    """Writes a policy atomically."""
     network, history = policy.network, policy.history
     arrays: dict[str, Any] = {"mean": network.mean, "scale": network.scale}
     for i, (weight, bias) in enumerate(zip(network.weights, network.biases, strict=True)):

@@ -1,7 +1,8 @@
-"""What a policy sees beyond the present: past observations, and low-pass filtered ones.
+"""Past and low-pass filtered observations as inputs of a policy.
 
-One observation of noisy, late sensors says little of the water and of a fish that differs from the
-nominal one. A few frames and a slow mean of all sensors tell both, without a recurrent network.
+One observation of noisy, delayed sensors has little information on the water, and on how the fish
+differs from the nominal one. Some frames and slow means of all sensors have more, without a
+recurrent network.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ MOST_FRAMES = 50
 
 @dataclass(frozen=True)
 class HistorySpec:
-    """Which part of the past a policy sees.
+    """Past observations that a policy sees.
 
     Attributes:
         frames: observations side by side, the newest first; 1 is the present alone.
@@ -35,7 +36,7 @@ class HistorySpec:
     period_s: float = 0.1
 
     def __post_init__(self) -> None:
-        """Refuses what cannot be.
+        """Refuses values that are not valid.
 
         Raises:
             ConfigError: says which.
@@ -51,15 +52,15 @@ class HistorySpec:
             )
 
     def width(self, observation: int) -> int:
-        """Numbers that the policy sees, for observations of so many."""
+        """Returns the number of inputs of the policy, for the size of an observation."""
         return observation * (self.frames + len(self.low_pass_s))
 
 
 class History:
-    """The past of N episodes side by side; no episode sees another's.
+    """Past observations of N parallel, independent episodes.
 
     Args:
-        spec: which part of the past.
+        spec: past observations that the policy sees.
         count: episodes.
         observation: numbers in one observation.
     """
@@ -80,7 +81,7 @@ class History:
     def push(self, observations: Float32Array) -> Float32Array:
         """Takes the next observations (N, n) and returns what the policy sees, (N, width).
 
-        A first observation counts as having been there for ever.
+        Before the first observation, all past observations equal it.
         """
         self._frames[1:] = self._frames[:-1].copy()
         self._frames[0] = observations
@@ -105,7 +106,7 @@ class History:
         return {"frames": self._frames, "filters": self._filters, "fresh": self._fresh}
 
     def load_state(self, state: Mapping[str, npt.NDArray[Any]]) -> None:
-        """Puts back what :meth:`save_state` gave.
+        """Restores the result of :meth:`save_state`.
 
         Raises:
             KeyError, ValueError: arrays are missing or have other shapes.

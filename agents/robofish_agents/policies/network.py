@@ -35,8 +35,8 @@ class Network:
     library and on the number of rows, by up to 3e-6 in an action.
 
     Attributes:
-        mean: (n,) subtracted from what the policy sees.
-        scale: (n,) what the difference is divided by.
+        mean: (n,) subtracted from the inputs.
+        scale: (n,) divisor of the difference.
         limit: normalised values are clipped to this.
         weights: float32 matrices (outputs, inputs), layer after layer.
         biases: float32 vectors (outputs,).
@@ -53,7 +53,7 @@ class Network:
     output: str
 
     def __call__(self, seen: Float32Array) -> Float32Array:
-        """Mean actions (N, 5) in [-1, 1] for what the policy sees (N, n)."""
+        """Returns mean actions (N, 5) in [-1, 1] for inputs of the policy (N, n)."""
         values = np.clip((seen - self.mean) / self.scale, -self.limit, self.limit)
         between = ACTIVATIONS[self.activation]
         last = len(self.weights) - 1

@@ -1,4 +1,4 @@
-"""A trained policy as an agent, without PyTorch; and the policies that come with the package."""
+"""Trained policies as agents, without PyTorch; also those that come with the package."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ STANDS_FOR = {"path": "track"}
 
 
 class PretrainedPolicy:
-    """Swims N fish side by side with a trained network; deterministic.
+    """Controls N fish with a trained network; deterministic.
 
     Args:
         policy: a policy file that was read.
@@ -39,7 +39,7 @@ class PretrainedPolicy:
         return cls(read_policy(path))
 
     def reset(self, count: int) -> None:
-        """``count`` episodes begin together; forget the past."""
+        """Resets past observations at the start of ``count`` episodes."""
         self._history = History(self.policy.history, count, len(OBSERVATION))
 
     def act(self, observations: npt.ArrayLike) -> Float32Array:

@@ -1,4 +1,4 @@
-"""Which trainings a sweep consists of."""
+"""The trainings of a sweep."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Trial:
     Attributes:
         name: of its run folder.
         config: what is trained.
-        changes: key -> value that it has in place of the configuration's.
+        changes: key -> value that replaces that of the configuration.
     """
 
     name: str
@@ -46,7 +46,7 @@ def plan(
     steps: int | None = None,
     trust_effects: bool = False,
 ) -> list[Trial]:
-    """All combinations of seeds and values.
+    """Returns all combinations of seeds and values.
 
     Args:
         source: a configuration, as for :func:`robofish_agents.training.config.load_train_config`.
@@ -56,7 +56,7 @@ def plan(
         trust_effects: run the effect files that the fish's file names.
 
     Raises:
-        ConfigError: a key, value or seed that cannot be; names it.
+        ConfigError: a key, value or seed is not valid; names it.
     """
     base = load_train_config(source, trust_effects, total_steps=steps)
     chosen = _seeds(seeds) if seeds else [base.seed]

@@ -39,17 +39,17 @@ def run_sweep(
     cluster: ClusterSettings,
     tell: Tell = lambda name, row: None,
 ) -> list[dict[str, Any]]:
-    """Trains what is not finished, and writes ``sweep.csv``, a row for each trial.
+    """Trains unfinished trials, and writes ``sweep.csv``, a row for each trial.
 
-    A trial whose process or machine died, or that was stopped, goes on from its last checkpoint
-    and takes the same steps, to the bit, as one that was not. On several machines all must see
+    A trial whose process or machine failed, or that was stopped, continues from its last checkpoint
+    with the same bits as an uninterrupted one. On several machines all must see
     ``out`` under the same path.
 
     Args:
         trials: from :func:`robofish_agents.sweep.plan.plan`.
         out: folder of run folders.
-        cluster: where.
-        tell: told the name of a trial and the row of each evaluation.
+        cluster: where to train.
+        tell: receives the name of a trial and the row of each evaluation.
 
     Returns:
         The rows of the table.
@@ -130,7 +130,7 @@ def _tune(trials: Sequence[Trial], out: Path, tell: Tell) -> dict[str, str]:
             return {}
 
         def on_trial_result(self, iteration: int, trials: Any, trial: Any, result: Any) -> None:
-            """An evaluation came."""
+            """Reports an evaluation."""
             if self.tell is not None:
                 self.tell(trial.config["trial"]["name"], result)
 
@@ -171,7 +171,7 @@ class _Reporter:
     """Passes evaluations to Ray Tune."""
 
     def stepped(self, steps: int) -> None:
-        """Nothing."""
+        """Ignores steps."""
 
     def evaluated(self, row: dict[str, float]) -> None:
         """Reports an evaluation."""
@@ -181,7 +181,7 @@ class _Reporter:
 
 
 def _trial(space: dict[str, Any]) -> None:
-    """What runs in a worker: one training, from its checkpoint if there is one."""
+    """Runs one training in a worker, from its checkpoint if there is one."""
     spec = space["trial"]
     check_version(spec["version"])
     folder = Path(spec["folder"])

@@ -1,7 +1,7 @@
-"""A training's books: time is counted, policies are evaluated, checkpoints are written.
+"""Records of a training: times, evaluations and checkpoints.
 
-Every engine keeps them alike: between two rollouts, when the learner has just finished its updates,
-so that what is saved there can go on with the same bits.
+Every engine keeps them in the same way. Checkpoints are written between two rollouts, after the
+updates of the learner, so that a resumed training continues with the same bits.
 """
 
 from __future__ import annotations
@@ -15,32 +15,32 @@ from robofish_agents.training.config import TrainConfig
 
 
 class Watcher(Protocol):
-    """What a training tells about itself."""
+    """Receives the progress of a training."""
 
     def stepped(self, steps: int) -> object:
-        """So many control steps are done."""
+        """Receives the number of control steps so far."""
 
     def evaluated(self, row: dict[str, float]) -> object:
-        """An evaluation on the side is done."""
+        """Receives an evaluation."""
 
 
 class Quiet:
-    """Watches a training and says nothing."""
+    """Ignores the progress of a training."""
 
     def stepped(self, steps: int) -> None:
-        """Steps are not shown."""
+        """Ignores steps."""
 
     def evaluated(self, row: dict[str, float]) -> None:
-        """Neither are evaluations."""
+        """Ignores evaluations."""
 
 
 class Books:
-    """Keeps a training's books.
+    """Records a training.
 
     Args:
         config: the training.
         progress: what was done before; kept up to date.
-        watcher: told about steps and evaluations.
+        watcher: receives steps and evaluations.
         evaluate: evaluates the present policy and keeps it if it is the best.
         save: writes a checkpoint.
         record: takes a name and a value for the log.
@@ -62,12 +62,12 @@ class Books:
         self._rollout_from = self._cpu
 
     def begin(self) -> None:
-        """Before the first rollout: what imitation came to is evaluated."""
+        """Evaluates the result of the imitation, before the first rollout."""
         if self.config.imitate.rounds and not self.progress.evaluations:
             self.evaluate()
 
     def before_rollout(self, steps: int) -> None:
-        """Evaluates and saves where it is due, after so many control steps."""
+        """Evaluates and saves if it is due after this number of control steps."""
         self._count()
         self.progress.steps = steps
         if self._due(self.config.evaluation.every, self._evaluated_at()):
@@ -78,15 +78,15 @@ class Books:
         self._rollout_from = time.process_time()
 
     def stepped(self, steps: int) -> None:
-        """A step of all fish is done, and so many in all."""
+        """Passes on the number of control steps so far."""
         self.watcher.stepped(steps)
 
     def after_rollout(self) -> None:
-        """Experience is collected; updates follow."""
+        """Counts the time of a rollout."""
         self.progress.rollout_cpu_s += time.process_time() - self._rollout_from
 
     def end(self, steps: int) -> None:
-        """After the last update: the last evaluation and checkpoint."""
+        """Makes the last evaluation and checkpoint, after the last update."""
         self._count()
         self.progress.steps = steps
         if self._evaluated_at() < steps:
@@ -94,7 +94,7 @@ class Books:
         self._save()
 
     def evaluate(self) -> None:
-        """Evaluates on the side; the time that takes is not counted as training."""
+        """Evaluates; this time is not counted as training."""
         row = {"steps": float(self.progress.steps), "cpu_s": self.progress.cpu_s}
         row |= self._evaluate()
         self.progress.evaluations += (row,)

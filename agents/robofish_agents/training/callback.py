@@ -1,4 +1,4 @@
-"""Stable-Baselines3 tells a training's books when a rollout begins and ends."""
+"""A callback of Stable-Baselines3 that reports rollouts to the records of a training."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from robofish_agents.training.books import Books
 
 
 class Between(BaseCallback):
-    """Passes moments of the learner to the books.
+    """Passes events of the learner to the records.
 
     Args:
         books: of the training.

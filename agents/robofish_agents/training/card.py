@@ -1,4 +1,4 @@
-"""The card of a trained policy: where it comes from, what it cost, how well it did."""
+"""The card of a trained policy: origin, costs and scores."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ MADE_WITH = ("robotic-fish", "stable-baselines3", "torch", "gymnasium", "numpy")
 
 
 def card(config: TrainConfig, progress: Progress, row: dict[str, float]) -> dict[str, Any]:
-    """What a user of a policy may want to know, as plain numbers and texts.
+    """Returns origin, costs and scores of a policy as plain numbers and texts.
 
     Args:
         config: the training.
         progress: its steps and times when the policy was taken.
-        row: the evaluation on the side of this policy.
+        row: the evaluation of this policy during training.
     """
     made_with = (*MADE_WITH, "ray") if config.engine == "rllib" else MADE_WITH
     return {
@@ -40,7 +40,7 @@ def card(config: TrainConfig, progress: Progress, row: dict[str, float]) -> dict
 
 
 def shares(progress: Progress, env_cpu_s: float) -> dict[str, float]:
-    """How the processor time of training divides.
+    """Returns how the processor time of training is divided.
 
     Returns:
         ``imitation``: what came before learning, if anything; of the rest,
@@ -58,7 +58,7 @@ def shares(progress: Progress, env_cpu_s: float) -> dict[str, float]:
 
 
 def processor() -> str:
-    """The processor's name."""
+    """Returns the name of the processor."""
     info = Path("/proc/cpuinfo")
     if info.is_file():
         for line in info.read_text(encoding="utf-8").splitlines():

@@ -1,4 +1,4 @@
-"""Checkpoints: one file with all that a later process needs to go on as if nothing had happened.
+"""Checkpoints: one file from which a later process continues with the same bits.
 
 It is written beside the old one and put in its place at once, so that a kill at any moment leaves
 a whole file. It holds arrays and JSON and no pickles, so that reading one can run no code.
@@ -23,16 +23,16 @@ FORMAT = "robofish-checkpoint-2"
 
 @dataclass
 class Progress:
-    """What a training has done so far, over all the processes that worked on it.
+    """Progress of a training, over all its processes.
 
     Attributes:
         steps: control steps of all fish.
-        cpu_s: processor time of training, without evaluation on the side (s).
-        wall_s: the same by the clock on the wall.
+        cpu_s: processor time of training, without evaluations (s).
+        wall_s: elapsed time of the same (s).
         imitation_cpu_s: part of it spent in imitation, before learning (s).
         rollout_cpu_s: part of it spent in collecting experience, environment included (s).
         env_cpu_s: part of that spent in the environment (s).
-        evaluations: rows of the evaluations on the side.
+        evaluations: rows of the evaluations during training.
     """
 
     steps: int = 0
@@ -47,7 +47,7 @@ class Progress:
 def save_checkpoint(
     path: Path, config: TrainConfig, learner: dict[str, Any], stack: Stack, progress: Progress
 ) -> None:
-    """Writes a checkpoint; a kill leaves the last one.
+    """Writes a checkpoint atomically: a killed process leaves the last one.
 
     Args:
         path: the file.
@@ -72,13 +72,13 @@ def save_checkpoint(
 def load_checkpoint(
     path: Path, config: TrainConfig, stack: Stack, restore: Callable[[dict[str, Any]], None]
 ) -> Progress:
-    """The progress; fish, learner and all random generators are put back.
+    """Reads the progress and restores fish, learner and all random generators.
 
     Args:
         path: the file. Reading it runs no code, whatever it holds.
         config: of the training that goes on.
         stack: fish of that configuration.
-        restore: puts the state of the learner back, once the fish have theirs.
+        restore: restores the learner, after the fish.
 
     Raises:
         ConfigError: not a checkpoint, a damaged one, or one of another configuration or version.
@@ -102,7 +102,7 @@ def load_checkpoint(
 
 
 def _earlier(path: Path) -> str | None:
-    """What to say of a checkpoint of the first format, which held pickles."""
+    """Returns the message for a checkpoint of the first format, which held pickles."""
     try:
         with zipfile.ZipFile(path) as archive:
             first = archive.read("format")

@@ -1,4 +1,4 @@
-"""`robofish train` on the screen: a progress bar, a line for each evaluation, what came of it."""
+"""Output of `robofish train`: a progress bar, a line for each evaluation, and the result."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Screen:
 
 
 def in_words(row: dict[str, float]) -> str:
-    """One evaluation in a line."""
+    """Returns one evaluation as a line of text."""
     return (
         f"{row['steps']:>10,.0f} steps, {row['cpu_s']:6.1f} s of processor: "
         f"success {100 * row['success_rate']:3.0f} % "
@@ -64,7 +64,7 @@ def run(
     engine: str | None = None,
     json_file: Path | None = None,
 ) -> Outcome:
-    """Trains as the command line asks.
+    """Trains with the options of the command line.
 
     Args:
         console: where words go.
@@ -72,7 +72,7 @@ def run(
         out: folder, or None for the usual place.
         seed: instead of the configuration's.
         steps: instead of the configuration's.
-        resume: go on with what is in the folder.
+        resume: continue the training in the folder.
         trust_effects: run the effect files that the fish's file names.
         engine: library that learns, instead of the configuration's.
         json_file: file that the caller writes with the outcome; refused if it is read.
@@ -100,7 +100,7 @@ def run(
 
 
 def _stopped(source: str, folder: Path, config: TrainConfig) -> str:
-    """What was kept of a training that a person stopped, and how to go on."""
+    """Returns what was kept of a stopped training, and how to continue."""
     options = f"--out {folder} --seed {config.seed} --steps {config.total_steps}"
     if config.engine != DEFAULT_ENGINE:
         options += f" --engine {config.engine}"

@@ -1,4 +1,4 @@
-"""Training configurations, ``configs/train/*.yaml``: what they may say, and reading them."""
+"""Training configurations, ``configs/train/*.yaml``: their keys, and reading them."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def _check(holds: bool, message: str) -> None:
 
 @dataclass(frozen=True)
 class History:
-    """What the policy sees of the past, see :class:`robofish_agents.policies.HistorySpec`."""
+    """Past observations that the policy sees; :class:`robofish_agents.policies.HistorySpec`."""
 
     frames: int = 1
     low_pass_s: tuple[float, ...] = ()
@@ -131,11 +131,11 @@ class Imitation:
     The teacher is :mod:`robofish_agents.training.teacher`.
 
     Attributes:
-        rounds: episodes that all fish swim for it, the first by the teacher; 0: none.
+        rounds: number of episodes of all fish, the first swum by the teacher; 0: none.
         epochs: passes through what was collected, after each round.
         gains: gains of the teacher that differ from those of the PID controller, see
             :class:`robofish_agents.training.teacher_gains.TeacherGains`.
-        stretch: what the fitted block displacement is multiplied by in the end.
+        stretch: factor of the fitted block displacement, applied at the end.
     """
 
     rounds: int = 0
@@ -156,10 +156,10 @@ class Imitation:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Evaluation on the side, on episodes that are not trained on and belong to no suite.
+    """Evaluation during training, on episodes that are not trained on and belong to no suite.
 
     Attributes:
-        every: steps between two; the best policy so far is kept.
+        every: steps between two evaluations; the best policy is kept.
         episodes: how many.
     """
 
@@ -172,7 +172,7 @@ class Evaluation:
 
 @dataclass(frozen=True)
 class Threads:
-    """Threads of PyTorch and of the environment; more do not pay for small networks."""
+    """Threads of PyTorch and of the environment; small networks do not gain from more."""
 
     torch: int = 1
     environment: int = 1
@@ -197,7 +197,7 @@ class TrainConfig:
         environment: further keyword arguments of the environment; they replace those of the suite.
         settings: changes of the environment's settings (configs/env) that hold in training alone,
             such as sharper rewards or faster goals; evaluations go without.
-        history: what the policy sees of the past.
+        history: past observations that the policy sees.
         network: see :class:`NetworkSettings`.
         ppo: see :class:`Ppo`.
         sac: see :class:`Sac`.
@@ -233,7 +233,7 @@ class TrainConfig:
     trust_effects: bool = field(default=False, compare=False)
 
     def __post_init__(self) -> None:
-        """Refuses what contradicts itself or the environment.
+        """Refuses settings that contradict each other or the environment.
 
         Raises:
             ConfigError: says which.
@@ -281,18 +281,18 @@ class TrainConfig:
         return options | {TRUST: self.trust_effects}
 
     def _check_rllib(self) -> None:
-        """Refuses what RLlib's PPO has no equal of."""
+        """Refuses settings that RLlib's PPO does not have."""
         without = "engine rllib has no equal; {}, or train with --engine sb3"
         _check(self.algorithm == "ppo", "algorithm: " + without.format("choose ppo"))
         _check(self.ppo.target_kl is None, "ppo.target_kl: " + without.format("remove it"))
         _check(not self.ppo.use_sde, "ppo.use_sde: " + without.format("remove it"))
 
     def history_spec(self, period_s: float) -> HistorySpec:
-        """What the policy sees of the past, for a control period (s)."""
+        """Returns the past observations that the policy sees, for a control period (s)."""
         return HistorySpec(self.history.frames, self.history.low_pass_s, period_s)
 
     def tree(self) -> dict[str, Any]:
-        """As a YAML file could say it, with every default spelled out."""
+        """Returns the configuration as in a YAML file, with every default."""
         left_out = ["sac" if self.algorithm == "ppo" else "ppo", TRUST]
         if self.engine == DEFAULT_ENGINE:
             left_out.append("engine")  # configurations of before there was a choice stay the same
@@ -317,7 +317,7 @@ def load_train_config(
         **changes: fields that replace those of the file; None leaves them.
 
     Raises:
-        ConfigError: no such file, or something in it that cannot be; names file and key.
+        ConfigError: the file is missing, or a value in it is not valid; names file and key.
     """
     file = _find(name_or_path)
     try:
@@ -338,7 +338,7 @@ def load_train_config(
 
 
 def files_behind(name_or_path: str | Path, config: TrainConfig) -> list[Path]:
-    """The files that a training reads: its configuration, suites, fish and settings.
+    """Lists the files that a training reads: its configuration, suites, fish and settings.
 
     Args:
         name_or_path: as for :func:`load_train_config`.

@@ -1,4 +1,4 @@
-"""What a training needs of the library that learns, and which library that is."""
+"""The interface of a learning library, and the choice between libraries."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ class Engine(Protocol):
         """Learns from the books' steps to those of the configuration."""
 
     def log_to(self, folder: Path) -> Callable[[str, float], object]:
-        """Opens a TensorBoard log in a folder; what it gives back records a name and a value."""
+        """Opens a TensorBoard log in a folder; returns a function that logs a name and a value."""
 
     def policy(self, about: Mapping[str, Any]) -> PolicyFile:
-        """The present deterministic policy, with a card."""
+        """Returns the present deterministic policy, with a card."""
 
     def state(self) -> dict[str, Any]:
-        """All that a later process needs to go on with the same bits, as plain values."""
+        """Returns plain values from which a later process continues with the same bits."""
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Puts a state back; the fish have theirs already."""
+        """Restores a state; the state of the fish is restored before."""
 
     def close(self) -> None:
-        """Ends what was started."""
+        """Closes everything that was opened."""
 
 
 def make_engine(config: TrainConfig, stack: Stack) -> Engine:
-    """A learner that knows nothing yet.
+    """Makes an untrained learner.
 
     Args:
         config: of the training; ``engine`` says which library.

@@ -1,4 +1,4 @@
-"""The past of each fish beside its present, for Stable-Baselines3."""
+"""A vector environment for Stable-Baselines3 that adds past observations."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from robofish_agents.policies.history import History, HistorySpec
 
 
 class HistoryVecEnv(VecEnvWrapper):
-    """Gives out what :class:`robofish_agents.policies.History` makes of the observations.
+    """Replaces observations by what :class:`robofish_agents.policies.History` makes of them.
 
     Args:
         venv: fish.
-        spec: which part of the past.
+        spec: past observations that the policy sees.
     """
 
     def __init__(self, venv: VecEnv, spec: HistorySpec) -> None:
@@ -31,12 +31,12 @@ class HistoryVecEnv(VecEnvWrapper):
         self.history = History(spec, venv.num_envs, self._size)
 
     def reset(self) -> np.ndarray:
-        """All episodes begin."""
+        """Begins all episodes."""
         self.history = History(self._spec, self.num_envs, self._size)
         return self.history.push(np.asarray(self.venv.reset()))
 
     def step_wait(self) -> VecEnvStepReturn:
-        """One control step; the last observation of an ended episode gets its own past."""
+        """Takes one control step; the last observation of an ended episode gets its own past."""
         observations, rewards, dones, infos = self.venv.step_wait()
         for lane in np.flatnonzero(dones).tolist():
             info: dict[str, Any] = infos[lane]

@@ -1,4 +1,4 @@
-"""Begins a training from a teacher instead of from nothing.
+"""Imitation of a teacher before reinforcement learning.
 
 Rounds as in DAgger (Ross, Gordon and Bagnell 2011): the learner swims, the teacher, which knows the
 true state, says what it would have done, and the network is fitted to all that was said so far. The
@@ -38,9 +38,9 @@ class Swim:
     """One episode of all fish.
 
     Attributes:
-        seen: (T, N, n) what the policy sees, not normalised.
-        wanted: (T, N, 5) what the teacher would have done.
-        reward: (T, N) normalised as the learner's.
+        seen: (T, N, n) inputs of the policy, not normalised.
+        wanted: (T, N, 5) actions of the teacher.
+        reward: (T, N) normalised as for the learner.
         ended: (T, N).
     """
 
@@ -51,7 +51,7 @@ class Swim:
 
 
 def imitate(model: PPO, stack: Stack, config: TrainConfig, settings: Imitation) -> None:
-    """Fits policy and values of a learner that knows nothing yet to a teacher."""
+    """Fits policy and values of an untrained learner to a teacher."""
     rng = np.random.default_rng(config.seed)
     outside: Any = stack.outside
     teacher = Teacher(stack.fish.parts, settings)

@@ -1,4 +1,4 @@
-"""What a learner of Stable-Baselines3 needs to go on with the same bits, as plain values."""
+"""The state of a learner of Stable-Baselines3 as plain values, to resume with the same bits."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def learner_state(model: Model) -> Plain:
 
 
 def restore_learner(model: Model, state: Plain) -> None:
-    """Puts a state into a learner of the same configuration; sets the global generators.
+    """Restores a learner of the same configuration; sets the global generators.
 
     Args:
         model: as :func:`robofish_agents.training.model.make_model` makes it.
@@ -93,7 +93,7 @@ def optimiser_state(optimiser: torch.optim.Optimizer) -> Plain:
 
 
 def restore_optimiser(optimiser: torch.optim.Optimizer, state: Plain) -> None:
-    """Puts moments and step sizes back.
+    """Restores moments and step sizes.
 
     Args:
         optimiser: of the same parameters.

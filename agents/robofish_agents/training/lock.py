@@ -1,4 +1,4 @@
-"""One training at a time in a folder."""
+"""A lock, so that one training at a time uses a folder."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ class Held(ConfigError):
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Keeps a folder for this process; the system lets go of it whatever way the process ends.
+    """Locks a folder for this process; the system releases it however the process ends.
 
-    A file in the folder is locked, and says who holds it. It is removed in the end; one that a
-    kill left behind is free.
+    A file in the folder is locked and names the process. It is removed at the end. A file that a
+    killed process left is not locked.
 
     Args:
         folder: made if missing.

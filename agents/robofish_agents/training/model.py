@@ -18,7 +18,7 @@ Model = PPO | SAC
 
 
 def make_model(config: TrainConfig, stack: Stack) -> Model:
-    """A learner that knows nothing yet."""
+    """Makes an untrained learner."""
     network = config.network
     policy: dict[str, Any] = {
         "net_arch": list(network.layers),

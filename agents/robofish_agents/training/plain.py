@@ -25,7 +25,7 @@ TREE, ARRAY = "tree", "__array__"
 
 
 def write_plain(tree: Tree, path: Path) -> None:
-    """Writes a tree; the file is there whole or not at all.
+    """Writes a tree atomically.
 
     Args:
         tree: plain values; tuples become lists, NumPy's numbers arrays.
@@ -45,7 +45,7 @@ def read_plain(path: Path) -> Tree:
     """Reads what :func:`write_plain` wrote.
 
     Raises:
-        OSError, ValueError, KeyError, BadZipFile: it is no such file, or damaged.
+        OSError, ValueError, KeyError, BadZipFile: another kind of file, or a damaged one.
     """
     try:
         arrays = read_arrays(read_bytes(path, MOST_BYTES), MOST_BYTES)

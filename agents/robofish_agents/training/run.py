@@ -1,4 +1,4 @@
-"""One training from its configuration to a policy file, in one process or over several."""
+"""One training from its configuration to a policy file, in one process or several."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ CONFIG, CARD, EVALUATIONS = "config.yaml", "card.yaml", "evaluations.csv"
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a training came to.
+    """Result of a training.
 
     Attributes:
-        policy: file of the policy that did best in the evaluations on the side.
+        policy: file of the policy with the best evaluation during training.
         best: row of that evaluation.
         progress: steps, times and all evaluations.
     """
@@ -45,7 +45,7 @@ class Outcome:
 
 
 def train(config: TrainConfig, folder: Path, watcher: Watcher, resume: bool = False) -> Outcome:
-    """Trains, and leaves everything in a folder.
+    """Trains, and writes all files into a folder.
 
     The folder gets ``policy.npz`` and ``card.yaml`` (best so far), ``checkpoint.zip``,
     ``evaluations.csv``, ``config.yaml`` and ``tensorboard/``. A training that was stopped at any
@@ -54,7 +54,7 @@ def train(config: TrainConfig, folder: Path, watcher: Watcher, resume: bool = Fa
     Args:
         config: what to train.
         folder: made if missing.
-        watcher: told about steps and evaluations.
+        watcher: receives steps and evaluations.
         resume: go on from the folder's checkpoint; from the start, if it was stopped before the
             first one.
 
@@ -74,7 +74,7 @@ def train(config: TrainConfig, folder: Path, watcher: Watcher, resume: bool = Fa
 
 
 def outputs(folder: Path) -> list[Path]:
-    """The files that a training leaves in a folder, beside its log."""
+    """Lists the files that a training writes into a folder, beside its log."""
     return [folder / name for name in (CONFIG, CHECKPOINT, POLICY, CARD, EVALUATIONS)]
 
 
@@ -89,7 +89,7 @@ def best_of(evaluations: Sequence[dict[str, float]]) -> dict[str, float]:
 
 
 def _check_folder(config: TrainConfig, folder: Path, resume: bool) -> None:
-    """Refuses a folder that has something to lose."""
+    """Refuses a folder with files that would be replaced."""
     if (folder / CHECKPOINT).exists():
         if not resume:
             raise ConfigError(

@@ -1,4 +1,4 @@
-"""Stable-Baselines3 as the library that learns."""
+"""Training with Stable-Baselines3."""
 
 from __future__ import annotations
 
@@ -45,25 +45,25 @@ class Sb3Engine:
         self.model.learn(left, callback=Between(books), reset_num_timesteps=steps == 0)
 
     def log_to(self, folder: Path) -> Callable[[str, float], object]:
-        """Opens a TensorBoard log in a folder; what it gives back records a name and a value."""
+        """Opens a TensorBoard log in a folder; returns a function that logs a name and a value."""
         self._log = logger.configure(str(folder), ["tensorboard"])
         self.model.set_logger(self._log)
         return self._log.record
 
     def policy(self, about: Mapping[str, Any]) -> PolicyFile:
-        """The present deterministic policy, with a card."""
+        """Returns the present deterministic policy, with a card."""
         spec = self.stack.past.history.spec
         return export_policy(self.model, self.stack.outside, spec, self.config.task, about)
 
     def state(self) -> dict[str, Any]:
-        """All that a later process needs to go on with the same bits, as plain values."""
+        """Returns plain values from which a later process continues with the same bits."""
         return learner_state(self.model)
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Puts a state back; the fish have theirs already."""
+        """Restores a state; the state of the fish is restored before."""
         restore_learner(self.model, state)
 
     def close(self) -> None:
-        """Ends the log, which has a thread."""
+        """Closes the log, which has a thread."""
         if self._log is not None:
             self._log.close()

@@ -13,7 +13,7 @@ T = TypeVar("T")
 
 
 def build(cls: type[T], tree: Any, place: str) -> T:
-    """A dataclass from a mapping of its fields.
+    """Builds a dataclass from a mapping of its fields.
 
     Args:
         cls: a dataclass of numbers, texts, tuples of them, mappings and further dataclasses.

@@ -1,4 +1,4 @@
-"""The fish that a training swims, with the wrappers around them, and their state as a whole."""
+"""The fish of a training with all wrappers, and their state."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ FIRST_SEED = 10_000_000
 
 
 class Shoal(VecEnv):
-    """Fish in several waters as one batch, with the processor time that their steps take.
+    """Fish under several conditions as one batch, with the processor time of their steps.
 
     Args:
         parts: batches side by side, with the same spaces.
@@ -35,7 +35,7 @@ class Shoal(VecEnv):
         super().__init__(int(self._ends[-1]), first.observation_space, first.action_space)
 
     def reset(self) -> np.ndarray:
-        """All fish begin."""
+        """Begins all episodes."""
         observations = np.concatenate([part.reset() for part in self.parts])
         self.reset_infos = [info for part in self.parts for info in part.reset_infos]
         return observations
@@ -63,7 +63,7 @@ class Shoal(VecEnv):
         return list(range(seed, seed + self.num_envs))
 
     def close(self) -> None:
-        """Nothing to release."""
+        """Does nothing: there is nothing to release."""
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """An attribute of the first part, once for each fish asked for."""
@@ -77,7 +77,7 @@ class Shoal(VecEnv):
     def env_method(
         self, method_name: str, *method_args: Any, indices: Any = None, **method_kwargs: Any
     ) -> list[Any]:
-        """Calls a method of each part; what each returns, once for each of its fish."""
+        """Calls a method of each part; returns its result once for each fish."""
         return [
             result
             for part in self.parts
@@ -91,7 +91,7 @@ class Shoal(VecEnv):
 
 @dataclass(frozen=True, eq=False)
 class Stack:
-    """The environment of a training from the inside out; ``outside`` is what the learner sees."""
+    """The environment of a training with its wrappers; ``outside`` is the outermost."""
 
     fish: Shoal
     monitor: VecMonitor
@@ -99,7 +99,7 @@ class Stack:
     outside: VecNormalize
 
     def state(self) -> dict[str, Any]:
-        """All that a later process needs to go on with the same bits, as plain values."""
+        """Returns plain values from which a later process continues with the same bits."""
         outside = self.outside
         return {
             "envs": [part.env.save_state() for part in self.fish.parts],
@@ -112,7 +112,7 @@ class Stack:
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Puts a state back.
+        """Restores a state.
 
         Raises:
             KeyError, ValueError: the state is not that of such fish.
@@ -129,14 +129,14 @@ class Stack:
         outside.old_obs, outside.old_reward = state["latest"]
 
     def _means(self) -> list[RunningMeanStd]:
-        """What observations and returns are normalised by."""
+        """Returns the running means of observations and returns."""
         seen = self.outside.obs_rms
         assert isinstance(seen, RunningMeanStd)
         return [seen, self.outside.ret_rms]
 
 
 def make_stack(config: TrainConfig) -> Stack:
-    """The fish of a configuration, seeded, with monitor, history and normalisation."""
+    """Makes the fish of a configuration, seeded, with monitor, history and normalisation."""
     names = config.disturbances
     count, threads = config.num_envs // len(names), config.threads.environment
     options = [config.options(name, training=True) for name in names]

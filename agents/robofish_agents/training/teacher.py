@@ -1,8 +1,8 @@
-"""The teacher of an imitation: a controller that knows more than any fish can.
+"""The teacher of an imitation: a controller with more information than any policy has.
 
-It is the PID controller on the true state, without noise or delay; it knows which trim the fish
-has, looks ahead along the goals, and swims faster where the block or the turn is at its limit.
-What it does can be told from what sensors show over some time, which is what the learner works out.
+It is the PID controller on the true state, without noise or delay. It knows the trim of the fish,
+predicts the goals, and swims faster where the block or the turn is at its limit. The learner has to
+estimate from past observations what the teacher knows.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ MOMENT, LIFT = "mass.static_moment_rest[0]", "mass.buoyancy"
 
 
 class ForesightPID(PIDController):
-    """The PID controller with foresight, and with a speed goal that is higher where that helps.
+    """The PID controller with prediction of the goals and an adapted speed goal.
 
     Args:
         gains: see :class:`TeacherGains`.
@@ -42,13 +42,13 @@ class ForesightPID(PIDController):
         super().__init__(gains)
 
     def reset(self, count: int) -> None:
-        """Episodes of ``count`` fish begin: forget the integrals and the goals' courses."""
+        """Resets integrals and predicted goals at the start of the episodes of ``count`` fish."""
         super().reset(count)
         self._depth_goal.reset(count)
         self._heading_goal.reset(count)
 
     def trim(self, moment: FloatArray, lift: FloatArray) -> None:
-        """Begins with a block where the fish's trim asks for it.
+        """Sets the initial position of the block that the trim of the fish requires.
 
         Args:
             moment: (N,) static moment beyond the nominal fish's (kg m).
@@ -80,7 +80,7 @@ class ForesightPID(PIDController):
         return super()._tail_frequency(seen, haste)
 
     def _haste(self, seen: Seen, extra: FloatArray) -> FloatArray:
-        """Speed (m/s) beyond the goal that something asks for."""
+        """Returns the additional speed (m/s) above the goal."""
         given = self.gains
         swing = given.swing_speed * (self._depth_goal.fastest - given.swing_from)
         turn = (np.abs(seen.heading_error) - given.turn_from) / given.turn_range
@@ -107,7 +107,7 @@ class Teacher:
         self._pid = ForesightPID(teacher_gains(settings.gains))
 
     def reset(self, count: int) -> None:
-        """Episodes of all fish have begun."""
+        """Begins the episodes of all fish."""
         self._pid.reset(count)
         moment, lift = (
             np.concatenate([beyond(path, batch) for batch in self._batches])
@@ -116,21 +116,21 @@ class Teacher:
         self._pid.trim(moment, lift)
 
     def act(self, observations: Float32Array) -> Float32Array:
-        """What it would do (N, 5), for the fish as they are and what their sensors show (N, 33)."""
+        """Returns actions (N, 5) for the true states and observations (N, 33) of the fish."""
         ends = np.cumsum([batch.count for batch in self._batches])[:-1]
         rows = zip(np.split(observations, ends), self._batches, strict=True)
         return self._pid.act(np.concatenate([true_observations(*row) for row in rows]))
 
 
 def beyond(path: str, batch: FishBatch) -> FloatArray:
-    """What each fish (N,) has beyond the nominal one of a parameter."""
+    """Returns the deviation (N,) of a parameter of each fish from the nominal value."""
     nominal = batch.options.model.fish.get(path)
     drawn = batch.drawn.get(path)
     return np.zeros(batch.count) if drawn is None else drawn - nominal
 
 
 def true_observations(observations: Float32Array, batch: FishBatch) -> FloatArray:
-    """Observations (N, 33) as sensors without noise and delay would show them now."""
+    """Returns observations (N, 33) of sensors without noise and delay."""
     outputs = dict(zip(OUTPUTS, batch.outputs, strict=True))
     qw, qx, qy, qz = batch.state[3:7]
     u, v, w, p, q, r = batch.state[7:13]

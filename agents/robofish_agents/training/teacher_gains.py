@@ -1,4 +1,4 @@
-"""Numbers of the teacher: those of the PID controller, and those of what it knows beyond."""
+"""Gains of the teacher: those of the PID controller, and those of its additional information."""
 
 from __future__ import annotations
 
@@ -13,10 +13,9 @@ class TeacherGains(PIDGains):
     """Gains of the PID controller, and these.
 
     Attributes:
-        depth_ahead: the depth error is that of so much later, goal and fish going on as they are
-            (s).
-        climb_ahead: the climb rate asked for is that of the goal so much later (s).
-        turn_ahead: so is the turn rate (s).
+        depth_ahead: time ahead of the depth error, with present rates of goal and fish (s).
+        climb_ahead: time ahead of the desired climb rate (s).
+        turn_ahead: time ahead of the desired turn rate (s).
         trim_moment: block action to begin with, per kg m of moment beyond the nominal fish's.
         trim_lift: the same per kg of displaced water beyond the nominal fish's.
         hurry: largest speed beyond the goal where the block is at its end (m/s).
@@ -70,5 +69,5 @@ NOTHING_BEYOND = {
 
 
 def teacher_gains(changes: Mapping[str, Gain]) -> TeacherGains:
-    """The PID controller's tuned gains and nothing beyond, but for the changes."""
+    """Returns the tuned gains of the PID controller, with changes; all others are zero."""
     return TeacherGains(**{**asdict(tuned_gains()), **NOTHING_BEYOND, **changes})

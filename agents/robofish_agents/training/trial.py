@@ -1,4 +1,4 @@
-"""Evaluation on the side: a policy on episodes that it is not trained on."""
+"""Evaluation of a policy during training, on episodes that it is not trained on."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LOOKED_AT = ("success_rate", "depth_rmse_m", "heading_rmse_rad", "mean_power_w",
 
 
 def try_policy(config: TrainConfig, agent: Agent) -> dict[str, float]:
-    """Means of the metrics LOOKED_AT over episodes from random starts.
+    """Returns means of the metrics LOOKED_AT over episodes from random starts.
 
     The conditions are those of the training, each taken once and with as many episodes; the
     reward is that of the environment. ``worst_success_rate`` is that of the worst of them.

@@ -1,1 +1,1 @@
-"""Ray RLlib as the library that learns, on its new API stack."""
+"""Training with Ray RLlib, on its new API stack."""

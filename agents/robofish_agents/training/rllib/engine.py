@@ -1,4 +1,4 @@
-"""Ray RLlib as the library that learns.
+"""Training with Ray RLlib.
 
 RLlib's PPO collects experience from the native batch and learns from it, in this process. The
 networks begin as those of Stable-Baselines3, imitation included, and are exported like them.
@@ -75,7 +75,7 @@ class RllibEngine:
 
     @property
     def runner(self) -> BatchRunner:
-        """What collects experience."""
+        """The environment runner, which collects experience."""
         found: BatchRunner = self.algorithm.env_runner
         return found
 
@@ -89,7 +89,7 @@ class RllibEngine:
         return self._learner.module[DEFAULT_MODULE_ID]
 
     def _take_over(self) -> None:
-        """RLlib goes on from the networks of Stable-Baselines3."""
+        """Copies the networks of Stable-Baselines3 into RLlib."""
         self._put(self.shape.policy.state_dict())
 
     def _put(self, weights: Mapping[str, torch.Tensor]) -> None:
@@ -102,7 +102,7 @@ class RllibEngine:
         self._take_over()
 
     def log_to(self, folder: Path) -> Callable[[str, float], object]:
-        """Opens a TensorBoard log in a folder; what it gives back records a name and a value."""
+        """Opens a TensorBoard log in a folder; returns a function that logs a name and a value."""
         self._log = logger.configure(str(folder), ["tensorboard"])
         self._open.callback(self._log.close)
         return self._log.record
@@ -141,13 +141,13 @@ class RllibEngine:
         log.dump(runner.steps)
 
     def policy(self, about: Mapping[str, Any]) -> PolicyFile:
-        """The present deterministic policy, with a card."""
+        """Returns the present deterministic policy, with a card."""
         self.shape.policy.load_state_dict(self._networks.state_dict())
         spec = self.stack.past.history.spec
         return export_policy(self.shape, self.stack.outside, spec, self.config.task, about)
 
     def state(self) -> dict[str, Any]:
-        """All that a later process needs to go on with the same bits, as plain values."""
+        """Returns plain values from which a later process continues with the same bits."""
         return {
             "weights": weights_state(self._networks.state_dict()),
             "optimiser": optimiser_state(self._learner.get_optimizer()),
@@ -156,7 +156,7 @@ class RllibEngine:
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Puts a state back; the fish have theirs already.
+        """Restores a state; the state of the fish is restored before.
 
         Raises:
             KeyError, ValueError, RuntimeError: the state is not that of such a learner.
@@ -170,5 +170,5 @@ class RllibEngine:
         restore_random(state["random"])
 
     def close(self) -> None:
-        """Ends what was started: log, algorithm, and Ray if it was not running before."""
+        """Closes log and algorithm, and stops Ray if it was not running before."""
         self._open.close()

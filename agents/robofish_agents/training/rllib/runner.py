@@ -1,4 +1,4 @@
-"""RLlib collects experience from the whole batch of fish, stepped as one."""
+"""An environment runner of RLlib that steps the whole batch of fish at once."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ Rows = npt.NDArray[Any]
 
 
 class BatchRunner(EnvRunner):  # type: ignore[misc]
-    """Swims all fish for one rollout and hands their paths to the learner.
+    """Runs all fish for one rollout and gives their trajectories to the learner.
 
     RLlib makes it from a configuration that it copies, so it gets its fish later, by :meth:`swim`.
 
     Attributes:
         env: the fish, as the learner sees them.
         rollout: control steps of each fish in one rollout.
-        books: told about steps; None before the training begins.
-        seen: (N, n) what the policy sees next; None before the first reset.
+        books: counts steps; None before the training begins.
+        seen: (N, n) next input of the policy; None before the first reset.
         steps: control steps of all fish so far.
         ended: return, length and success of the episodes that ended in the last rollout.
     """
@@ -52,7 +52,7 @@ class BatchRunner(EnvRunner):  # type: ignore[misc]
         self.make_module()
 
     def swim(self, stack: Stack, rollout: int) -> None:
-        """Takes its fish.
+        """Sets the fish.
 
         Args:
             stack: the fish, with what is around them.
@@ -61,18 +61,18 @@ class BatchRunner(EnvRunner):  # type: ignore[misc]
         self.env, self.rollout = stack.outside, rollout
 
     def make_module(self) -> None:
-        """Makes networks of its own; RLlib copies the learner's weights into them."""
+        """Makes the networks; RLlib copies the learner's weights into them."""
         spec = self.config.get_rl_module_spec(spaces=self.get_spaces())
         self.module: FishModule = spec.build()
 
     def assert_healthy(self) -> None:
-        """It has fish and networks from the beginning."""
+        """Does nothing: fish and networks always exist."""
 
     def stop(self) -> None:
-        """The fish belong to the training."""
+        """Does nothing: the training owns the fish."""
 
     def get_spaces(self) -> dict[str, Any]:
-        """What the policy sees and does."""
+        """Returns the spaces of the input and of the action of the policy."""
         spaces = (self.config.observation_space, self.config.action_space)
         return dict.fromkeys((INPUT_ENV_SPACES, INPUT_ENV_SINGLE_SPACES, DEFAULT_MODULE_ID), spaces)
 
@@ -83,15 +83,15 @@ class BatchRunner(EnvRunner):  # type: ignore[misc]
             self.module.set_state(weights.get(DEFAULT_MODULE_ID, weights))
 
     def get_state(self, *args: Any, **kwargs: Any) -> dict[str, Any]:
-        """Weights; the fish are kept by the training."""
+        """Returns the weights; the training keeps the state of the fish."""
         return {COMPONENT_RL_MODULE: self.module.get_state()}
 
     def get_metrics(self) -> Any:
-        """What was counted since the last time."""
+        """Returns the counts since the last call."""
         return self.metrics.reduce()
 
     def sample(self, **kwargs: Any) -> list[SingleAgentEpisode]:
-        """One rollout of all fish, as pieces of episodes."""
+        """Returns one rollout of all fish, as parts of episodes."""
         if self.seen is None:
             self.seen = np.asarray(self.env.reset())
         self.ended.clear()
@@ -108,7 +108,7 @@ class BatchRunner(EnvRunner):  # type: ignore[misc]
         return [piece for lane in lanes for piece in self._pieces(lane, whole, lasts)]
 
     def _step(self) -> dict[str, Any]:
-        """One control step: what was seen, done and came of it; (N, ...) each."""
+        """Takes one control step; returns inputs, actions and results, (N, ...) each."""
         seen = self.seen
         assert seen is not None
         with torch.no_grad():

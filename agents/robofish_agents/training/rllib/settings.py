@@ -1,4 +1,4 @@
-"""A training configuration in the words of RLlib."""
+"""Converts a training configuration to one of RLlib."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class FishPpo(PPO):  # type: ignore[misc]
 
 
 def build(config: TrainConfig, stack: Stack, folder: str) -> FishPpo:
-    """An algorithm of RLlib that learns in this process; Ray must be running.
+    """Builds an algorithm of RLlib that learns in this process; Ray must be running.
 
     Args:
         config: of the training.

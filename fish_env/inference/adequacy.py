@@ -20,6 +20,7 @@ from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause
 from fish_env.inference.projection import Projector, Signal
 from fish_env.inference.screening import SETTINGS_AT_ONCE, null_threshold
+from fish_env.inference.tails import chi2_log_tail
 
 NOTHING = Cause("generic")
 
@@ -130,6 +131,19 @@ def implausible_estimates(fit: Fit) -> tuple[str, ...]:
             if beyond:
                 found.append(f"{name} with a {parameter.name} of {value:.2g} {unit}")
     return tuple(found)
+
+
+def contradicts_priors(fit: Fit) -> bool:
+    """Whether the coefficients as a whole are further off than the vehicle described can be.
+
+    Something is then missing that coefficients make up for, each within its bounds, or the vehicle
+    is another one. The sum of squares of n coefficients in prior standard deviations is that of
+    normal numbers, chi-squared with n degrees of freedom, or less where data hold little.
+    """
+    paths = fit.problem.baseline.paths
+    kept = np.array([path not in fit.released for path in paths])
+    squares = float(np.sum(fit.point.z[kept] ** 2))
+    return bool(chi2_log_tail(squares, int(kept.sum())) < np.log(POLICY.strange_coefficients))
 
 
 def beyond_plausible(fit: Fit, name: str) -> bool:

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from fish_env.arrays import FloatArray
-from fish_env.inference.adequacy import generic_signals, implausible_estimates
+from fish_env.inference.adequacy import contradicts_priors, generic_signals, implausible_estimates
 from fish_env.inference.budget import RESAMPLES
 from fish_env.inference.elimination import off_values
 from fish_env.inference.estimate.fit import Fit
@@ -50,7 +50,8 @@ def confirmed(
 
     What is left may be a disturbance of implausible strength: it is estimated with the rest, and
     the evidence for a cause is counted beside it. What was measured of a drive without a model
-    needs no model to confirm it.
+    needs no model to confirm it. Where coefficients as a whole contradict their priors they make up
+    for what is missing, and so may any cause that was found beside them: none is believed.
 
     Args:
         accepted: causes that explain part of the data.
@@ -61,6 +62,9 @@ def confirmed(
         The causes that are left with their fit; None where none is.
     """
     measured = _measured(accepted)
+    if contradicts_priors(accepted.fit) and (doubtful := {*accepted.causes} - measured):
+        report(f"leaving out {', '.join(sorted(doubtful))}: coefficients contradict their priors")
+        return without(accepted, tuple(doubtful)) if measured else None
     while {*accepted.causes} - measured:
         weakest = _implausible(accepted, measured)
         if weakest is not None:

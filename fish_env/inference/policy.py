@@ -46,6 +46,8 @@ class DecisionPolicy:
         prior_reach_sd: prior standard deviations that a coefficient may move.
         extreme_prior_sd: prior standard deviations that are implausible beside an effect.
         implausible_prior_sd: prior standard deviations, or plausible sizes, that are implausible.
+        strange_coefficients: p-value of all coefficients under their priors below which no cause is
+            believed beside something unknown.
         far_start_sd: prior standard deviations beyond which a fit also starts from nominal values.
         score_block_s: length of blocks over which scores are summed (s).
         long_score_block_s: length of the longer blocks (s).
@@ -88,6 +90,9 @@ class DecisionPolicy:
     prior_reach_sd: float = _number(5.0, 3.0, 12.0, BY_HAND)
     extreme_prior_sd: float = _number(4.9, 3.0, 12.0, "one coefficient in a million passes it")
     implausible_prior_sd: float = _number(10.0, 5.0, 50.0, BY_HAND)
+    strange_coefficients: float = _number(
+        1e-4, 1e-12, 0.05, "the vehicle described is so in all but one of ten thousand cases"
+    )
     far_start_sd: float = _number(2.0, 0.5, 5.0, EFFORT)
     score_block_s: float = _number(3.0, 0.5, 30.0, BY_HAND)
     long_score_block_s: float = _number(9.0, 1.0, 60.0, BY_HAND)

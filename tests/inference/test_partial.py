@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from fish_env.inference.adequacy import contradicts_priors
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.partial import StandIns, confirmed, sustained
 from fish_env.inference.pipeline import infer
+from fish_env.inference.problem import Point
 from fish_env.inference.vehicle import Drive
 from tests.inference.boat import sail
 from tests.inference.boat_problem import BoatProblem
@@ -82,3 +86,15 @@ def test_what_was_measured_of_a_drive_needs_no_simulation(certain):
     assert "current" in found.causes
     alone = Explanation(("rudder_bias",), fit(boat, ("rudder_bias",)))
     assert (confirmed(alone, THRESHOLD) is not None) == certain
+
+
+def test_no_cause_is_believed_where_coefficients_contradict_their_priors():
+    """A boat whose coefficients are all four prior deviations off is not the boat described."""
+    boat = BoatProblem(sail(np.random.default_rng(7), FITTED, {NORTH: 0.15, EAST: -0.2}))
+    right = fit(boat, ("current",))
+    off = replace(right, point=Point(np.full_like(right.point.z, 4.0), right.point.effects))
+    said: list[str] = []
+    assert confirmed(Explanation(("current",), off), THRESHOLD, said.append) is None
+    assert "contradict their priors" in said[0]
+    assert not contradicts_priors(right)
+    assert contradicts_priors(off)

@@ -8,18 +8,17 @@ from __future__ import annotations
 
 import atexit
 import gc
-import os
 import sys
 import warnings
 from importlib.metadata import entry_points
 from pathlib import Path
-from typing import Annotated, NoReturn
+from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.markup import escape
 
 from fish_env.commands.campaign import campaign
+from fish_env.commands.ending import complain, leave_broken_pipe
 from fish_env.commands.options import (
     Commands,
     Json,
@@ -368,7 +367,7 @@ add_commands(app)
 def main() -> None:
     """Runs `robofish`. Our errors are one red line and exit status 2; Ctrl-C is yellow and 130."""
     with warnings.catch_warnings():
-        warnings.showwarning = lambda message, *_: _complain("yellow", f"robofish: {message}")
+        warnings.showwarning = lambda message, *_: complain("yellow", f"robofish: {message}")
         # On its way out the interpreter would look for garbage among all that the compiler made,
         # which takes most of a second; it goes with the process.
         atexit.register(gc.freeze)
@@ -379,31 +378,19 @@ def _run() -> None:
     try:
         app(prog_name="robofish")
     except Interrupted as error:
-        _complain("yellow", f"robofish: {error}")
+        complain("yellow", f"robofish: {error}")
         raise SystemExit(INTERRUPTED) from None
     except RoboticFishError as error:
         if isinstance(error.__cause__, BrokenPipeError):
-            _leave_broken_pipe()
-        _complain("red", f"robofish: {error}")
+            leave_broken_pipe()
+        complain("red", f"robofish: {error}")
         raise SystemExit(2) from None
     except BrokenPipeError:
-        _leave_broken_pipe()
+        leave_broken_pipe()
     except OSError as error:
         named = f"{error.filename}: " if error.filename else ""
-        _complain("red", f"robofish: {named}{error.strerror or error}")
+        complain("red", f"robofish: {named}{error.strerror or error}")
         raise SystemExit(2) from None
-
-
-def _leave_broken_pipe() -> NoReturn:
-    """Ends quietly, as other programs do whose reader, such as `head`, has seen enough."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-    raise SystemExit(1)
-
-
-def _complain(colour: str, text: str) -> None:
-    from fish_env.reading import printable
-
-    Console(stderr=True, soft_wrap=True).print(escape(printable(text)), style=colour)
 
 
 if __name__ == "__main__":

@@ -210,7 +210,8 @@ def announce_compilation(function: Any, file: Path, name: str) -> None:
     if marker.exists():
         return
     print(
-        f"fish_env: compiling {name} for this machine (once; up to a minute, kept in {file.parent})",
+        f"fish_env: compiling {name} for this machine "
+        f"(once; up to a minute, kept in {file.parent})",
         file=sys.stderr,
         flush=True,
     )

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import atexit
 import gc
-import sys
 import warnings
 from importlib.metadata import entry_points
 from pathlib import Path
@@ -19,6 +18,7 @@ from rich.console import Console
 
 from fish_env.commands.campaign import campaign
 from fish_env.commands.ending import complain, leave_broken_pipe
+from fish_env.commands.import_command import import_command
 from fish_env.commands.options import (
     Commands,
     Json,
@@ -59,6 +59,7 @@ def simulate(
         typer.Option(help="A .csv or .parquet file. Without it, or with -, CSV is printed."),
     ] = None,
     replay: Annotated[Path | None, typer.Option(help="HTML replay page to write.")] = None,
+    json: Json = None,
     trust_effects: TrustEffects = False,
 ) -> None:
     """Simulate one case and write pose and velocities over time.
@@ -70,7 +71,7 @@ def simulate(
     """
     from fish_env.commands.simulate import simulate_case
 
-    simulate_case(case, dt, rate, out, replay, trust_effects)
+    simulate_case(case, dt, rate, out, replay, trust_effects, json)
 
 
 @app.command()
@@ -101,45 +102,7 @@ def compare(
     compare_dataset(console_for(json), dataset, fish, json, out, dt, runs, replay, trust_effects)
 
 
-@app.command("import")
-def import_command(
-    logs: Annotated[
-        list[str],
-        typer.Argument(
-            help="Logs: files, folders, or patterns such as 'runs/*.csv'.", metavar="LOG"
-        ),
-    ],
-    out: Annotated[Path, typer.Option(help="Folder of the dataset to write.")],
-    mapping: Annotated[
-        Path | None, typer.Option(help="A mapping (YAML) to use; without it, one is guessed.")
-    ] = None,
-    fish: Annotated[str | None, typer.Option(help="The fish: preset or parameter file.")] = None,
-    frame: Annotated[
-        str | None, typer.Option(help="ned (z down) or enu (z up), if the logs do not say.")
-    ] = None,
-    name: Annotated[str | None, typer.Option(help="Name of the dataset.")] = None,
-    run_column: Annotated[
-        str | None, typer.Option(help="Column whose value names the run, in a table of runs.")
-    ] = None,
-    start: Annotated[str | None, typer.Option(help="rest: each run began level and still.")] = None,
-    yes: Annotated[
-        bool, typer.Option("--yes", help="Accept all guesses without asking; print them.")
-    ] = False,
-) -> None:
-    """Import logs: ROS bags, MATLAB, Parquet, Excel, CSV of any shape.
-
-    Guesses the meaning of each column, shows the guesses and a picture of each run, and writes
-    a dataset once you confirm. It also writes the mapping `import.yaml`, for `--mapping`.
-
-    **Example:** `robofish import trial1.bag trial2.bag --out trials --fish zheng-2021-a`
-    """
-    from fish_env.commands.import_logs import Told, import_logs
-
-    console = Console()
-    ask = console.input if sys.stdin.isatty() else None
-    told = Told(fish, frame, name, run_column, start)
-    if import_logs(console, logs, out, mapping, told, yes, ask) is None:
-        raise typer.Exit(1)
+app.command("import")(import_command)
 
 
 @app.command()
@@ -321,14 +284,16 @@ def paper(
 @app.command()
 def demo(
     out: Annotated[Path, typer.Option(help="Folder for the report.")] = Path("out/demo"),
+    json: Json = None,
 ) -> None:
     """Show what the package does, in a minute or two: diagnosis, comparison and environment.
 
     **Example:** `robofish demo`
     """
     from fish_env.commands.demo import run_demo
+    from fish_env.commands.numbers import console_for
 
-    run_demo(Console(), out)
+    run_demo(console_for(json), out, json)
 
 
 @app.command()

@@ -15,6 +15,7 @@ from fish_env.errors import ScheduleError, missing_extra
 from fish_env.files import replacing
 from fish_env.model.state import INPUTS
 from fish_env.sensing.channels import channels_from_states
+from fish_env.version import WRITER
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -94,7 +95,9 @@ class Trajectory:
         except ImportError:
             raise missing_extra("Writing Parquet", "pyarrow", "parquet") from None
         with replacing(path) as part:
-            self.to_pandas().to_parquet(part, index=False)
+            frame = self.to_pandas()
+            frame.attrs["written_by"] = WRITER
+            frame.to_parquet(part, index=False)
 
     def _chosen(self, columns: tuple[str, ...] | None) -> Mapping[str, FloatArray]:
         everything = self.columns

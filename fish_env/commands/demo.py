@@ -6,6 +6,7 @@ functions like those of :data:`PARTS`, whose docstring begins with their title.
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable
 from importlib.metadata import entry_points
@@ -14,14 +15,18 @@ from pathlib import Path
 from rich.console import Console
 from rich.rule import Rule
 
+from fish_env.commands.numbers import write_json
 from fish_env.comparison import compare_steady
 from fish_env.comparison.words import in_words
 from fish_env.data import SteadyDataset, load_dataset
 from fish_env.errors import DatasetError
+from fish_env.files import check_outputs
 from fish_env.params import load_fish
 
 DATASET = "msu-steady"
 TRIALS = "demo-trials"
+ANSWER = Path("diagnosis", "diagnosis.json")
+"""What the diagnosis writes below the folder of the demonstration."""
 Part = Callable[[Console, Path], list[Path]]
 
 
@@ -53,7 +58,7 @@ def diagnose_trials(console: Console, out: Path) -> list[Path]:
         "Six runs of 10 s from a stand-in for a robot. Its data are simulated, with noise, and it "
         "has one fault that the simulation does not know. What is it?"
     )
-    folder = out / "diagnosis"
+    folder = out / ANSWER.parent
     with console.status("reading") as status:
         answer = diagnose(
             TRIALS, folder, quick=True, progress=lambda step: status.update(f"{step}")
@@ -76,13 +81,15 @@ def all_parts() -> dict[str, Part]:
     return PARTS | {part.__doc__.partition("\n")[0].rstrip("."): part for part in added}
 
 
-def run_demo(console: Console, out: Path) -> None:
+def run_demo(console: Console, out: Path, json_file: Path | None = None) -> None:
     """Runs every part of the demonstration and names the report and the pictures it wrote.
 
     Args:
         console: Where words and progress go.
         out: Folder for the report and the pictures.
+        json_file: JSON file for the diagnosis and the names of the files; None for none.
     """
+    check_outputs([json_file, out / ANSWER])
     begun, pictures, parts = time.monotonic(), list[Path](), all_parts()
     for number, (title, part) in enumerate(parts.items(), 1):
         console.print(Rule(f"{number} of {len(parts)}: {title}", align="left"))
@@ -90,4 +97,7 @@ def run_demo(console: Console, out: Path) -> None:
     console.print(Rule("Open these files", align="left"))
     for picture in pictures:
         console.print(str(picture), soft_wrap=True)
+    if json_file is not None:
+        found = json.loads((out / ANSWER).read_text(encoding="utf-8"))
+        write_json(console, json_file, {"diagnosis": found, "files": [str(p) for p in pictures]})
     console.print(f"{time.monotonic() - begun:.0f} s", style="dim")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rich import box
@@ -35,6 +36,7 @@ from fish_env.data.importing.plan import Content, Entry
 from fish_env.data.importing.writing import used_content
 from fish_env.data.writing import check_free
 from fish_env.errors import DatasetError
+from fish_env.files import check_outputs
 from fish_env.params import list_fish
 
 Ask = Callable[[str], str]
@@ -86,6 +88,7 @@ def import_logs(
     told: Told,
     yes: bool,
     ask: Ask | None,
+    json_file: Path | None = None,
 ) -> Imported | None:
     """Reads logs, shows what their columns are taken for, and writes a dataset once confirmed.
 
@@ -97,6 +100,7 @@ def import_logs(
         told: What the options say.
         yes: Write without asking.
         ask: Asks a person one question; None where nobody can answer.
+        json_file: Will be written afterwards, so it must be none of the logs.
 
     Returns:
         The dataset; None if the answer was no.
@@ -108,6 +112,8 @@ def import_logs(
     if mapping is None or mapping.resolve() != (out / MAPPING).resolve():
         _check_mapping(out)
     sources, notes = open_logs(logs)
+    read = dict.fromkeys(source.file for source in sources)
+    check_outputs([json_file, out / FILE_NAME], [*read, mapping])
     for note in notes:
         console.print(f"note: {note}", style="dim", highlight=False, markup=False)
     if mapping is not None:
@@ -271,6 +277,29 @@ def _mapping_row(plan: Plan, entry: Entry, sources: Sequence[Source]) -> list[st
     words += f", {entry.between}" if entry.between != "hold" else ""
     lowest, highest = np.nanmin(values), np.nanmax(values)
     return [words, entry.unit.name, f"{lowest:.4g}", f"{highest:.4g}"]
+
+
+def in_numbers(imported: Imported, out: Path) -> dict[str, Any]:
+    """What was imported, for `--json`: the content of dataset.yaml, the runs and the notes.
+
+    Args:
+        imported: The dataset.
+        out: Its folder.
+    """
+    return {
+        "folder": str(out),
+        "description": dict(imported.description),
+        "runs": [
+            {
+                "id": run.id,
+                "duration_s": run.time_s[-1] - run.time_s[0],
+                "rows": len(run.time_s),
+                "command_changes": len(run.commands.times_s) - 1,
+            }
+            for run in imported.dataset.runs
+        ],
+        "notes": [*imported.notes, *imported.dataset.notes],
+    }
 
 
 def _runs_table(imported: Imported) -> Table:

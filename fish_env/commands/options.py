@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -56,6 +57,13 @@ Temp = Annotated[
 class Commands(TyperGroup):
     """The commands; a person's Ctrl-C ends each with one line."""
 
+    _line: tuple[str, ...] = ()
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Keeps the words of the command line, for the line that tells how to start again."""
+        self._line = tuple(args)
+        return super().parse_args(ctx, args)
+
     def invoke(self, ctx: Any) -> Any:
         """Runs a command.
 
@@ -65,9 +73,10 @@ class Commands(TyperGroup):
         try:
             return super().invoke(ctx)
         except KeyboardInterrupt:
+            again = shlex.join((str(ctx.command_path), *self._line))
             raise Interrupted(
-                "stopped; complete files are kept, and nothing is half written. Run the command "
-                "again for the rest"
+                "stopped; files that were complete are kept, and none is half written. Start "
+                f"again with: {again}"
             ) from None
 
 

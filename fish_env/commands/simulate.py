@@ -11,11 +11,13 @@ from rich.console import Console
 
 from fish_env.arrays import FloatArray
 from fish_env.commands.case import read_case
+from fish_env.commands.numbers import write_json
 from fish_env.errors import ScheduleError, missing_extra
 from fish_env.files import STANDARD, cannot_write, check_outputs, replacing
 from fish_env.params import fish_files
 from fish_env.simulator import Simulator
 from fish_env.trajectory import POSE_COLUMNS, Trajectory
+from fish_env.version import WRITER
 
 COLUMNS = ("t", *POSE_COLUMNS)
 SUFFIXES = (".csv", ".parquet")
@@ -28,6 +30,7 @@ def simulate_case(
     out: Path | None,
     replay: Path | None = None,
     trust_effects: bool = False,
+    json_file: Path | None = None,
 ) -> None:
     """Simulates a case and writes its motion, to standard output if no file is named.
 
@@ -38,6 +41,7 @@ def simulate_case(
         out: `.csv` or `.parquet` file; `-` is standard output.
         replay: HTML page that shows the fish swim.
         trust_effects: Run the effect files that the fish's file names.
+        json_file: JSON file of the table by columns; `-` puts it in the place of the table.
 
     Raises:
         ScheduleError: The case or the output's ending is not as it should be.
@@ -47,10 +51,15 @@ def simulate_case(
     if out is not None and out.suffix not in SUFFIXES:
         raise ScheduleError(f"{out}: give the output the ending .csv or .parquet")
     case = read_case(case_file, trust_effects)
-    check_outputs([out, replay], [case_file, *fish_files(case.fish)])
+    check_outputs([out, replay, json_file], [case_file, *fish_files(case.fish)])
     simulator = Simulator(case.fish, dt, case.effects)
     trajectory = simulator.run(case.commands, case.duration_s, case.initial, rate_hz)
-    write_table(pose_table(trajectory), out)
+    table = pose_table(trajectory)
+    if out is not None or json_file is None or str(json_file) != STANDARD:
+        write_table(table, out)
+    if json_file is not None:
+        columns = dict(zip(COLUMNS, table.T.tolist(), strict=True))
+        write_json(Console(stderr=True), json_file, {"fish": case.fish.name, "columns": columns})
     if replay is not None:
         from fish_env.commands.replay import replay_case
 
@@ -97,4 +106,6 @@ def _write_parquet(table: FloatArray, out: Path) -> None:
     import pandas as pd
 
     with replacing(out) as part:
-        pd.DataFrame(table, columns=list(COLUMNS)).to_parquet(part, index=False)
+        frame = pd.DataFrame(table, columns=list(COLUMNS))
+        frame.attrs["written_by"] = WRITER
+        frame.to_parquet(part, index=False)

@@ -7,6 +7,7 @@ from fish_env.data.mapping import Section
 from fish_env.data.table import Column
 from fish_env.data.units import Unit, parse_unit
 from fish_env.data.vocabulary import Quantity
+from fish_env.reading import short
 
 TIME = "t"
 ISO = "iso"
@@ -90,6 +91,11 @@ def parse_clock(top: Section) -> Clock:
             return Clock()
         unit = parse_unit(channels.text(TIME), _DURATION, channels.at(TIME))
         return Clock(TIME, unit, declared=True)
+    if isinstance(column := top.content["time"], str):
+        raise top.at("time").refuse(
+            f"'{short(column)}' alone does not tell the unit",
+            f"Write it as {{column: {short(column)}, unit: s}}, with the unit of your clock",
+        )
     section = top.section("time")
     section.allow(["column", "unit"])
     column = section.text("column") if "column" in section else TIME

@@ -84,13 +84,9 @@ def confirmed(
 
 
 def _measured(found: Explanation) -> frozenset[str]:
-    """Causes that were measured without a model.
-
-    Where runs have beats of their own, a law of the beat may be what these happen to differ by.
-    """
+    """Causes that were measured without a model, and not by chance."""
     drive = found.fit.problem.drive
-    known = drive.certain and not drive.uneven
-    return drive.effects & {*found.causes} if known else frozenset()
+    return drive.effects & {*found.causes} if drive.certain else frozenset()
 
 
 def sustained(

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fish_env.files import replacing
+from fish_env.version import WRITER
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -25,6 +27,9 @@ FORMATS = ("png", "pdf")
 DOTS_PER_INCH = 150
 PALE = 0.35
 """Opacity of what lies behind a mean."""
+
+_WRITER_KEYS = {".png": "Software", ".svg": "Creator", ".pdf": "Creator"}
+"""Ending of a picture -> the entry of its metadata that names the program."""
 
 _STYLE: dict[Any, Any] = {
     "font.size": 9.0,
@@ -43,6 +48,20 @@ _STYLE: dict[Any, Any] = {
 }
 
 
+@cache
+def _stamped(figure: type[Figure]) -> type[Figure]:
+    """A kind of figure whose files name the version of the package."""
+
+    class Stamped(figure):  # type: ignore[valid-type, misc]
+        def savefig(self, fname: Any, **options: Any) -> None:
+            key = _WRITER_KEYS.get(Path(fname).suffix) if isinstance(fname, str | Path) else None
+            if key is not None:
+                options["metadata"] = {key: WRITER, **(options.get("metadata") or {})}
+            super().savefig(fname, **options)
+
+    return Stamped
+
+
 @contextmanager
 def drawing(width: float = 7.2, height: float = 4.0) -> Iterator[Figure]:
     """A figure in the project's style, for use with `with`.
@@ -57,7 +76,7 @@ def drawing(width: float = 7.2, height: float = 4.0) -> Iterator[Figure]:
     from matplotlib.figure import Figure
 
     with matplotlib.rc_context({**_STYLE, "axes.prop_cycle": cycler(color=PALETTE)}):
-        figure = Figure(figsize=(width, height), layout="constrained")
+        figure = _stamped(Figure)(figsize=(width, height), layout="constrained")
         FigureCanvasAgg(figure)
         yield figure
 

@@ -11,6 +11,7 @@ from fish_env.errors import ConfigError, missing_extra
 from fish_env.files import replacing
 from fish_env.rendering.scene import Scene, Setting, between
 from fish_env.rendering.views import View
+from fish_env.version import WRITER
 
 QUALITY = 6
 """Of imageio-ffmpeg, 0 to 10."""
@@ -43,7 +44,7 @@ def write(
             fps=fps,
             quality=QUALITY,
             macro_block_size=2,
-            output_params=list(ENCODER),
+            output_params=[*ENCODER, "-metadata", f"comment={WRITER}"],
         )
         writer.send(None)
         try:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fish_env.data import CommandSteps, Dataset, Run
-from fish_env.diagnosis.inputs.check import check_inputs
+from fish_env.diagnosis.inputs.check import CERTAIN, check_inputs
 from fish_env.diagnosis.inputs.drive_law import DriveLaw, drive_law
 from fish_env.identification.tail_drive import SCALE, tail_drive
 
@@ -72,6 +72,14 @@ def test_tails_that_obey_have_no_law():
     found = [drive_law(swaying(seed, own=0.002)) for seed in range(20)]
     assert sum(bool(law.sizes) for law in found) <= 2  # each term is tested at 5 per cent
     assert all(abs(law.common - 1.0) < 0.005 for law in found)
+
+
+def test_own_beats_of_runs_are_no_certain_law():
+    """Runs that differ by two per cent: chance makes no law certain, and a law is."""
+    chance = [drive_law(swaying(seed, own=0.02)).p for seed in range(20, 50)]
+    assert min(chance) > CERTAIN
+    assert sum(p < 0.05 for p in chance) <= 5  # binomial: more in one set of thirty of 300
+    assert drive_law(swaying(1, own=0.02, offset=0.25)).p < CERTAIN
 
 
 def test_without_a_beat_nothing_is_said():

@@ -9,7 +9,9 @@ from importlib.metadata import version
 from pathlib import Path
 
 import pytest
+from typer.main import get_command
 
+from fish_env.cli import app
 from fish_env.files import check_outputs, write_text
 from fish_env.params import config_root
 from tests.command_line import run
@@ -20,10 +22,8 @@ CASE = {
     "duration_s": 0.3,
     "schedule": [{"t": 0, "tail_amplitude": 0.3, "tail_frequency": 1.0}],
 }
-PRINTING = (
-    "campaign", "compare", "diagnose", "effects", "evaluate", "fit", "info", "leaderboard", "paper",
-    "swim", "sweep", "train",
-)  # fmt: skip
+WITHOUT_RESULTS = {"plot", "replay"}
+"""Commands that print no more than the names of the files they write."""
 
 
 @pytest.fixture
@@ -47,10 +47,46 @@ def test_the_shell_completes_the_commands(capsys, monkeypatch):
     assert out.split() == ["diagnose"]
 
 
-@pytest.mark.parametrize("command", PRINTING)
-def test_every_command_that_prints_results_writes_numbers(command, capsys):
-    _, out, _ = run(capsys, command, "--help")
-    assert "--json" in out
+def test_every_command_that_prints_results_writes_numbers():
+    commands = get_command(app).commands  # those of other packages too
+    assert WITHOUT_RESULTS < set(commands)
+    options = {n: {o for p in c.params for o in p.opts} for n, c in commands.items()}
+    without = {name for name, known in options.items() if "--json" not in known}
+    assert without == WITHOUT_RESULTS
+
+
+def test_a_motion_as_numbers_takes_the_place_of_the_table(tmp_path, capsys):
+    case = tmp_path / "case.json"
+    case.write_text(json.dumps(CASE))
+    _, table, _ = run(capsys, "simulate", str(case))
+    status, out, err = run(capsys, "simulate", str(case), "--json", "-")
+    assert (status, err) == (0, "")
+    columns = json.loads(out)["columns"]
+    assert list(columns) == table.partition("\n")[0].split(",")
+    assert [f"{x:.17g}" for x in columns["x"]] == [r.split(",")[1] for r in table.split()[1:]]
+    status, _, err = run(capsys, "simulate", str(case), "--json", str(case))
+    assert (status, "is read and would be replaced" in err) == (2, True)
+
+
+def test_an_import_as_numbers(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("swim.csv").write_text("t,x\n" + "".join(f"{i / 10},{i / 100}\n" for i in range(30)))
+    told = ("--fish", "zheng-2021-a", "--frame", "ned", "--mapping", "map.yaml")
+    Path("map.yaml").write_text(
+        "format: robofish-import/1\nname: a\nsources: {log: {time: {column: t, unit: s}}}\n"
+        "channels: {x: {source: log, column: x, unit: m}}\ncommands: {}\n"
+        "constant_commands: {tail_offset: 0, tail_amplitude: 0.3, tail_frequency: 1, "
+        "block_displacement: 0, block_angle: 0}\n"
+    )
+    for target in ("swim.csv", "map.yaml"):
+        status, _, err = run(capsys, "import", "swim.csv", "--out", "a", *told, "--json", target)
+        assert (status, "is read and would be replaced" in err) == (2, True)
+    assert not Path("a").exists()
+    status, out, _ = run(capsys, "import", "swim.csv", "--out", "a", *told, "--json", "-")
+    assert status == 0
+    found = json.loads(out)
+    assert found["runs"] == [{"id": "swim", "duration_s": 2.9, "rows": 30, "command_changes": 0}]
+    assert found["description"]["channels"] == {"x": "m"}
 
 
 def test_numbers_go_to_standard_output_alone(capsys):
@@ -119,10 +155,11 @@ def test_ctrl_c_says_what_was_kept(capsys, monkeypatch):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("fish_env.commands.effects.print_effects", stopped)
-    status, _, err = run(capsys, "effects")
+    status, _, err = run(capsys, "effects", "--json", "all effects.json")
     assert status == 130
     assert err.count("\n") == 1
-    assert "nothing is half written" in err
+    assert "none is half written" in err
+    assert err.endswith("Start again with: robofish effects --json 'all effects.json'\n")
     monkeypatch.setattr("fish_env.commands.diagnose.diagnose", stopped)
     status, _, err = run(capsys, "diagnose", "msu-steady", "--out", "out/none")
     assert status == 130

@@ -173,6 +173,26 @@ def test_a_log_without_anything_known_is_refused_in_one_line(tmp_path, capsys):
     assert "not used: battery" in shown
 
 
+@pytest.mark.parametrize(
+    ("stamp", "name", "expected"),
+    [
+        ("01.05.2026 10:00:0{}", "stamp", ["column stamp", "'01.05.2026 10:00:00'", "ISO 8601"]),
+        ("{}", "beat", ["no column is named as a time among beat, x", "time_ms", "--mapping"]),
+    ],
+)
+def test_logs_without_a_readable_time_are_refused_by_that_name(
+    tmp_path, capsys, stamp, name, expected
+):
+    rows = "".join(f"{stamp.format(i)},{i}\n" for i in range(5))
+    (tmp_path / "swim.csv").write_text(f"{name},x\n{rows}")
+    told = ("--fish", "zheng-2021-a", "--frame", "ned", "--yes")
+    out = tmp_path / "out"
+    status, _, err = run(capsys, "import", str(tmp_path / "swim.csv"), "--out", str(out), *told)
+    assert status == 2
+    assert all(words in err for words in expected), err
+    assert not out.exists()
+
+
 def test_values_that_contradict_their_unit_are_refused_before_anything_is_written(tmp_path, capsys):
     frame(yaw=40 * np.sin(TIME)).to_csv(tmp_path / "swim.csv", index=False)
     mapping = tmp_path / "m.yaml"

@@ -16,7 +16,9 @@ from fish_env.data import load_dataset, write_dataset
 from fish_env.data.schema import Dataset
 from fish_env.params import load_fish
 from fish_env.params.io import save_fish
+from fish_env.plotting.style import drawing, save
 from fish_env.replay import Group, motion_from_run, write_replay
+from fish_env.simulator import Simulator
 from fish_env.version import VERSION
 from scripts import check_project, check_wheels
 
@@ -43,6 +45,21 @@ def test_files_name_the_version_and_are_read_again(tmp_path):
         assert f"robotic-fish {VERSION}" in (tmp_path / name).read_text(encoding="utf-8")
     assert json.loads((tmp_path / "numbers.json").read_text()) == {"version": VERSION, "a": 1}
     assert load_dataset(tmp_path / "data").name == data.name
+
+
+def test_pictures_and_parquet_name_the_version(tmp_path):
+    pd = pytest.importorskip("pandas")
+    with drawing(1.0, 1.0) as figure:
+        save(figure, tmp_path, "a", ("png", "svg", "pdf"))
+    written = {ending: (tmp_path / f"a.{ending}").read_bytes() for ending in ("png", "svg")}
+    assert all(f"robotic-fish {VERSION}".encode() in content for content in written.values())
+    # Texts in a PDF may be in UTF-16.
+    pdf = (tmp_path / "a.pdf").read_bytes().replace(b"\0", b"")
+    assert f"robotic-fish {VERSION}".encode() in pdf
+    swim = Simulator("zheng-2021-a").run([{"t": 0.0}], duration_s=0.1)
+    swim.to_parquet(tmp_path / "a.parquet")
+    kept = pd.read_parquet(tmp_path / "a.parquet")
+    assert kept.attrs == {"written_by": f"robotic-fish {VERSION}"}
 
 
 def test_every_item_of_the_checklists_holds():

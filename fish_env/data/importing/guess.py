@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from fish_env.data.importing.kinds import Kind, find_kinds, guess_time
+from fish_env.data.importing.kinds import Kind, find_kinds, guess_time, without_time
 from fish_env.data.importing.names import (
     CHANNEL_NAMES,
     COMMAND_NAMES,
@@ -84,10 +84,15 @@ def guess_mapping(
 
     Returns:
         The mapping, and every guess in words. What there is no evidence for is left out of it.
+
+    Raises:
+        DatasetError: No table has a column of times that can be read.
     """
     said = list[str]()
     kinds = find_kinds(sources)
     times = {kind.name: found for kind in kinds if (found := guess_time(kind)) is not None}
+    if kinds and not times:
+        raise without_time(kinds[0])
     timed = [kind for kind in kinds if kind.name in times]
     commands = _choose_commands(timed, said)
     channels = _choose_channels(timed, commands.values(), said)

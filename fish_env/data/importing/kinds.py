@@ -13,6 +13,7 @@ from fish_env.data.importing.stamps import TimeColumn, guess_unit
 from fish_env.data.units import parse_unit
 from fish_env.data.vocabulary import Quantity
 from fish_env.errors import DatasetError
+from fish_env.reading import short
 
 _WORDS = re.compile(r"[^A-Za-z0-9]+")
 SAME_CLOCK = 1.0
@@ -113,6 +114,28 @@ def guess_time(kind: Kind) -> tuple[TimeColumn, str] | None:
         if guessed is not None:
             return TimeColumn(column, guessed[0]), guessed[1]
     return None
+
+
+def without_time(kind: Kind) -> DatasetError:
+    """The error for tables without a column of times that can be read.
+
+    Args:
+        kind: The tables.
+    """
+    source = kind.first
+    for column in source.columns:
+        if TIME_NAMES.fullmatch(take_apart(column).bare) and not source.is_numeric(column):
+            cell = next((str(cell) for cell in source.columns[column] if str(cell)), "")
+            return source.place(column).refuse(
+                f"'{short(cell)}' is no time that can be read",
+                "Write times in ISO 8601, such as 2026-05-01T12:00:00.040, or as numbers in any "
+                "unit of time",
+            )
+    return source.place().refuse(
+        f"no column is named as a time among {', '.join(source.columns)}",
+        "Name it t, time or stamp, with its unit if it is not s: time_ms. Or name it under "
+        "`sources` of a mapping, and give --mapping",
+    )
 
 
 def _rank(source: Source, column: str) -> tuple[bool, bool]:

@@ -17,7 +17,7 @@ from fish_env.diagnosis.inputs.clocks import strokes_of
 from fish_env.diagnosis.inputs.drive_law import DriveLaw, drive_law
 from fish_env.diagnosis.inputs.fine import BIAS, Fine, fine_clock
 from fish_env.diagnosis.inputs.ratios import ratio_near
-from fish_env.diagnosis.inputs.search import LEVEL, Found, search
+from fish_env.diagnosis.inputs.search import Found, search
 from fish_env.diagnosis.inputs.weighing import BEAT, Scales
 from fish_env.errors import DatasetError
 from fish_env.identification.beats import own_ratio
@@ -33,6 +33,9 @@ ORDINARY_BEAT = 0.15
 """A tail that beats so much faster or slower than it was told is a servo's doing: the effect
 `frequency_scale` describes it, and runs of a real robot differ as much. Beyond, a command or a
 clock is wrong."""
+CERTAIN = 1e-3
+"""p-value of a law of the beat that needs no model of forces to be believed. Without any law the
+p-values are uniform, also where each run has a beat of its own (`tests/diagnosis/test_drive_law.py`)."""
 TIMES = ("clock", "clock_skew", "beat")
 PACES = ("frequency_scale", "clock_scale", "clock_skew")
 """Effects by which a fish makes another frequency of the commanded one."""
@@ -102,7 +105,7 @@ def check_inputs(dataset: Dataset, fish: FishParams | None = None, seed: int = 0
         dataset = seen.fine.change.applied(dataset)
     drive = seen.law.starts(math.prod(change.clocks[""].beat for change in left))
     drive = {path: v for path, v in drive.items() if effect_of(path) not in nominal.effects}
-    certain = seen.law.p < LEVEL
+    certain = seen.law.p < CERTAIN
     return Inputs(tuple(faults), _noted(dataset, faults), logged, drive, certain)
 
 

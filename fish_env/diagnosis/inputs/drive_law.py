@@ -44,7 +44,8 @@ class DriveLaw:
     Attributes:
         common: ratio at the start of a run, without offset and stroke; None where no beat is clear.
         sizes: effect parameter of :data:`TERMS` -> size, of those that show.
-        p: largest p-value of these, times the number of terms that were tested (Bonferroni).
+        p: largest p-value of these, times the number of terms that were tested (Bonferroni);
+            1 where none shows.
     """
 
     common: float | None = None
@@ -122,7 +123,7 @@ def _law(ratio: FloatArray, weight: FloatArray, terms: FloatArray, run_of: IntAr
         doubtful = np.where(small, 1.0, p)
         if not kept or doubtful.max() < LEVEL:
             found = {TERMS[i]: float(size) for i, size in zip(kept, sizes, strict=True)}
-            largest = min(1.0, len(TERMS) * float(doubtful.max(initial=0.0)))
+            largest = min(1.0, len(TERMS) * float(doubtful.max())) if kept else 1.0
             return DriveLaw(float(value[0]), found, largest)
         kept.pop(int(np.argmax(doubtful)))
 

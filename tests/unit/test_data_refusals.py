@@ -225,6 +225,7 @@ def test_missing_run_keys(tmp_path, key):
         ({"fish": "absent.yaml"}, ["key fish", "absent.yaml"]),
         ({"nose": {"x": 1}}, ["key nose", "'noise'"]),
         ({"name": ["a"]}, ["key name", "text"]),
+        ({"time": "stamp"}, ["key time", "Write it as {column: stamp, unit: s}"]),
         ({"channels": {}}, ["key channels", "no channel"]),
         ({"channels": ["x"]}, ["key channels", "key: value"]),
         ({"channels": {"x": "m", "heading": "rad"}}, ["key channels.heading", "unknown channel"]),

@@ -8,7 +8,7 @@ from fish_env.data.importing.assemble import Imported, assemble
 from fish_env.data.importing.from_pandas import from_frames
 from fish_env.data.importing.guess import Guess, guess_mapping
 from fish_env.data.importing.opening import open_logs
-from fish_env.data.importing.plan import Plan, parse_plan, plan_text, read_plan
+from fish_env.data.importing.plan import Plan, parse_plan, plan_text, read_content
 from fish_env.data.importing.source import Source
 from fish_env.data.importing.writing import MAPPING, write_imported, write_mapping
 
@@ -24,7 +24,7 @@ __all__ = [
     "open_logs",
     "parse_plan",
     "plan_text",
-    "read_plan",
+    "read_content",
     "write_imported",
     "write_mapping",
 ]

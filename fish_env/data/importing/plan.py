@@ -244,13 +244,15 @@ def _runs(top: Section) -> tuple[RunSpec, ...]:
     return tuple(specs)
 
 
-def read_plan(file: Path) -> Plan:
-    """Reads a mapping file. The path of a fish file in it is relative to the mapping.
+def read_content(file: Path) -> Content:
+    """Reads a mapping file, which options may complete before it is checked.
+
+    The path of a fish file in it is relative to the mapping.
 
     Raises:
-        DatasetError: It is missing or no mapping.
+        DatasetError: It is missing or no YAML mapping.
     """
     content = read_section(Place(file)).content
     if isinstance(fish := content.get("fish"), str) and fish not in list_fish():
         content["fish"] = str((file.parent / Path(fish).expanduser()).resolve())
-    return parse_plan(content, file)
+    return content

@@ -25,7 +25,7 @@ from fish_env.data.importing import (
     open_logs,
     parse_plan,
     plan_text,
-    read_plan,
+    read_content,
     write_imported,
     write_mapping,
 )
@@ -117,7 +117,7 @@ def import_logs(
     for note in notes:
         console.print(f"note: {note}", style="dim", highlight=False, markup=False)
     if mapping is not None:
-        content = told.applied(read_plan(mapping).content)
+        content = told.applied(read_content(mapping))
         plan, imported = _build(content, sources, out, mapping)
         _show(console, plan, imported, sources, None)
         _draw(console, imported, out)

@@ -12,9 +12,17 @@ import pytest
 import yaml
 
 from fish_env.errors import ConfigError, OutputError
+from fish_env.version import WRITER
 from robofish_agents.training.config import Ppo, TrainConfig
 from robofish_agents.training.lock import LOCK, locked
-from robofish_agents.training.run import CHECKPOINT, CONFIG, POLICY, train
+from robofish_agents.training.run import (
+    CHECKPOINT,
+    CONFIG,
+    POLICY,
+    config_bytes,
+    holds_config,
+    train,
+)
 from tests.agents.test_training import Quiet
 from tests.command_line import run
 
@@ -75,6 +83,14 @@ def test_a_resume_keeps_remarks_in_the_configuration(trained):
     config.write_text("# chosen by me\n" + config.read_text())
     train(TINY, trained, Quiet(), resume=True)
     assert config.read_text().startswith("# chosen by me")
+
+
+def test_a_stopped_start_begins_again_under_another_version(tmp_path):
+    assert config_bytes(TINY).startswith(f"# Written by {WRITER}.\n".encode())
+    (tmp_path / CONFIG).write_bytes(config_bytes(TINY).replace(b" 0.", b" 9.", 1))
+    assert holds_config(tmp_path / CONFIG, TINY)
+    train(TINY, tmp_path, Quiet())
+    assert (tmp_path / CONFIG).read_bytes() == config_bytes(TINY)
 
 
 @pytest.mark.parametrize("name", [CONFIG, POLICY, "card.yaml", "evaluations.csv"])

@@ -21,7 +21,7 @@ from robofish_agents.evaluation.suites import TRUST
 from robofish_agents.sweep.plan import Trial
 from robofish_agents.training.config import TrainConfig
 from robofish_agents.training.lock import Held
-from robofish_agents.training.run import CONFIG, EVALUATIONS, POLICY, best_of, config_bytes, train
+from robofish_agents.training.run import CONFIG, EVALUATIONS, POLICY, best_of, holds_config, train
 from robofish_agents.training.schema import build
 
 PLAN, TABLE, TUNE = "sweep.yaml", "sweep.csv", "tune"
@@ -77,7 +77,7 @@ def run_sweep(
 
 def _check_folder(trial: Trial, folder: Path) -> None:
     file = folder / CONFIG
-    if file.is_file() and file.read_bytes() != config_bytes(trial.config):
+    if file.is_file() and not holds_config(file, trial.config):
         raise ConfigError(
             f"{folder}: holds a training of another configuration; move it away, or give another "
             "folder with --out"

@@ -14,6 +14,7 @@ from typing import Any
 
 from fish_env.archives import UNREADABLE
 from fish_env.errors import ConfigError
+from fish_env.version import WRITER
 from robofish_agents.training.config import DEFAULT_ENGINE, TrainConfig
 from robofish_agents.training.plain import read_plain, write_plain
 from robofish_agents.training.stack import Stack
@@ -61,6 +62,7 @@ def save_checkpoint(
     """
     tree = {
         "format": FORMAT,
+        "made_with": WRITER,
         "config": config.tree(),
         "learner": learner,
         "stack": stack.state(),

@@ -13,6 +13,7 @@ import yaml
 
 from fish_env.errors import ConfigError
 from fish_env.files import write_bytes, write_rows
+from fish_env.version import stamped
 from robofish_agents.policies.files import write_policy
 from robofish_agents.policies.pretrained import PretrainedPolicy
 from robofish_agents.training.books import Books, Watcher
@@ -80,7 +81,20 @@ def outputs(folder: Path) -> list[Path]:
 
 def config_bytes(config: TrainConfig) -> bytes:
     """What ``config.yaml`` of a run folder holds."""
-    return _yaml(config.tree())
+    return stamped(_yaml(config.tree()).decode("utf-8")).encode("utf-8")
+
+
+def holds_config(file: Path, config: TrainConfig) -> bool:
+    """Whether a run folder's ``config.yaml`` is of this configuration, by whatever version.
+
+    Args:
+        file: the file.
+        config: the configuration.
+    """
+    if not file.is_file():
+        return False
+    lines = file.read_bytes().splitlines(keepends=True)
+    return b"".join(x for x in lines if not x.startswith(b"#")) == _yaml(config.tree())
 
 
 def best_of(evaluations: Sequence[dict[str, float]]) -> dict[str, float]:
@@ -98,8 +112,7 @@ def _check_folder(config: TrainConfig, folder: Path, resume: bool) -> None:
             )
         return
     present = [file for file in outputs(folder) if file.exists()]
-    kept = folder / CONFIG
-    if present and not (kept.is_file() and kept.read_bytes() == config_bytes(config)):
+    if present and not holds_config(folder / CONFIG, config):
         raise ConfigError(
             f"{present[0]}: this training did not write it and would replace it; move it away, or "
             "give another folder with --out"

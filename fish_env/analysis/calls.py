@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -157,6 +159,12 @@ def as_dataset(
     return from_frames(data, fish=named, **described)
 
 
+def _in_notebook() -> bool:
+    """Whether a kernel of Jupyter runs this."""
+    shell = sys.modules.get("IPython")
+    return shell is not None and hasattr(shell.get_ipython(), "kernel")
+
+
 @contextmanager
 def progress_bar(
     wanted: bool, title: str, total: int | None = None
@@ -175,12 +183,15 @@ def progress_bar(
         yield lambda step: None
         return
     try:
-        from tqdm.auto import tqdm
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # without ipywidgets the bar is of text
+            from tqdm.auto import tqdm
     except ImportError:
         yield lambda step: None
         return
-    # Without a terminal, disable=None shows none; a notebook shows it always.
-    with tqdm(total=total, desc=title, leave=False, disable=None) as bar:
+    # disable=None shows none where the error stream is no terminal, as that of a notebook.
+    disable = False if _in_notebook() else None
+    with tqdm(total=total, desc=title, leave=False, disable=disable) as bar:
 
         def tell(step: str) -> None:
             bar.set_postfix_str(step, refresh=False)

@@ -87,6 +87,22 @@ def test_a_progress_bar_is_told_every_step(capsys):
     assert capsys.readouterr().out == ""
 
 
+@pytest.mark.slow
+def test_a_notebook_without_widgets_shows_the_progress_bar():
+    nbclient, nbformat = (pytest.importorskip(name) for name in ("nbclient", "nbformat"))
+    pytest.importorskip("ipykernel")
+    code = (
+        "import sys\nsys.modules['ipywidgets'] = None\n"
+        "from fish_env.analysis.calls import progress_bar\n"
+        "with progress_bar(True, 'working', 2) as tell:\n    tell('one')\n    tell('two')\n"
+    )
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(code)])
+    nbclient.NotebookClient(notebook, timeout=120).execute()
+    shown = str(notebook.cells[0].outputs)
+    assert "working" in shown
+    assert "Warning" not in shown
+
+
 def test_the_calls_are_loaded_when_asked_for():
     assert fish_env.compare is not None
     assert {"compare", "diagnose", "fit"} <= set(fish_env.__all__)

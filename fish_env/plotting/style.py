@@ -16,6 +16,7 @@ from fish_env.files import replacing
 from fish_env.version import WRITER
 
 if TYPE_CHECKING:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
 BLUE, VERMILION, GREEN = "#0072B2", "#D55E00", "#009E73"
@@ -49,15 +50,15 @@ _STYLE: dict[Any, Any] = {
 
 
 @cache
-def _stamped(figure: type[Figure]) -> type[Figure]:
-    """A kind of figure whose files name the version of the package."""
+def _stamped(canvas: type[FigureCanvasAgg]) -> type[FigureCanvasAgg]:
+    """A kind of canvas whose files name the version of the package."""
 
-    class Stamped(figure):  # type: ignore[valid-type, misc]
-        def savefig(self, fname: Any, **options: Any) -> None:
-            key = _WRITER_KEYS.get(Path(fname).suffix) if isinstance(fname, str | Path) else None
-            if key is not None:
+    class Stamped(canvas):  # type: ignore[valid-type, misc]
+        def print_figure(self, filename: Any, *args: Any, **options: Any) -> Any:
+            path = Path(filename) if isinstance(filename, str | Path) else Path()
+            if (key := _WRITER_KEYS.get(path.suffix)) is not None:
                 options["metadata"] = {key: WRITER, **(options.get("metadata") or {})}
-            super().savefig(fname, **options)
+            return super().print_figure(filename, *args, **options)
 
     return Stamped
 
@@ -76,8 +77,8 @@ def drawing(width: float = 7.2, height: float = 4.0) -> Iterator[Figure]:
     from matplotlib.figure import Figure
 
     with matplotlib.rc_context({**_STYLE, "axes.prop_cycle": cycler(color=PALETTE)}):
-        figure = _stamped(Figure)(figsize=(width, height), layout="constrained")
-        FigureCanvasAgg(figure)
+        figure = Figure(figsize=(width, height), layout="constrained")
+        _stamped(FigureCanvasAgg)(figure)
         yield figure
 
 

@@ -32,6 +32,8 @@ from scripts.exported import (
 from scripts.results import RESULTS, write_dated
 
 FISH = 1000
+TASKS = (*SIGNAL_TASKS, "station")
+"""Tasks with shipped policies of their own."""
 HEAD = (
     "| task | trained | policy | largest difference | RMS difference | decision (us) | bytes |\n"
     "| --- | --- | --- | --: | --: | --: | --: |\n"
@@ -100,6 +102,8 @@ def page(rows: Sequence[dict[str, Any]], swims: Sequence[dict[str, Any]], count:
         off = [f"{row[key]:.1e}" if key in row else "-" for key in ("largest", "rms")]
         text += f"| {row['task']} | {row['seed']} | {row['policy']} | {' | '.join(off)} "
         text += f"| {row['us']:.1f} | {row['bytes']:,} |\n"
+    if not swims:
+        return text
     text += "\nSwims of the suites, 100 episodes each.\n\n"
     text += "| task | weights | suite | success (%) | depth RMSE (cm) | heading RMSE (rad) |\n"
     text += "| --- | --- | --- | --: | --: | --: |\n"
@@ -117,17 +121,20 @@ def main(arguments: Sequence[str] | None = None) -> None:
         "--steps", type=int, default=1000, help=f"observations in {FISH}s, a policy"
     )
     parser.add_argument("--out", type=Path, default=RESULTS)
+    parser.add_argument("--task", choices=TASKS, help="policies of this task alone")
     options, console = parser.parse_args(arguments), Console()
+    tasks = TASKS if options.task is None else (options.task,)
     with tempfile.TemporaryDirectory() as folder:
         rows = []
-        for task in SIGNAL_TASKS:
+        for task in tasks:
             rows += measured(task, options.steps, Path(folder))
             console.print(page(rows, [], options.steps * FISH), markup=False)
-    swims = [row for task in SIGNAL_TASKS for row in swum(task)]
+    swims = [row for task in tasks if task in SIGNAL_TASKS for row in swum(task)]
     text = page(rows, swims, options.steps * FISH)
     about = {"machine": machine(), "steps": options.steps, "fish": FISH, "rows": rows}
     about |= {"swims": swims, "versions": versions(("numpy", "onnx", "onnxruntime"))}
-    write_dated(options.out, "export", about, text)
+    name = "export" if options.task is None else f"export-{options.task}"
+    write_dated(options.out, name, about, text)
     console.print(text, markup=False)
 
 

@@ -17,7 +17,10 @@ def register(app: typer.Typer) -> None:
 
 def export(
     policy: Annotated[
-        str, typer.Argument(help="A policy file; or hold or track, for the shipped policy.")
+        str,
+        typer.Argument(
+            help="A policy file; or hold, track, path or station, for the shipped policy."
+        ),
     ],
     onnx: Annotated[Path | None, typer.Option(help="ONNX model to write.")] = None,
     c: Annotated[Path | None, typer.Option("--c", help="C header to write.")] = None,

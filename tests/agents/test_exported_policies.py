@@ -13,6 +13,7 @@ from fish_env.envs.config import load_env_config
 from fish_env.envs.layout import OBSERVATION
 from fish_env.envs.registration import ENV_ID
 from fish_env.envs.robotic_fish_3d import RoboticFish3DEnv
+from fish_env.envs.tasks import TASKS
 from fish_env.errors import ConfigError
 from robofish_agents.deployment import contract_path, export_c, export_onnx, with_int8_weights
 from robofish_agents.policies import (
@@ -49,6 +50,7 @@ def drawn(history: HistorySpec, activation: str = "tanh", output: str = "clip") 
 KINDS = {
     "shipped for hold": read_policy(shipped("hold")[0]),
     "shipped for track": read_policy(shipped("track")[1]),
+    "shipped for station": read_policy(shipped("station")[0]),
     "the present alone": drawn(HistorySpec()),
     "two frames": drawn(HistorySpec(2)),
     "four frames and two filters": drawn(HistorySpec(4, (0.5, 2.0)), "relu", "tanh"),
@@ -246,15 +248,16 @@ def test_a_model_carries_its_contract(tmp_path):
     assert again.read_bytes() == file.read_bytes()
 
 
-def test_the_command_writes_and_names_its_files(tmp_path, capsys):
-    header = tmp_path / "hold.h"
-    status, out, _ = run(capsys, "export", "hold", "--c", str(header), "--json", "-")
+@pytest.mark.parametrize("name", TASKS)
+def test_the_command_writes_and_names_its_files(name, tmp_path, capsys):
+    header = tmp_path / f"{name}.h"
+    status, out, _ = run(capsys, "export", name, "--c", str(header), "--json", "-")
     assert status == 0
     assert [entry["file"] for entry in json.loads(out)["files"]] == [
         str(header),
         str(contract_path(header)),
     ]
-    assert "hold_act(" in header.read_text()
+    assert f"{name}_act(" in header.read_text()
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from typing import Any
 
 from rich.console import Console
 
-from fish_env.envs.tasks import SIGNAL_TASKS
+from fish_env.envs.tasks import TASKS
 from fish_env.errors import ConfigError
 from fish_env.files import STANDARD, check_outputs
 from robofish_agents.deployment.c_header import export_c
@@ -51,11 +51,7 @@ def run_export(
     outputs = [path for path in (onnx, c) if path is not None]
     if any(str(path) == STANDARD for path in outputs):
         raise ConfigError("an export has two files; give it a name in place of -")
-    file = (
-        shipped(policy)[0]
-        if policy in SIGNAL_TASKS and not Path(policy).is_file()
-        else Path(policy)
-    )
+    file = shipped(policy)[0] if policy in TASKS and not Path(policy).is_file() else Path(policy)
     contracts = [contract_path(path) for path in outputs]
     check_outputs([*outputs, *contracts, json], [file, config])
     read = read_policy(file)

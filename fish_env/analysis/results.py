@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from html import escape
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from textwrap import TextWrapper
 from typing import TYPE_CHECKING, Any
 
 from fish_env.comparison import RunsComparison, SteadyComparison
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
 
 REPORT = "report.html"
 MOST_SENTENCES = 4
+_WRAPPER = TextWrapper(80, initial_indent="  ", subsequent_indent="    ", break_on_hyphens=False)
+"""Cells of notebooks do not wrap lines of text."""
 
 
 class Pictures:
@@ -67,7 +70,8 @@ class Result:
 
     def __repr__(self) -> str:
         """The title and the first findings."""
-        return "\n".join([self.title(), *(f"  {s}" for s in self.sentences()[:MOST_SENTENCES])])
+        found = self.sentences()[:MOST_SENTENCES]
+        return "\n".join([self.title(), *(_WRAPPER.fill(sentence) for sentence in found)])
 
     def _repr_html_(self) -> str:
         """The title, the findings and the table."""

@@ -34,7 +34,9 @@ def test_compare_says_what_the_command_says(compared, tmp_path, capsys):
 
 
 def test_a_comparison_shows_itself(compared, tmp_path):
-    assert 2 <= len(repr(compared).splitlines()) <= 6
+    lines = repr(compared).splitlines()
+    assert 2 <= len(lines) <= 16
+    assert max(map(len, lines)) <= 80
     assert "msu-steady against msu-tail-fish" in compared._repr_html_()
     table = compared.to_dataframe()
     assert list(table["observation"]) == ["surge_speed", "sway_speed", "yaw_rate"]

@@ -3,6 +3,7 @@
 import re
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from fish_env.diagnosis.headline import headline
@@ -15,6 +16,7 @@ from fish_env.inference.estimate.fit import fit
 from fish_env.inference.gain import ClosedGap
 from fish_env.inference.problem import Point
 from fish_env.inference.verdict import VERDICTS
+from fish_env.simulator import schedule
 from tests.diagnosis.report_cases import answer, run_series, steady_series
 
 NETWORK = re.compile(r"""(src|href)=["'](?!data:|#)|@import|url\((?!['"]?(#|data:))""")
@@ -59,6 +61,29 @@ def test_what_is_beyond_the_usual_is_told(tmp_path):
     ):
         assert part in page, part
     assert "Buoyancy differs" not in page
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_intervals_over_runs_need_three_of_them(count, tmp_path):
+    told = answer(fitted_runs=count)
+    told["gain"]["final_runs"] = [f"r{i}" for i in range(count)]
+    page = write_report(told, None, tmp_path).read_text()
+    shown = count >= 3
+    assert ("(95 %: 90 to 100 %)" in page) == shown
+    assert ("(95 % interval: 90 to 100 %)" in page) == shown
+    assert ("Lines: 95 % intervals over runs" in page) == shown
+    assert ("no interval over runs" in page) == (not shown)
+    ranking = (tmp_path / "figures" / "ranking.svg").read_text()
+    assert ("stroke-width: 1.4" in ranking) == shown
+
+
+def test_the_next_experiment_is_a_table_to_fly(full):
+    page, folder = full
+    flown = schedule(pd.read_csv(folder / "next_experiment.csv").to_dict("records"))
+    proposed = schedule(answer()["next_experiment"]["schedule"])
+    np.testing.assert_array_equal(flown.times_s, proposed.times_s)
+    np.testing.assert_array_equal(flown.values, proposed.values)
+    assert "next_experiment.csv" in page
 
 
 def test_nothing_is_asked_of_a_network_and_nothing_breaks_out(full):

@@ -153,9 +153,15 @@ def beyond_plausible(fit: Fit, name: str) -> bool:
 
 
 def _out_of_place(parameter: EffectParameter, value: float) -> bool:
-    """Whether a shape is far from any plausible one, where the effect is a different one."""
+    """Whether a shape is far from any plausible one, where the effect is a different one.
+
+    A shape that does nothing where it is infinite, like the depth of a tank, is never too large.
+    """
     low, high = parameter.plausible
-    return bool(abs(value - 0.5 * (low + high)) > 1.5 * (high - low))
+    off = value - 0.5 * (low + high)
+    if not np.isfinite(parameter.neutral):
+        off = min(off, 0.0) if parameter.neutral > 0.0 else max(off, 0.0)
+    return bool(abs(off) > 1.5 * (high - low))
 
 
 def _beyond(

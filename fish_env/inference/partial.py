@@ -68,7 +68,8 @@ def confirmed(
     while {*accepted.causes} - measured:
         weakest = _implausible(accepted, measured)
         if weakest is not None:
-            report(f"leaving out {weakest}: its estimate is implausible")
+            words = "; ".join(implausible_estimates(accepted.fit))
+            report(f"leaving out {weakest}: its estimate is implausible ({words})")
         else:
             log_p = StandIns(accepted, threshold).log_p()
             log_p = {name: value for name, value in log_p.items() if name not in measured}

@@ -200,3 +200,18 @@ def test_a_coefficient_at_the_end_of_what_physics_allows_is_no_explanation():
 )
 def test_an_effect_needs_a_sign_and_size_that_it_can_have(effect, interval, believed):
     assert (implausible_estimates(named(effects=(effect,), interval=interval)) == ()) is believed
+
+
+@pytest.mark.parametrize("depth", [3700.0, 0.5])
+def test_a_shape_that_does_nothing_where_it_is_infinite_is_never_too_large(depth):
+    """Data may hardly tell a deep tank from the sea."""
+    found = named(effects=("wave",))
+    values = {**found.point.effects, "effects.wave.tank_depth": depth}
+    assert implausible_estimates(replace(found, point=Point(found.point.z, values))) == ()
+
+
+def test_a_shape_that_is_finite_may_be_too_large():
+    found = named(effects=("wave",))
+    values = {**found.point.effects, "effects.wave.frequency": 9.0}
+    (said,) = implausible_estimates(replace(found, point=Point(found.point.z, values)))
+    assert "frequency" in said

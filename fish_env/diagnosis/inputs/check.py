@@ -35,7 +35,8 @@ ORDINARY_BEAT = 0.15
 clock is wrong."""
 CERTAIN = 1e-3
 """p-value of a law of the beat that needs no model of forces to be believed. Without any law the
-p-values are uniform, also where each run has a beat of its own (`tests/diagnosis/test_drive_law.py`)."""
+p-values are uniform, also where each run has a beat of its own
+(`tests/diagnosis/test_drive_law.py`)."""
 TIMES = ("clock", "clock_skew", "beat")
 PACES = ("frequency_scale", "clock_scale", "clock_skew")
 """Effects by which a fish makes another frequency of the commanded one."""

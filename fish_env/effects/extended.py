@@ -15,7 +15,7 @@ from fish_env.errors import EffectError, ParameterError, ScheduleError
 from fish_env.model.composition import Composition
 from fish_env.model.effect import Effect
 from fish_env.model.runtime import Kernels, kernels
-from fish_env.params.packing import PATHS, pack_tables, pack_values
+from fish_env.params.packing import PATHS, RECORD_FIELDS, pack_tables, pack_values
 from fish_env.params.schema import FishParams
 from fish_env.reading import is_number, shown
 
@@ -87,6 +87,11 @@ class ExtendedModel:
         for row, value in enumerate(rows.values(), start=len(base)):
             record[row] = value
         return record
+
+    def row_of(self, path: str) -> int | None:
+        """Row of :meth:`records` with a parameter of an effect; None where the kernel has none."""
+        names = [PREFIX + name for name in self._effect_values()]
+        return len(RECORD_FIELDS) + names.index(path) if path in names else None
 
     def _effect_values(self) -> dict[str, float]:
         values: dict[str, float] = {}

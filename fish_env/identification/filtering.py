@@ -37,6 +37,7 @@ from fish_env.threads import default_threads
 
 POSITIONS = {"x": 0, "y": 1, "z": 2}
 TAIL_PHASE = 13  # row of the state
+WAVE_PHASE = "effects.wave.phase"
 CORRECTIONS = 4
 """Each leaves a tenth or less of the error of a start."""
 TEMPLATES = tuple(
@@ -166,6 +167,7 @@ class RunFilter:
         self.channels = tuple(channels)
         self.codes = codes_of(channels)
         self.kernels = filter_kernels(model)
+        self.wave_row = model.row_of(WAVE_PHASE)
 
     @cached_property
     def rates(self) -> list[FloatArray]:
@@ -223,7 +225,7 @@ class RunFilter:
         own = data.variation[:, None] if more is None else data.variation[:, None] + more
         if not own.any() and not data.moved.any():
             return records, sensors
-        varied = np.ascontiguousarray(varied_records(records, own))
+        varied = np.ascontiguousarray(varied_records(records, own, self.wave_row))
         return varied, sensors.of_run(data, own, self.channels)
 
     def run(

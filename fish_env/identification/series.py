@@ -38,6 +38,7 @@ from fish_env.identification.sensors import largest_jitter_of, largest_noise
 from fish_env.identification.tail_drive import LATE, TailDrive
 from fish_env.identification.variation import EVERY, USUAL, VARIATIONS
 from fish_env.identification.variation_slopes import swum_slopes
+from fish_env.identification.wave_phases import settle_wave_phases
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.hypotheses import effects_of
 from fish_env.inference.policy import POLICY
@@ -210,8 +211,8 @@ class SeriesProblem(Problem):
         return bool(widest_disturbance(self.fish).left_by(noise))
 
     def settled(self, point: Point, noise: NoiseModel, nearby: bool = False) -> SeriesProblem:
-        """The same problem with the likeliest starting phase of every run that has none."""
-        return settle_phases(self, point, noise, nearby)
+        """The same problem with the likeliest phases of tails that have none, and of a wave."""
+        return settle_wave_phases(settle_phases(self, point, noise, nearby), point, noise)
 
     @cached_property
     def largest_sensor_sd(self) -> FloatArray:

@@ -36,15 +36,17 @@ VARIATIONS = (
     RunVariation("inertial_delay", "s", 0.03, shared=True, positive=True),
     RunVariation("depth_delay", "s", 0.02, shared=True, positive=True),
     RunVariation("start_phase", "rad", 0.2),
+    RunVariation("wave_phase", "rad", 1.8),
 )
 """Trim is how far the barycentre of the whole fish at rest is moved. The beat and its sag are
 beside what combs have found, see ``own_beats``. Devices are late by a frame of a camera; a filter
 of 5 Hz inside an inertial unit makes that 0.045 s late. The phase is that of the tail at the first
-sample, beside what is declared or was found on a grid: it moves with the delays."""
+sample, beside what is declared or was found on a grid: it moves with the delays. A wave meets each
+run in another phase: numbers that are even over a circle have a spread of 1.8 rad."""
 COUNT = len(VARIATIONS)
-BEAT, SAG, START = (
+BEAT, SAG, START, WAVE = (
     next(i for i in range(COUNT) if VARIATIONS[i].name == name)
-    for name in ("beat", "beat_sag", "start_phase")
+    for name in ("beat", "beat_sag", "start_phase", "wave_phase")
 )
 DEGREE = float(np.deg2rad(1.0))
 SENSOR_ERRORS = (
@@ -91,9 +93,17 @@ _DELAYS = {
 }
 
 
-def varied_records(records: FloatArray, own: FloatArray) -> FloatArray:
-    """Parameter records (parameters, N) with a run's own numbers (K, N or 1) added."""
+def varied_records(records: FloatArray, own: FloatArray, wave_row: int | None) -> FloatArray:
+    """Parameter records (parameters, N) with a run's own numbers (K, N or 1) added.
+
+    Args:
+        records: what all runs share.
+        own: the run's numbers.
+        wave_row: of the phase of the wave; None where the kernel computes none.
+    """
     moved = records.copy()
+    if wave_row is not None:
+        moved[wave_row] += own[WAVE]
     for name, row in _STATIC.items():
         moved[row] += own[_INDEX[name]] * records[_MASS]
     moved[_BUOYANCY] += own[_INDEX["buoyancy"]]

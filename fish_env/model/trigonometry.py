@@ -48,16 +48,13 @@ def sincos(angle):
 def exponential(x):
     """e^x for x in [-30, 30] (values beyond are clamped), to about 1e-12 relative.
 
-    e^(x/1024) from its Taylor series, squared ten times: no branch and no library call.
+    e^(x/1024) from its Taylor series, squared ten times: no branch, no division, no library call.
     """
     small = min(max(x, -30.0), 30.0) * (1.0 / 1024.0)
-    value = 1.0 + small / 7.0
-    value = 1.0 + value * small / 6.0
-    value = 1.0 + value * small / 5.0
-    value = 1.0 + value * small / 4.0
-    value = 1.0 + value * small / 3.0
-    value = 1.0 + value * small / 2.0
-    value = 1.0 + value * small
+    s2 = small * small
+    low = (1.0 + small) + s2 * (0.5 + small * (1.0 / 6.0))
+    high = (1.0 / 24.0 + small * (1.0 / 120.0)) + s2 * (1.0 / 720.0 + small * (1.0 / 5040.0))
+    value = low + (s2 * s2) * high
     for _ in range(10):
         value = value * value
     return value

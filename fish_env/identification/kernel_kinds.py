@@ -14,7 +14,7 @@ KERNELS = (
     LEAN,
     frozenset({"inputs", "tail"}),
     frozenset(
-        {"barycentre", "water", "water_rate", "tail_inflow", "tail_lift", "tail_force"}
+        {"density", "barycentre", "water", "water_rate", "tail_inflow", "tail_lift", "tail_force"}
         | {"body_drag", "wrench"}
     ),
     frozenset(STAGES),

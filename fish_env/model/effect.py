@@ -6,6 +6,7 @@ stage takes the value so far and returns the new one (``wrench`` hooks return wh
 =============== ======================================================== =================
 stage           hook                                                     value
 =============== ======================================================== =================
+``density``     (density, place, e)                                      float
 ``inputs``      (inputs, time, fish, e)                                  Inputs
 ``tail``        (tail, inputs, phase, time, fish, e)                     Tail
 ``barycentre``  (centre, place, inputs, time, fish, e)                   Barycentre
@@ -19,6 +20,7 @@ stage           hook                                                     value
 ``inertia``     (inertia, tail, fish, e)                                 Inertia
 =============== ======================================================== =================
 
+``density`` is that of the water (kg/m^3); every later stage sees the new one in ``fish``.
 ``water`` is the velocity of the water (m/s), ``water_rate`` its acceleration along its own path,
 DU/Dt (m/s^2); ``sine`` that of the tail's incidence. ``e`` is the named tuple of the effect's
 parameters. At neutral parameters a hook must return its
@@ -51,6 +53,7 @@ from fish_env.inference.effects import Switched
 from fish_env.reading import shown
 
 STAGES = (
+    "density",
     "inputs",
     "tail",
     "barycentre",

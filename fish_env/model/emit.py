@@ -185,6 +185,7 @@ class Emitter:
         lines += [
             "time = work[TIME * width + k] + elapsed + shift",
             f"place = Vector({', '.join(state[:3])})",
+            *self.other_water(),
             f"attitude = rotation({', '.join(state[3:7])})",
             f"velocity = Vector({', '.join(state[7:10])})",
             f"omega = Vector({', '.join(state[10:13])})",
@@ -196,6 +197,18 @@ class Emitter:
         rates = ", ".join(f"u{i}_rate" for i in range(5))
         lines.append(f"inputs = Inputs(u0, u1, u2, u3, u4, {rates})")
         return lines
+
+    def other_water(self) -> list[str]:
+        """The fish of the lane in water whose density effects change."""
+        if not self.has("density"):
+            return []
+        own = {"density": "density"}
+        fields = ", ".join(own.get(name, f"fish.{name}") for name in RECORD_FIELDS)
+        return [
+            "density = fish.density",
+            *self.apply("density", "density", "place"),
+            f"fish = Fish({fields})",
+        ]
 
     def apply(self, stage: str, value: str, arguments: str, tail: str = "") -> list[str]:
         """Calls of all hooks of a stage, each replacing ``value``.

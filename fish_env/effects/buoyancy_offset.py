@@ -25,10 +25,13 @@ EFFECT = Effect(
     hooks={"barycentre": shift_buoyancy},
     equals=("mass.buoyancy",),
     confusable_with=(
+        "bubbles",
         "com_offset",
         "current",
         "depth_bias",
         "hull_compression",
+        "surface_piercing",
+        "water_density",
         "water_ingress",
         "wave",
     ),

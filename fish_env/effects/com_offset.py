@@ -34,6 +34,7 @@ EFFECT = Effect(
     confusable_with=(
         "attitude_misalignment",
         "block_scale",
+        "bubbles",
         "buoyancy_offset",
         "tail_asymmetry",
         "tail_bias",

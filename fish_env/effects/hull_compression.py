@@ -26,6 +26,7 @@ EFFECT = Effect(
     ),
     hooks={"barycentre": compress},
     confusable_with=(
+        "bubbles",
         "buoyancy_offset",
         "depth_bias",
         "surface_drag",

@@ -32,10 +32,12 @@ EFFECT = Effect(
     confusable_with=(
         "cross_flow_drag",
         "current",
+        "floor_effect",
         "offset_drag",
         "surface_drag",
         "tail_gain",
         "tether",
         "wake_fraction",
+        "wall_effect",
     ),
 )

@@ -27,8 +27,10 @@ EFFECT = Effect(
     ),
     hooks={"body_drag": raise_drag},
     confusable_with=(
+        "floor_effect",
         "hull_compression",
         "linear_drag",
         "offset_drag",
+        "surface_piercing",
     ),
 )

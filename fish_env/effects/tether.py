@@ -77,5 +77,6 @@ EFFECT = Effect(
         "hull_compression",
         "linear_drag",
         "position_scale",
+        "wall_effect",
     ),
 )

@@ -22,6 +22,8 @@ MANY = 4
 """Settings that are also tested one by one."""
 MOST_GRID_SIZES = 96
 """Of a starting grid."""
+DIRECTIONS = 6
+"""How many of a turn are tried of a shape that is a direction."""
 SHARES = (0.0, 0.25, 0.5, 0.75, 1.0)
 """Sizes tried between small and large."""
 
@@ -336,6 +338,8 @@ def _shape_values(parameter: EffectParameter) -> tuple[float, ...]:
     if not parameter.probed:
         return (parameter.neutral,)
     low, high = parameter.plausible
+    if parameter.unit == "rad" and high - low >= 6.0:  # both ends are one direction
+        return tuple((low + 2.0 * np.pi / DIRECTIONS * np.arange(DIRECTIONS)).tolist())
     if low > 0 and high / low > 4:
         return tuple(np.geomspace(low, high, 3).tolist())
     return tuple(np.linspace(low, high, 3).tolist())

@@ -46,6 +46,14 @@ def test_parameters_of_shape_take_several_values():
     assert len(depths) == 3
 
 
+def test_a_direction_is_tried_all_around():
+    """No wall is further than 30 degrees from one of them; both ends of a turn would be one."""
+    tried = {probe["heading"] for a in probes_of(catalogue()["wall_effect"]) for probe in a}
+    around = np.linspace(-np.pi, np.pi, 100)[:, None] - np.array(sorted(tried))
+    assert np.cos(around).max(axis=1).min() > np.cos(np.pi / 6) - 1e-3
+    assert len(tried) == 6
+
+
 @pytest.mark.parametrize("frequency", [0.2, 0.361, 1.234, 2.0])
 @pytest.mark.parametrize("phase", [-2.0, 0.0, 1.5])
 def test_some_probe_shows_most_of_a_wave(frequency, phase):

@@ -1,5 +1,7 @@
 """The catalogue as a whole: neutral changes nothing, bad values are refused, all is declared."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -18,6 +20,8 @@ BUSY = [
     {"t": 0.05, "tail_offset": -0.2, "tail_amplitude": 0.2, "block_displacement": 0.004},
 ]
 """Something for every effect to act on: fast strokes, and every command but the angle changes."""
+SHALLOW = replace(TUMBLE, position=(0.3, -0.2, 0.03))
+"""A start where the surface matters too."""
 
 
 def on(name):
@@ -62,7 +66,7 @@ def test_neutral_effects_change_nothing_while_another_is_on(name):
         simulator = Simulator(swimmer())
         simulator.model = ExtendedModel(swimmer(), {name: on(name)}, declared, ())
         vars(simulator.model)["kernels"] = PlainKernels(Composition(declared), {})
-        run = simulator.run(BUSY, duration_s=0.1, initial=TUMBLE)
+        run = simulator.run(BUSY, duration_s=0.1, initial=SHALLOW)
         ends.append(run.states[:, :18])
     np.testing.assert_array_equal(ends[0], ends[1])
 
@@ -70,9 +74,9 @@ def test_neutral_effects_change_nothing_while_another_is_on(name):
 @pytest.mark.parametrize("name", MOVING)
 def test_an_effect_that_is_on_changes_the_motion(name):
     """Otherwise the tests above would say nothing."""
-    baseline = Simulator(swimmer()).run(BUSY, duration_s=0.5, initial=TUMBLE)
+    baseline = Simulator(swimmer()).run(BUSY, duration_s=0.5, initial=SHALLOW)
     changed = Simulator(swimmer(), effects={name: on(name)}).run(
-        BUSY, duration_s=0.5, initial=TUMBLE
+        BUSY, duration_s=0.5, initial=SHALLOW
     )
     assert not np.array_equal(baseline.states[:, :14], changed.states[:, :14])
 
@@ -157,6 +161,11 @@ def test_the_catalogue_is_that_of_the_specification():
             "tank_depth": np.inf,
         },
         "surface_drag": {"gain": 0, "depth": None},
+        "surface_piercing": {"height": 0, "slenderness": None},
+        "water_density": {"scale": 1},
+        "bubbles": {"mass": 0, "x": None},
+        "wall_effect": {"gain": 0, "distance": None, "heading": None, "range": None},
+        "floor_effect": {"gain": 0, "depth": None, "range": None},
         "tether": dict.fromkeys(("stiffness", "x", "y", "z", "slack", "attach_x"), 0),
         "clock_scale": {"scale": 1},
         "clock_skew": {"scale": 1},

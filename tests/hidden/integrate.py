@@ -11,6 +11,8 @@ from tests.hidden.jit import entry_point, helper
 from tests.hidden.motion import derivative
 from tests.hidden.servo import (
     BLOCK,
+    FASTEST,
+    FREE_SPEED,
     KICK,
     LAST,
     LIMIT,
@@ -96,6 +98,7 @@ def begin(y, fish, e, table, drive):
     drive[BLOCK] = table[0, SHIFT] * e.block_scale_scale
     drive[ROW] = 0.0
     drive[LAST] = 0.0
+    drive[FASTEST] = FREE_SPEED
     y[18] = angle
     y[19] = angle
     y[21] = drive[BLOCK]

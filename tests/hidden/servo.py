@@ -11,6 +11,9 @@ its rate then, the step's start time; 8 place of the block behind its play; 9 si
 sticking fin; 10 row of the commands in force; 11 half stroke (+1 or -1) of the step; 12 moment of
 the water about the tail's hinge; 13 fastest that the servo turns during the step; 14 rate of the
 tail at the end of the last step; 15 what is added to its acceleration.
+
+A servo under load slows down within `ROTOR` of its load, as its rotor has inertia. Without it the
+speed would follow the load of the step before, and the two would jump forth and back.
 """
 
 from __future__ import annotations
@@ -25,8 +28,8 @@ LIMIT, PLAY, BLOCK, FIN, ROW, SIDE, HINGE, FASTEST, LAST, KICK = (
     0, 4, 8, 9, 10, 11, 12, 13, 14, 15,
 )  # fmt: skip
 DRIVE_SIZE = 16
-FREE_SPEED, STALLED = 9.0, 0.05
-"""rad/s without load, and the share of it that a stalled servo still creeps at."""
+FREE_SPEED, STALLED, ROTOR = 9.0, 0.05, 0.005
+"""rad/s without load, the share of it that a stalled servo still creeps at, and s."""
 
 
 @helper
@@ -106,14 +109,14 @@ def plan_limit(t, h, late, e, table, drive):
     """
     if not is_limited(e):
         return
-    drive[FASTEST] = e.servo_rate_limit_rate
+    most = e.servo_rate_limit_rate
     if not math.isinf(e.servo_torque_limit_torque):
         left = max(1.0 - abs(drive[HINGE]) / e.servo_torque_limit_torque, STALLED)
-        drive[FASTEST] = min(drive[FASTEST], FREE_SPEED * left)
+        drive[FASTEST] += (FREE_SPEED * left - drive[FASTEST]) * (1.0 - math.exp(-h / ROTOR))
+        most = min(most, drive[FASTEST])
     here, goal = sent(t, late, e, table, drive)[0], sent(t + h, late, e, table, drive)[0]
     now = drive[LIMIT]
     needed = (goal - now) / h
-    most = drive[FASTEST]
     keeps_up = abs(needed) <= most
     drive[LIMIT + 1] = 0.0 if keeps_up and abs(here - now) < 1e-9 else 1.0
     drive[LIMIT + 2] = min(max(needed, -most), most)

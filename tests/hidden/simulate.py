@@ -76,6 +76,8 @@ class Swim:
         # Limits and plays decide once a step what they do, so their steps are shorter.
         decides = self.effects.keys() & DECIDED
         self.longest = 0.25 * longest if decides else longest
+        if "servo_torque_limit" in self.effects:  # a tenth of the rotor's time constant
+            self.longest *= 0.5
         start = start or Start()
         self.phase = start.phase
         self.state = np.zeros(STATES)

@@ -43,5 +43,6 @@ EFFECT = Effect(
     confusable_with=(
         "battery_sag",
         "frequency_scale",
+        "servo_torque_limit",
     ),
 )

@@ -17,6 +17,7 @@ from fish_env.model.effect import Effect
 from fish_env.model.runtime import Kernels, kernels
 from fish_env.params.packing import PATHS, RECORD_FIELDS, pack_tables, pack_values
 from fish_env.params.schema import FishParams
+from fish_env.params.tables import analytic_tail
 from fish_env.reading import is_number, shown
 
 EffectValues = Mapping[str, Mapping[str, float]]
@@ -33,7 +34,8 @@ class ExtendedModel:
         fish: the parameters.
         effects: complete parameter values of the effects that are on, by name.
         declared: the effects the kernel contains, in the order their hooks run. None for a fish
-            without effects: then the lean kernel runs it.
+            without effects: then the lean kernel runs it. Loaded drives, which are slow, as a rule
+            only where they are on.
         measurement: effects that act on what is recorded, not on the motion, in catalogue order.
     """
 
@@ -69,7 +71,10 @@ class ExtendedModel:
         """
         known = set(PATHS.values())
         arrays = {path: np.atleast_1d(np.asarray(v, float)) for path, v in changes.items()}
-        values: dict[str, FloatArray | float] = dict(self.fish.values())
+        values: dict[str, FloatArray | float] = {
+            **analytic_tail(self.fish.tables()),
+            **self.fish.values(),
+        }
         values |= {path: array for path, array in arrays.items() if path in known}
         rows = {name: np.full(1, value) for name, value in self._effect_values().items()}
         for path, array in arrays.items():
@@ -186,7 +191,12 @@ def build_model(
     complete = {name: found[name].complete(values) for name, values in wanted.items()}
     on = {name: v for name, v in complete.items() if v != found[name].neutral}
     everything = (*catalogue().values(), *own.values())
-    acting = tuple(effect for effect in everything if effect.acts_on_motion)
+    acting = tuple(
+        effect
+        for effect in everything
+        if effect.acts_on_motion
+        and (whole_catalogue or effect.name in {*on, *own} or not effect.loaded)
+    )
     needed = whole_catalogue or any(e.name in on or e.name in own for e in acting)
     measured = tuple(e for e in everything if e.name in on and e.acts_on_record)
     return ExtendedModel(fish, on, acting if needed else (), measured)

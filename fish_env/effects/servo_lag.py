@@ -54,6 +54,7 @@ EFFECT = Effect(
         "sensor_delay",
         "servo_delay",
         "servo_rate_limit",
+        "servo_torque_limit",
         "tail_flexibility",
         "tail_gain",
         "wake_memory",

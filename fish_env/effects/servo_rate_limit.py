@@ -9,37 +9,11 @@ from __future__ import annotations
 
 from math import inf
 
-from fish_env.model.corners import MEMORY, angle_at, follow, handed_on, starting
+from fish_env.model.corners import MEMORY, handed_on, starting
 from fish_env.model.effect import Effect, EffectParameter
 from fish_env.model.jit import kernel
-from fish_env.model.records import Tail
-from fish_env.model.tail import SETTLING_TIME, spread_jumps
-
-ROUNDING = 1e-9  # rad; a tail this close to its command is on it
-
-
-@kernel
-def ahead_of_command(angle, tail, bent, since, at, limit):
-    """How far the tail is ahead of its command, a time ``at`` after the step's start (rad).
-
-    The exact solution of d(xi)/dt = clip(towards cmd, -limit, limit) from ``angle`` at the step's
-    start, for a command that bends little in a step. The tail moves at its limit until it meets
-    its command, and then follows it as far as the limit allows.
-    """
-    gap = angle_at(tail, bent, -since) - angle
-    behind = abs(gap) > ROUNDING
-    towards = limit if gap > 0.0 else -limit
-    closing = towards - (tail.rate - since * (tail.acceleration - 3.0 * since * bent))
-    approaching = behind & (closing * gap > 0.0)
-    meeting = gap / (closing if approaching else 1.0)
-    slowed = closing - 0.5 * tail.acceleration * meeting
-    meeting = gap / (slowed if approaching & (slowed * gap > 0.0) else 1.0)
-    apart = min(meeting, at) if approaching & (slowed * gap > 0.0) else at
-    chasing = apart if behind else 0.0
-    reached = angle + towards * chasing
-    reach = limit * (at - chasing)
-    goal = angle_at(tail, bent, at - since)
-    return reached + min(max(goal - reached, -reach), reach) - goal
+from fish_env.model.servo import chase
+from fish_env.model.tail import SETTLING_TIME
 
 
 @kernel
@@ -48,16 +22,7 @@ def limit_rate(tail, inputs, phase, time, fish, e, states, memory, since):
     (settled_rate,) = states
     on = e.rate < inf
     limit = e.rate if on else 1.0
-    ahead, rate, gained = follow(ahead_of_command, limit, tail, since, memory)
-    behind = (abs(ahead) > ROUNDING) | (abs(tail.rate) > limit)
-    limited, _ = spread_jumps(
-        Tail(
-            tail.angle + ahead,
-            min(max(rate, -limit), limit),
-            0.0 if behind else tail.acceleration,
-        ),
-        settled_rate,
-    )
+    limited, gained = chase(tail, limit, settled_rate, since, memory)
     return handed_on(on, tail, limited, gained, since)
 
 
@@ -91,6 +56,7 @@ EFFECT = Effect(
     confusable_with=(
         "servo_backlash",
         "servo_lag",
+        "servo_torque_limit",
         "tail_gain",
     ),
 )

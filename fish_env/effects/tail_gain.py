@@ -41,6 +41,7 @@ EFFECT = Effect(
         "servo_backlash",
         "servo_lag",
         "servo_rate_limit",
+        "servo_torque_limit",
         "swing_loss",
         "tail_flexibility",
         "tail_reactive",

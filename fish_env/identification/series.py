@@ -112,8 +112,7 @@ class SeriesProblem(Problem):
     def stages_for(self, effects: Iterable[str]) -> frozenset[str]:
         """Stages in the quickest kernel that computes with these effect parameters."""
         names = {*effects_of(effects), *self.model.effects}
-        hooks = {stage for name in names for stage in self.known[name].hooks}
-        return quickest(hooks)
+        return quickest({stage for name in names for stage in self.known[name].needs})
 
     def _filter_of(self, stages: frozenset[str]) -> RunFilter:
         if stages not in self._filters:

@@ -32,7 +32,8 @@ rule from one physics step to the next, such as "move at most so far": the hook 
 that the last step left and the time since then (s), and returns ``(value, memory)``, the memory
 as it is at this instant; the engine keeps what it is at the end of the step. It is for the drive:
 the stages ``inputs`` and ``tail``. A hook with both takes ``(..., e, states, memory, since)`` and
-returns ``(value, derivatives, memory)``.
+returns ``(value, derivatives, memory)``. A drive that gives way to the water is *loaded*: its tail
+hook takes ``(tail, inputs, phase, time, fish, motion, e, ...)``.
 
 Hooks of a stage run in the order of section, ``order`` and name, those of users' effects last.
 """
@@ -74,6 +75,8 @@ SECTIONS = (
     "surroundings",
     "measurement",
 )
+LOAD = "load"
+"""What a loaded drive needs beside the stages of its hooks."""
 FOLLOWED = 0.9
 """Steps of RK4 that a time constant has to last to be followed."""
 
@@ -95,6 +98,7 @@ class Effect(Switched):
         initial_states: (inputs, tail, fish, e) -> tuple of states, then memory, at the start of a
             run; inputs and tail as the hooks before this one leave them.
         command_delay: name of the parameter (s) by which the tail's command is late.
+        loaded: whether the hook of the tail takes the motion through the water too.
         order: place among the effects of its section, low ones first.
         sample_time: (recorded time array, parameters) -> true time array (measurement).
         command_time: (recorded time array, parameters) -> true time array, of commands.
@@ -124,6 +128,7 @@ class Effect(Switched):
     memory: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     initial_states: Callable[..., Any] | None = None
     command_delay: str | None = None
+    loaded: bool = False
     order: int = 0
     sample_time: Callable[..., Any] | None = None
     command_time: Callable[..., Any] | None = None
@@ -159,6 +164,8 @@ class Effect(Switched):
             raise EffectError(f"effect {self.name}: memory is for hooks of inputs and tail alone")
         if stages and self.initial_states is None:
             raise EffectError(f"effect {self.name}: give initial_states for its states and memory")
+        if self.loaded and "tail" not in self.hooks:
+            raise EffectError(f"effect {self.name}: a loaded drive has a hook for the tail")
         if self.command_delay not in (None, *self.neutral):
             raise EffectError(f"effect {self.name}: no parameter '{self.command_delay}'")
 
@@ -166,6 +173,11 @@ class Effect(Switched):
     def record_type(self) -> type:
         """Named tuple that hooks receive as ``e``."""
         return namedtuple(f"{self.name}_parameters", [p.name for p in self.parameters])
+
+    @property
+    def needs(self) -> frozenset[str]:
+        """Stages of its hooks, and :data:`LOAD` of a loaded drive."""
+        return frozenset({*self.hooks, *((LOAD,) if self.loaded else ())})
 
     @property
     def acts_on_record(self) -> bool:

@@ -65,6 +65,7 @@ class Emitter:
         self.states = composition.state_names
         self.parameters = composition.parameter_names
         self.coefficients = "table" if composition.tables else "analytic"
+        self.loaded = any(effect.loaded for effect in composition.effects)
 
     def text(self) -> str:
         """All functions of one composition."""
@@ -109,6 +110,7 @@ class Emitter:
         """States and memory of effects at the start of a run, each behind the hooks before it."""
         lines = ["elapsed = 0.0", "shift = 0.0", *self.unpack()]
         lines += self.apply("inputs", "inputs", "time, fish", "commanded_tail(inputs, phase)")
+        lines += self.motion_lines() if self.loaded else ()
         lines += self.command_lines("running_command(inputs, phase, late)")
         lines += self.apply("tail", "tail", "tail_inputs, tail_phase, time, fish", "tail")
         for effect in self.effects:
@@ -140,6 +142,7 @@ class Emitter:
             "shift = h",
             *self.unpack(),
             *self.apply("inputs", "inputs", "time, fish"),
+            *(self.motion_lines() if self.loaded else ()),
             *self.command_lines(self.recalled()),
             *self.apply("tail", "tail", "tail_inputs, tail_phase, time, fish"),
         ]
@@ -202,13 +205,9 @@ class Emitter:
         """The fish of the lane in water whose density effects change."""
         if not self.has("density"):
             return []
-        own = {"density": "density"}
-        fields = ", ".join(own.get(name, f"fish.{name}") for name in RECORD_FIELDS)
-        return [
-            "density = fish.density",
-            *self.apply("density", "density", "place"),
-            f"fish = Fish({fields})",
-        ]
+        fields = ", ".join("density" if f == "density" else f"fish.{f}" for f in RECORD_FIELDS)
+        changed = self.apply("density", "density", "place")
+        return ["density = fish.density", *changed, f"fish = Fish({fields})"]
 
     def apply(self, stage: str, value: str, arguments: str, tail: str = "") -> list[str]:
         """Calls of all hooks of a stage, each replacing ``value``.
@@ -225,7 +224,8 @@ class Emitter:
 
     def call(self, effect: Effect, stage: str, target: str, arguments: str) -> str:
         """Call of one hook, which also gives the slopes of its states and its new memory."""
-        targets, given = [target], [arguments, f"e_{effect.name}"]
+        water = ["motion"] if effect.loaded and stage == "tail" else []
+        targets, given = [target], [arguments, *water, f"e_{effect.name}"]
         rows = [f"work[(X + {row}) * width + k], " for row in self.rows_of(effect)]
         count = len(effect.state_names)
         if stage in effect.states:
@@ -254,17 +254,11 @@ class Emitter:
         lines = [
             *self.unpack(),
             *self.apply("inputs", "inputs", "time, fish"),
+            *self.motion_lines(),
             *self.command_lines(self.recalled()),
             *self.apply("tail", "tail", "tail_inputs, tail_phase, time, fish"),
             "centre = barycentre(inputs, fish)",
             *self.apply("barycentre", "centre", "place, inputs, time, fish"),
-            "water = Vector(0.0, 0.0, 0.0)",
-            *self.apply("water", "water", "place, time"),
-            "flow = to_body(attitude, water)" if self.has("water") else "flow = water",
-            "rate = Vector(0.0, 0.0, 0.0)",
-            *self.apply("water_rate", "rate", "water, place, time"),
-            "flow_rate = to_body(attitude, rate)" if self.has("water_rate") else "flow_rate = rate",
-            "motion = relative_motion(time, place, velocity, omega, attitude, flow, flow_rate)",
             *self.tail_lines(),
             *self.body_lines(),
             "gravity = gravity_wrench(attitude, centre, fish)",
@@ -277,6 +271,18 @@ class Emitter:
                 given = "motion, tail, inputs, centre, fish"
                 lines.append(self.call(effect, "wrench", f"t_{effect.name}", given))
         return lines
+
+    def motion_lines(self) -> list[str]:
+        """The fish against the ground and against the water."""
+        return [
+            "water = Vector(0.0, 0.0, 0.0)",
+            *self.apply("water", "water", "place, time"),
+            "flow = to_body(attitude, water)" if self.has("water") else "flow = water",
+            "rate = Vector(0.0, 0.0, 0.0)",
+            *self.apply("water_rate", "rate", "water, place, time"),
+            "flow_rate = to_body(attitude, rate)" if self.has("water_rate") else "flow_rate = rate",
+            "motion = relative_motion(time, place, velocity, omega, attitude, flow, flow_rate)",
+        ]
 
     def tail_lines(self) -> list[str]:
         """Tail: kinematics, forces, servo power."""

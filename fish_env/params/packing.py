@@ -91,7 +91,8 @@ CURVES = (
 def pack_values(values: Mapping[str, float | FloatArray]) -> FloatArray:
     """Pack path -> value (a number, or one per fish) into records of shape (fields, fish).
 
-    Paths that are absent were replaced by a coefficient table; their field is zero and unread.
+    Paths that are absent were replaced by a coefficient table; their field is zero, and the
+    forces do not read it.
     """
     columns = [np.atleast_1d(np.asarray(values.get(path, 0.0), float)) for path in PATHS.values()]
     count = max(column.size for column in columns)

@@ -11,6 +11,7 @@ import csv
 import dataclasses
 import math
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal
 
@@ -103,6 +104,26 @@ def extension_values(table: CoefficientTable, alpha: FloatArray) -> FloatArray:
         return start + (end - start) * np.sin(alpha) ** 2 / math.sin(last) ** 2
     # sin a cos a = sin(2a) / 2; rounding would leave 1e-16 at pi/2, where the curve is zero.
     return np.where(alpha == HALF_PI, 0.0, end * np.sin(2 * alpha) / math.sin(2 * last))
+
+
+def analytic_tail(tables: Mapping[str, CoefficientTable]) -> dict[str, float]:
+    """Coefficients of analytic curves that are close to the tables of a tail, by path.
+
+    Where only the moment about the hinge counts: through the drag at 0 and 90 degrees, and
+    through the lift at 45.
+    """
+    close: dict[str, float] = {}
+    if "tail.drag" in tables:
+        drag = tables["tail.drag"]
+        rise = float(extension_values(drag, np.array([HALF_PI]))[0]) - drag.value[0]
+        close |= {"tail.drag.c0": drag.value[0], "tail.drag.c2": rise}
+    if "tail.lift" in tables:
+        lift = tables["tail.lift"]
+        half = np.array([0.5 * HALF_PI])
+        within = lift.alpha[-1] >= half[0]
+        at = np.interp(half, lift.alpha, lift.value) if within else extension_values(lift, half)
+        close["tail.lift.c1"] = 2.0 * float(at[0])
+    return close
 
 
 def extension_notice(table: CoefficientTable) -> str:

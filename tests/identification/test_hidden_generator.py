@@ -58,6 +58,7 @@ FURTHER = {
     "beat_load": {"offset": 0.25, "load": 0.012},
     "tail_stall": {"loss": 0.6, "onset": 1.0, "width": 0.06},
     "clock_skew": {"scale": 1.02},
+    "servo_torque_limit": {"torque": 0.02},
     "surface_piercing": {"height": 0.05},
     "bubbles": {"mass": 0.004, "x": 0.04},
     "wall_effect": {"gain": 2.5, "distance": 0.4, "heading": 0.7, "range": 0.3},
@@ -69,6 +70,7 @@ SHALLOW = {"surface_piercing": (0.1, 0.2, 0.03)}
 LOOSE = {
     "tail_asymmetry": 0.02,
     "angle_limit": 0.02,
+    "servo_torque_limit": 0.1,
     "tail_stall": 0.02,
     "servo_rate_limit": 0.1,
     "servo_backlash": 0.3,

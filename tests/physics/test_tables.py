@@ -98,3 +98,13 @@ def test_tables_work_in_a_batch(all_tables):
         return Simulator(all_tables, dt, effects)
 
     checkers.check_scalar_equals_batch(build, 5)
+
+
+def test_the_load_of_a_servo_is_that_of_the_tables(all_tables):
+    """Without it the servo would feel no water, and turn at its speed without load."""
+    weak = {"servo_torque_limit": {"torque": 0.01}}
+    paths = [
+        Simulator(fish, effects=effects).run(SWIM, duration_s=2.0).states[:, :13]
+        for fish, effects in ((all_tables, weak), (swimmer(), weak), (swimmer(), None))
+    ]
+    assert np.abs(paths[0] - paths[1]).max() < 1e-3 * np.abs(paths[2] - paths[1]).max()

@@ -131,6 +131,7 @@ def test_the_catalogue_is_that_of_the_specification():
         "beat_load": {"offset": 0, "load": 0},
         "servo_lag": {"time_constant": 0},
         "servo_rate_limit": {"rate": np.inf},
+        "servo_torque_limit": {"torque": np.inf, "speed": None},
         "servo_delay": {"delay": 0},
         "servo_backlash": {"gap": 0},
         "tail_flexibility": {"natural_frequency": np.inf, "damping_ratio": 1},
@@ -195,6 +196,11 @@ def test_the_drive_acts_in_the_order_from_command_to_water():
     order = [name for name, effect in catalogue().items() if effect.section == "actuation"]
     chain = ("tail_asymmetry", "tail_bias", "angle_limit", "servo_rate_limit", "servo_lag")
     chain = (*chain, "servo_backlash", "tail_flexibility")
+    assert (
+        order.index("servo_rate_limit")
+        < order.index("servo_torque_limit")
+        < order.index("servo_lag")
+    )
     assert [name for name in order if name in chain] == list(chain)
     assert order.index("block_scale") < order.index("block_lag")
 

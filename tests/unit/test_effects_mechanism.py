@@ -205,10 +205,12 @@ def test_the_whole_catalogue_still_runs_in_vector_registers():
     """A hook that does not vectorise takes all others out of the vector registers with it.
 
     What effects remember of a step is computed once for each fish by itself: a sixth of the code,
-    most of it of the two effects that make the tail's rate jump.
+    most of it of the two effects that make the tail's rate jump; a quarter with a loaded drive.
     """
     whole = build_model(swimmer(), whole_catalogue=True)
-    assert share_in_vector_registers(whole) > 0.8
+    assert share_in_vector_registers(whole) > 0.75
+    without_load = tuple(effect for effect in whole.declared if not effect.loaded)
+    assert share_in_vector_registers(replace(whole, declared=without_load)) > 0.8
     without_memory = tuple(effect for effect in whole.declared if not effect.memory)
     assert share_in_vector_registers(replace(whole, declared=without_memory)) > 0.95
 

@@ -37,15 +37,20 @@ def gain_of_the_rate(effect, setting, step, seconds=6.0):
 
 
 @pytest.mark.parametrize(
-    ("name", "setting"),
-    [("servo_backlash", {"gap": 0.06}), ("servo_rate_limit", {"rate": 2.0})],
+    ("name", "follows", "setting"),
+    [
+        ("servo_backlash", "fish_env.effects.servo_backlash", {"gap": 0.06}),
+        ("servo_rate_limit", "fish_env.model.servo", {"rate": 2.0}),
+    ],
 )
-def test_the_rate_adds_up_to_the_angle_wherever_it_jumps(name, setting, monkeypatch):
+def test_the_rate_adds_up_to_the_angle_wherever_it_jumps(name, follows, setting, monkeypatch):
     """Within a step too; the rate of the moment alone would be off by ten times as much."""
     effect = get_effect(name)
     right = gain_of_the_rate(effect, setting, 0.0025)
     assert right < 5e-5
-    module = import_module(f"fish_env.effects.{name}")
+    own, module = import_module(f"fish_env.effects.{name}"), import_module(follows)
+    if own is not module:
+        monkeypatch.setattr(own, "chase", py_function(own.chase))
     monkeypatch.setattr(module, "follow", py_function(corners.follow))
     monkeypatch.setattr(corners, "window", lambda tail, since, *_: (since, since + 1e-6, 0.0))
     assert gain_of_the_rate(effect, setting, 0.0025) > 10 * right

@@ -101,7 +101,7 @@ EFFECT = Effect(
     loaded=True,
     time_scale=fastest,
     order=4,
-    step_error=0.01,
+    step_error=0.03,
     confusable_with=(
         "beat_load",
         "servo_lag",

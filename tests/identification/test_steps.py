@@ -19,6 +19,7 @@ from tests.identification.synthetic import PATHS, Setup, simulate
 
 LAG = {"effects.servo_lag.time_constant": 0.013}
 LIMIT = {"effects.servo_rate_limit.rate": 2.0}
+TORQUE = {"effects.servo_torque_limit.torque": 0.01}
 
 
 @pytest.fixture(scope="module")
@@ -61,6 +62,14 @@ def test_steps_are_fine_after_a_switch_and_plain_elsewhere(dataset):
 @pytest.mark.parametrize("effects", [LAG, LIMIT, {}], ids=["lag", "rate limit", "nothing"])
 def test_the_steps_get_less_wrong_than_the_sensors(dataset, effects):
     assert off(dataset, effects) < 1.0
+
+
+def test_the_steps_get_a_torque_limit_as_wrong_as_it_says(dataset):
+    """As a share of what it changes, before any extrapolation."""
+    exact = SeriesProblem(dataset, dt=2e-4)
+    change = (predicted(exact, TORQUE) - predicted(exact, {})) / exact.sensor_sd
+    said = exact.known["servo_torque_limit"].step_error
+    assert off(dataset, TORQUE) < said * np.nanmax(np.abs(change))
 
 
 @pytest.mark.parametrize("effects", [LAG, LIMIT], ids=["lag", "rate limit"])

@@ -22,7 +22,7 @@ KERNELS = (
 )
 """Stages that are compiled together. An effect costs a little where it is neutral too, so one of
 what drives the tail, or of what pushes the fish, is computed without the other kinds: the same
-bits, in two thirds of the time. A loaded drive costs two fifths of all others together."""
+bits, in two thirds of the time. A loaded drive costs a quarter of all others together."""
 
 
 def quickest(stages: AbstractSet[str]) -> frozenset[str]:

@@ -132,7 +132,8 @@ def challenged(
 ) -> tuple[Explanation, tuple[Explanation, ...]]:
     """The explanation after the effects closest to its causes were tried in their place.
 
-    With those that explain the data alike. Beside a disturbance of implausible strength no fit
+    With those that explain the data alike. The closest to each cause come first: a small cause that
+    many could replace must not keep the others from being doubted. Beside a disturbance of implausible strength no fit
     tells which is better, and none is made.
 
     Args:
@@ -147,8 +148,18 @@ def challenged(
     close = [(s.cause, s.name) for s in substitutes(current, shown) if s.cost < LINEAR_DOUBT]
     pairs_of = (zip(current.causes, e.causes, strict=False) for e in rivals)
     earlier = [(a, b) for pairs in pairs_of for a, b in pairs if a != b]
-    pairs = [(c, signals[n]) for c, n in [*earlier, *close] if n in signals]
+    pairs = [(c, signals[n]) for c, n in [*earlier, *each_in_turn(close)] if n in signals]
     if not pairs:
         return current, ()
     best, *others = substituted(current, pairs[:MOST], POLICY.most_challenges, report)
     return best, rivals_of(best, others)
+
+
+def each_in_turn(close: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
+    """Pairs of a cause and a substitute: the first of each cause, then the second, and so on."""
+    ranks: dict[str, int] = {}
+    ranked = []
+    for cause, name in close:
+        ranks[cause] = ranks.get(cause, -1) + 1
+        ranked.append((ranks[cause], (cause, name)))
+    return [pair for _, pair in sorted(ranked, key=lambda entry: entry[0])]

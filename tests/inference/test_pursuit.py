@@ -10,6 +10,7 @@ import pytest
 from fish_env.inference.elimination import insignificant
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.explanation import Explanation
+from fish_env.inference.many_causes import each_in_turn
 from fish_env.inference.pipeline import infer
 from fish_env.inference.probes import causes_of
 from fish_env.inference.projection import Projector
@@ -106,3 +107,15 @@ def test_three_causes_are_named():
     result = infer(*map(BoatProblem, split(runs, FITTED)), seed=3)
     assert set(result.verdict.causes) == {*NAMES, "propeller_walk"}
     assert result.verdict.alternatives == ()
+
+
+def test_every_cause_is_doubted_before_one_is_doubted_again():
+    """A small cause with many substitutes must not take all the trials."""
+    close = [("gain", "lag"), ("gain", "loss"), ("gain", "wave"), ("delay", "lag"), ("play", "gap")]
+    assert each_in_turn(close) == [
+        ("gain", "lag"),
+        ("delay", "lag"),
+        ("play", "gap"),
+        ("gain", "loss"),
+        ("gain", "wave"),
+    ]

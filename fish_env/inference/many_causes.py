@@ -133,8 +133,8 @@ def challenged(
     """The explanation after the effects closest to its causes were tried in their place.
 
     With those that explain the data alike. The closest to each cause come first: a small cause that
-    many could replace must not keep the others from being doubted. Beside a disturbance of implausible strength no fit
-    tells which is better, and none is made.
+    many could replace must not keep the others from being doubted. Beside a disturbance of
+    implausible strength no fit tells which is better, and none is made.
 
     Args:
         current: causes of which some were found together.

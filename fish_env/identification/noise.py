@@ -113,6 +113,16 @@ class DisturbanceRange:
             found.append(f"a disturbance that stays for {noise.correlation_s:.0f} s or more")
         return tuple(found)
 
+    def passing(self, noise: NoiseModel) -> NoiseModel | None:
+        """A noise model with a disturbance that passes; None where it does not stay for long.
+
+        One that stays as long as any may hides every slow cause: weighted by it, none shows.
+        """
+        shortest, longest = self.correlation
+        if noise.correlation_s <= 0.98 * longest:
+            return None
+        return replace(noise, correlation_s=float(np.sqrt(shortest * longest)))
+
 
 def disturbance_range(fish: FishParams) -> DisturbanceRange:
     """Up to a thousandth of the weight, at a quarter of the hull's width, for up to ten seconds.

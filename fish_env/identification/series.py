@@ -205,6 +205,10 @@ class SeriesProblem(Problem):
         """How the disturbance leaves what is plausible: a misfit with another name."""
         return disturbance_range(self.fish).left_by(noise)
 
+    def passing_noise(self, noise: NoiseModel) -> NoiseModel | None:
+        """The noise model with a disturbance that passes, where it is one that stays."""
+        return disturbance_range(self.fish).passing(noise)
+
     def swamped(self, noise: NoiseModel) -> bool:
         """Whether a disturbance is as strong as any that a noise model may have."""
         return bool(widest_disturbance(self.fish).left_by(noise))
@@ -300,9 +304,8 @@ class SeriesProblem(Problem):
             filtered: gains to use.
             pushes: a prescribed wrench for each point.
         """
-        return self.filter_for(effects).innovations(
-            *self.lanes(z, effects), noise, filtered, pushes
-        )
+        lanes = self.lanes(z, effects)
+        return self.filter_for(effects).innovations(*lanes, noise, filtered, pushes)
 
     def changes(
         self,
@@ -333,9 +336,8 @@ class SeriesProblem(Problem):
             keep_slopes: whether to keep what :meth:`RunFilter.replay` needs; kept where runs
                 differ, whose numbers are estimated by them.
         """
-        record, measurement = self.lane(point)
         corners, keep = self.refines_steps(point.effects), keep_slopes or bool(noise.spread.any())
-        return self.filter_for(point.effects).run(record, measurement, noise, keep, corners)
+        return self.filter_for(point.effects).run(*self.lane(point), noise, keep, corners)
 
     def without_refinement(self) -> SeriesProblem:
         """The same problem without finer steps for effects that make the tail's rate jump."""
@@ -381,9 +383,8 @@ class SeriesProblem(Problem):
         self, z: FloatArray, effects: Mapping[str, FloatArray]
     ) -> tuple[FloatArray, Measurement]:
         """Parameter records (parameters, N) and what the sensors do, for N points."""
-        changes, measurement = changes_of(
-            self.model, self.known, self.baseline, z, effects, self.channels
-        )
+        own = self.model, self.known, self.baseline
+        changes, measurement = changes_of(*own, z, effects, self.channels)
         model = self.filter_for(effects).model
         return np.ascontiguousarray(model.records(changes)), measurement
 

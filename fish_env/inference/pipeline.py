@@ -23,7 +23,7 @@ from fish_env.inference.budget import Budget, error_budget
 from fish_env.inference.effort import FULL, Effort
 from fish_env.inference.estimate.again import finished
 from fish_env.inference.estimate.fit import Fit, fit
-from fish_env.inference.explanation import Explanation
+from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.gain import gap_closed
 from fish_env.inference.parallel import both
 from fish_env.inference.partial import Describe, confirmed, sustained
@@ -118,6 +118,8 @@ def investigate(
     # A weaker cause may explain what is left, but no disturbance of implausible strength.
     if effort.retries and not left.reached and not left.implausible:
         attribution, left = with_weaker_causes(attribution, left, causes, rng, report)
+    if effort.retries and not left.reached:
+        attribution, left = with_slow_causes(attribution, left, causes, rng, report)
     verdict = decide(attribution, left, shown)
     partly_known = verdict.name == "outside_library" and bool(attribution.accepted.causes)
     if effort.retries and partly_known:
@@ -279,3 +281,46 @@ def with_weaker_causes(
     report("testing what is left")
     after = adequacy(more.accepted.fit, rng, more.tolerated)
     return (more, after) if after.reached else (attribution, left)
+
+
+def with_slow_causes(
+    attribution: Attribution,
+    left: Adequacy,
+    causes: Sequence[Cause],
+    rng: np.random.Generator,
+    report: Report,
+) -> tuple[Attribution, Adequacy]:
+    """One more search where a disturbance that stays hides slow causes; kept if it then passes.
+
+    The search begins under a disturbance that passes. All fits with further causes estimate it
+    again, and what is kept has to be better than before under its own.
+
+    Args:
+        attribution: what was found.
+        left: adequacy of the accepted explanation.
+        causes: causes to consider.
+        rng: for null distributions.
+        report: told what is being done.
+    """
+    before = attribution.accepted
+    own = before.fit
+    noise = own.problem.passing_noise(own.noise)
+    if noise is None:
+        return attribution, left
+    report("looking for slow causes")
+    again = partial(fit, own.problem, own.effects, own.point, noise, own.released)
+    passing = reached(partial(again, refit_noise=False))
+    if passing is None:
+        return attribution, left
+    begun = replace(
+        attribution,
+        accepted=Explanation(before.causes, passing),
+        shown=screen(passing, causes, rng),
+    )
+    more = extended(begun, causes, rng, FULL, report)
+    found = more.accepted
+    better = found.score < before.score - POLICY.evidence_doubt
+    if found.causes == before.causes or not better or disturbance_at_limit(found.fit):
+        return attribution, left
+    report("testing what is left")
+    return more, adequacy(found.fit, rng, more.tolerated)

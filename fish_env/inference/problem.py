@@ -317,6 +317,14 @@ class Problem(Protocol):
         """
         return None
 
+    def passing_noise(self, noise: Any) -> Any | None:
+        """The noise model with a disturbance that passes; None where it is not one that stays.
+
+        Args:
+            noise: the present one. A disturbance that stays hides every slow cause.
+        """
+        return None
+
     def follows_drive(self, noise: Any) -> bool:
         """Whether a noise model follows a drive that is out of step."""
         return False

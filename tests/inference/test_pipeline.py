@@ -9,10 +9,10 @@ from fish_env.inference.adequacy import Adequacy, Misfit
 from fish_env.inference.attribution import Attribution, attribute
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.explanation import Explanation
-from fish_env.inference.pipeline import cross_validated, with_weaker_causes
+from fish_env.inference.pipeline import cross_validated, with_slow_causes, with_weaker_causes
 from fish_env.inference.probes import causes_of
 from fish_env.inference.screening import Screen
-from tests.inference.stated import Stated, apart, effect
+from tests.inference.stated import Stated, White, apart, effect
 
 SHOWN = Screen((), -11.0, 0.05)
 LEFT = Adequacy(False, -11.0, (Misfit("u", "heave", -12.0, 0.01),))
@@ -99,3 +99,43 @@ def test_one_half_of_the_runs_refutes_chance_in_the_other(causes, gain, reached)
     assert after.refuted == (2.0 * gain if reached else None)
     odd, even = ("r0", "r2", "r4"), ("r1", "r3")
     assert tested == ([] if causes else [(odd, even), (even, odd)])
+
+
+class Hiding(Pushed):
+    """A disturbance that stays wherever a sample is far off, and then hides what moves it."""
+
+    STAYS = White(50.0)
+
+    def fitted_noise(self, point, noise, final, filtered, leverage):
+        left = noise.sd * np.concatenate([run.residuals for run in filtered])
+        return self.STAYS if np.abs(left).max() > 5.0 else White()
+
+    def disturbance_at_limit(self, noise):
+        return ("a disturbance that stays",) if noise == self.STAYS else ()
+
+    def passing_noise(self, noise):
+        return White() if noise == self.STAYS else None
+
+
+@pytest.mark.parametrize(
+    ("tide", "unknown", "kept"),
+    [
+        (8.0, 0.0, ("tide",)),
+        (8.0, 8.0, ()),  # the disturbance stays with it too
+        (0.0, 8.0, ()),
+        (0.0, 0.0, ()),  # nothing stays, and nothing is looked for
+    ],
+)
+def test_a_slow_cause_is_found_where_a_disturbance_hid_it(tide, unknown, kept):
+    targets = {**dict.fromkeys(NAMES[1:], 0.0), "tide": tide, UNKNOWN: unknown}
+    runs = {name: np.full(3, size) for name, size in targets.items()}
+    problem = Hiding(apart(runs), [effect(name, reach=10.0) for name in targets])
+    causes = [cause for cause in causes_of(problem) if cause.name != UNKNOWN]
+    rng, said = np.random.default_rng(0), []
+    before = attribute(problem, fit(problem), causes, rng)
+    assert before.accepted.causes == ()
+    found, left = with_slow_causes(before, LEFT, causes, rng, said.append)
+    assert ("looking for slow causes" in said) == (tide > 0.0 or unknown > 0.0)
+    assert found.accepted.causes == kept
+    assert (found is before) == (left is LEFT) == (not kept)
+    assert left.reached == bool(kept)

@@ -148,11 +148,24 @@ def challenged(
     close = [(s.cause, s.name) for s in substitutes(current, shown) if s.cost < LINEAR_DOUBT]
     pairs_of = (zip(current.causes, e.causes, strict=False) for e in rivals)
     earlier = [(a, b) for pairs in pairs_of for a, b in pairs if a != b]
-    pairs = [(c, signals[n]) for c, n in [*earlier, *each_in_turn(close)] if n in signals]
+    tried = [*_of_drive(current), *earlier, *each_in_turn(close)]
+    pairs = [(c, signals[n]) for c, n in dict.fromkeys(tried) if n in signals]
     if not pairs:
         return current, ()
     best, *others = substituted(current, pairs[:MOST], POLICY.most_challenges, report)
     return best, rivals_of(best, others)
+
+
+def _of_drive(current: Explanation) -> list[tuple[str, str]]:
+    """What was measured of a drive, with what else in the clocks or the drive may have shown it."""
+    problem = current.fit.problem
+    return [
+        (cause, name)
+        for cause in current.causes
+        if cause in problem.drive.effects
+        for name in problem.out_of_step
+        if name in problem.known[cause].confusable_with and name not in current.causes
+    ]
 
 
 def each_in_turn(close: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:

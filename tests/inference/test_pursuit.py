@@ -10,15 +10,17 @@ import pytest
 from fish_env.inference.elimination import insignificant
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.explanation import Explanation
-from fish_env.inference.many_causes import each_in_turn
+from fish_env.inference.many_causes import challenged, each_in_turn
 from fish_env.inference.pipeline import infer
 from fish_env.inference.probes import causes_of
 from fish_env.inference.projection import Projector
 from fish_env.inference.pursuit import picked, pursued, substitutes
 from fish_env.inference.screening import Screen, screen
 from fish_env.inference.tails import chi2_log_tail
+from fish_env.inference.vehicle import Drive
 from tests.inference.boat import sail, split
 from tests.inference.boat_problem import BoatProblem
+from tests.inference.stated import Stated, effect, size_of
 from tests.inference.test_boat import BIAS, EAST, FITTED, NORTH, WALK
 
 HIDDEN = {BIAS: 0.03, NORTH: 0.05, EAST: -0.1}
@@ -119,3 +121,23 @@ def test_every_cause_is_doubted_before_one_is_doubted_again():
         ("gain", "loss"),
         ("gain", "wave"),
     ]
+
+
+def test_what_was_measured_of_a_drive_is_doubted_first():
+    """A clock may show what a drive seems to do, however little the linear model says of it."""
+
+    def residuals(z, effects):
+        slow, clock = effects[size_of("slow")], effects[size_of("clock")]
+        alike, apart = slow + clock - 5.0, 0.5 * slow - 0.3 * clock - 2.5
+        return np.tile([alike, apart, float(z.sum())], (3, 1))
+
+    known = [effect("slow", reach=10.0, confusable_with=("clock",)), effect("clock", reach=10.0)]
+    problem = Stated(residuals, known)
+    problem.out_of_step, said = ("slow", "clock"), []
+    problem.drive = Drive({size_of("slow"): 5.0}, known=True, certain=True)
+    measured = Explanation(("slow",), fit(problem, ("slow",)))
+    shown = screen(measured.fit, causes_of(problem), np.random.default_rng(0))
+    best, rivals = challenged(measured, shown, (), said.append)
+    assert "trying clock instead of slow" in said
+    assert best is measured
+    assert not rivals

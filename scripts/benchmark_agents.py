@@ -10,6 +10,7 @@ A combination is done again when the suite, the agent's code or its policies hav
 from __future__ import annotations
 
 import argparse
+import ast
 import datetime
 import hashlib
 import json
@@ -37,6 +38,7 @@ SOURCES = {
 """What an agent's numbers depend on: files, folders, patterns."""
 GUIDANCE = ("fish_env/envs/guidance.py", "fish_env/envs/guides.py", "fish_env/envs/tasks/*.py")
 """What those of paths and places depend on as well."""
+DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 
 
 def fingerprint(agent: str, suite: str) -> str:
@@ -49,8 +51,22 @@ def fingerprint(agent: str, suite: str) -> str:
         pattern = f"{place}/**/*" if (ROOT / place).is_dir() else place
         for file in sorted(ROOT.glob(pattern)):
             if file.is_file() and file.suffix not in (".pyc", ".md"):
-                digest.update(file.read_bytes())
+                digest.update(content(file))
     return digest.hexdigest()[:12]
+
+
+def content(file: Path) -> bytes:
+    """The bytes of a file; of Python without docstrings, on which no number depends."""
+    if file.suffix != ".py":
+        return file.read_bytes()
+    source = file.read_text(encoding="utf-8")
+    lines: list[str | None] = list(source.splitlines())
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
+            first = node.body[0]
+            for line in range(first.lineno - 1, first.end_lineno or first.lineno):
+                lines[line] = None
+    return "\n".join(line for line in lines if line is not None).encode()
 
 
 def fingerprints(agents: Sequence[str]) -> dict[str, dict[str, str]]:

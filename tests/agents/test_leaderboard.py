@@ -105,6 +105,18 @@ def test_a_fingerprint_changes_with_the_agent(monkeypatch):
     assert before != benchmark_agents.fingerprint("pid", "calm")
 
 
+def test_a_reworded_docstring_is_the_same_agent(tmp_path):
+    code = 'def act(x):\n    """{}"""\n    return {} * x\n'
+    files = [tmp_path / f"{i}.py" for i in range(3)]
+    for file, filled in zip(
+        files, (("Acts.", 2), ("Returns actions.", 2), ("Acts.", 3)), strict=True
+    ):
+        file.write_text(code.format(*filled))
+    one, reworded, other = map(benchmark_agents.content, files)
+    assert one == reworded
+    assert one != other
+
+
 def test_without_results_the_pages_say_so(tmp_path):
     none = tmp_path / "none.json"
     assert agents_report.headline(none) == agents_report.NOT_YET

@@ -109,7 +109,7 @@ class DisturbanceRange:
         if noise.moment_sd > 0.98 * self.moment[1]:
             found.append(f"a disturbing moment of {1e3 * noise.moment_sd:.2g} mN m or more")
         strength = max(noise.force_sd / self.force[1], noise.moment_sd / self.moment[1])
-        if noise.correlation_s > 0.98 * self.correlation[1] and strength > FELT:
+        if self._stays(noise) and strength > FELT:
             found.append(f"a disturbance that stays for {noise.correlation_s:.0f} s or more")
         return tuple(found)
 
@@ -118,10 +118,13 @@ class DisturbanceRange:
 
         One that stays as long as any may hides every slow cause: weighted by it, none shows.
         """
-        shortest, longest = self.correlation
-        if noise.correlation_s <= 0.98 * longest:
+        if not self._stays(noise):
             return None
-        return replace(noise, correlation_s=float(np.sqrt(shortest * longest)))
+        return replace(noise, correlation_s=float(np.sqrt(np.prod(self.correlation))))
+
+    def _stays(self, noise: NoiseModel) -> bool:
+        """Whether its disturbance stays as long as any may."""
+        return noise.correlation_s > 0.98 * self.correlation[1]
 
 
 def disturbance_range(fish: FishParams) -> DisturbanceRange:

@@ -17,6 +17,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fish_env.arrays import FloatArray
+from fish_env.identification.by_run import squares_by_run
 from fish_env.identification.in_step import nominal_point
 from fish_env.identification.runs import PHASE, RunData
 from fish_env.identification.series import SeriesProblem
@@ -206,10 +207,7 @@ def _left(problem: SeriesProblem, comb: Mapping[str, FloatArray]) -> FloatArray 
     if RATE in comb:
         comb = {**comb, RATE: held[RATE] + comb[RATE]}
     rows = settled.innovations(z, {**held, **comb}, noise, filtered)
-    ends = np.cumsum([run.measured.size for run in settled.runs])[:-1]
-    parts = [np.sum(own * own, axis=1) for own in np.split(rows, ends, axis=1)]
-    found = np.column_stack(parts)
-    return np.where(np.isfinite(found), found, np.inf)
+    return squares_by_run(rows, settled.runs)
 
 
 def _minimum(left: FloatArray, comb: FloatArray, at: int) -> float:

@@ -13,6 +13,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from fish_env.arrays import FloatArray
+from fish_env.identification.by_run import squares_by_run
 from fish_env.identification.filtering import Filtered, Measurement, RunFilter
 from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.runs import RunData
@@ -71,13 +72,11 @@ def settle_wave_phases(problem: W, point: Point, noise: NoiseModel) -> W:
     lanes = problem.lanes(np.repeat(point.z[:, None], count, axis=1), effects)
     filtered = problem.filtered(point, noise)
     judge = problem.filter_for(effects)
-    rows = judge.innovations(*lanes, noise, filtered, variation=more) ** 2
-    ends = np.cumsum([run.measured.size for run in problem.runs])[:-1]
+    rows = judge.innovations(*lanes, noise, filtered, variation=more)
     runs = []
-    for run, squares in zip(problem.runs, np.split(rows, ends, axis=1), strict=True):
+    for run, left in zip(problem.runs, squares_by_run(rows, problem.runs).T, strict=True):
         phases = _around_zero(run.variation[WAVE] + TURNS)
-        left = squares.sum(axis=1) + (phases / noise.spread[WAVE]) ** 2
-        likeliest = int(np.argmin(np.where(np.isfinite(left), left, np.inf)))
+        likeliest = int(np.argmin(left + (phases / noise.spread[WAVE]) ** 2))
         runs.append(_in_phase(run, float(phases[likeliest])) if likeliest else run)
     return problem.with_runs(runs)
 

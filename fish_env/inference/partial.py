@@ -65,11 +65,11 @@ def confirmed(
     if contradicts_priors(accepted.fit) and (doubtful := {*accepted.causes} - measured):
         report(f"leaving out {', '.join(sorted(doubtful))}: coefficients contradict their priors")
         return without(accepted, tuple(doubtful)) if measured else None
-    while {*accepted.causes} - measured:
-        weakest = _implausible(accepted, measured)
+    while others := [name for name in accepted.causes if name not in measured]:
+        words = implausible_estimates(accepted.fit)
+        weakest = _blamed(others, words)
         if weakest is not None:
-            words = "; ".join(implausible_estimates(accepted.fit))
-            report(f"leaving out {weakest}: its estimate is implausible ({words})")
+            report(f"leaving out {weakest}: its estimate is implausible ({'; '.join(words)})")
         else:
             log_p = StandIns(accepted, threshold).log_p()
             log_p = {name: value for name, value in log_p.items() if name not in measured}
@@ -157,12 +157,9 @@ def _least(losses: FloatArray, rng: np.random.Generator) -> float:
     return float(np.quantile(drawn, 0.025))
 
 
-def _implausible(accepted: Explanation, measured: frozenset[str]) -> str | None:
-    """The first cause whose estimate is implausible, but for those measured; None if none is."""
-    words = implausible_estimates(accepted.fit)
-    others = (name for name in accepted.causes if name not in measured)
-    blamed = (name for name in others if any(_is_of(name, word) for word in words))
-    return next(blamed, None)
+def _blamed(causes: Sequence[str], words: Sequence[str]) -> str | None:
+    """The first cause that words on implausible estimates are about; None if none is."""
+    return next((name for name in causes if any(_is_of(name, word) for word in words)), None)
 
 
 def _is_of(cause: str, word: str) -> bool:

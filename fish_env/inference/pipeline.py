@@ -308,8 +308,9 @@ def with_slow_causes(
     if noise is None:
         return attribution, left
     report("looking for slow causes")
-    again = partial(fit, own.problem, own.effects, own.point, noise, own.released)
-    passing = reached(partial(again, refit_noise=False))
+    passing = reached(
+        lambda: fit(own.problem, own.effects, own.point, noise, own.released, refit_noise=False)
+    )
     if passing is None:
         return attribution, left
     begun = replace(

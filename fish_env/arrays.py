@@ -11,3 +11,5 @@ IntArray = npt.NDArray[np.int64]
 """Array of 64-bit integers."""
 BoolArray = npt.NDArray[np.bool_]
 """Array of truth values."""
+SingleArray = npt.NDArray[np.float32]
+"""Array of 32-bit floating-point numbers, for what is only multiplied and takes much memory."""

@@ -13,7 +13,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from fish_env.arrays import FloatArray
+from fish_env.arrays import FloatArray, SingleArray
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.information import (
     block_index,
@@ -28,6 +28,11 @@ from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause
 from fish_env.inference.tails import chi2_log_tail
 
+AT_ONCE = 64
+"""Signals that are projected together: a tall product costs little more than a slim one."""
+SINGLE_PRECISION = 1e-6
+"""Relative error of a sum of products in 32 bits, with room."""
+
 
 @dataclass(frozen=True, eq=False)
 class Projected:
@@ -36,7 +41,8 @@ class Projected:
     Attributes:
         cause: the cause.
         probe: index of the alternative (-1: a baseline coefficient).
-        left: (D, m) change of the residuals for the settings probed, after a refit.
+        left: (D, m) change of the residuals for the settings probed, after a refit. In 32 bits:
+            a screen holds hundreds, and what decides is worked out before.
         energy: squared size of that change before the refit.
         projected: (m, m) information about the settings after a refit of the baseline.
         score: (m,) projected signal times residuals.
@@ -44,7 +50,7 @@ class Projected:
 
     cause: Cause
     probe: int
-    left: FloatArray
+    left: SingleArray
     energy: float
     projected: FloatArray
     score: FloatArray
@@ -98,9 +104,11 @@ class Signal(Projected):
         return float(chi2_log_tail(self.statistic, self.freedom))
 
     @cached_property
-    def span(self) -> FloatArray:
-        """(D, m) orthonormal basis of ``left``."""
-        return np.asarray(np.linalg.qr(self.left)[0])
+    def to_orthonormal(self) -> FloatArray:
+        """(m, k) weights that make orthonormal columns of ``left``, of its k independent ones."""
+        values, vectors = np.linalg.eigh(inner(self.left, self.left))
+        kept = values > SINGLE_PRECISION * values[-1]
+        return np.asarray(vectors[:, kept] / np.sqrt(values[kept]))
 
 
 class Projector:
@@ -165,38 +173,36 @@ class Projector:
             count_prior: whether what pulled the coefficients from their priors counts as evidence,
                 as it does for a cause that would let them return.
         """
-        return self.signals([(cause, probe, slice(None))], columns.T, count_prior)[0]
+        return self.signals([(cause, probe, range(columns.shape[1]))], columns.T, count_prior)[0]
 
     def signals(
         self,
-        tests: Sequence[tuple[Cause, int, Sequence[int] | slice]],
+        tests: Sequence[tuple[Cause, int, Sequence[int]]],
         rows: FloatArray,
         count_prior: bool = True,
     ) -> list[Signal | None]:
-        """As :meth:`signal`, of many causes at once: a tall product costs no more than a slim one.
+        """As :meth:`signal`, of many causes at once.
 
         Args:
             tests: cause, index of the alternative, and which rows are its own.
             rows: (m, D) changes of the residuals.
             count_prior: see :meth:`signal`.
         """
-        followed, left = np.empty((len(self.vector), len(rows))), np.empty_like(rows)
 
-        def follow(own: slice) -> None:
-            followed[:, own] = self.coefficients(rows[own].T)
-            np.matmul(followed[:, own].T, self.lin.slopes.T, out=left[own])
-            np.subtract(rows[own], left[own], out=left[own])
+        def together(part: Sequence[tuple[Cause, int, Sequence[int]]]) -> list[Signal | None]:
+            changes = rows[[i for _, _, own in part for i in own]]
+            followed = self.coefficients(changes.T)
+            left = changes - followed.T @ self.lin.slopes.T
+            found, first = [], 0
+            for cause, probe, own in part:
+                mine = slice(first, first + len(own))
+                seen = changes[mine].T, followed[:, mine], left[mine].T
+                found.append(self._signal(cause, probe, *seen, count_prior))
+                first += len(own)
+            return found
 
-        half = len(rows) // 2
-        side_by_side(partial(follow, own) for own in (slice(half), slice(half, None)))
-
-        def one(test: tuple[Cause, int, Sequence[int] | slice]) -> Signal | None:
-            cause, probe, own = test
-            return self._signal(
-                cause, probe, rows[own].T, followed[:, own], left[own].T, count_prior
-            )
-
-        return side_by_side(partial(one, test) for test in tests)
+        parts = side_by_side(partial(together, part) for part in _parts(tests))
+        return [signal for part in parts for signal in part]
 
     def _signal(
         self,
@@ -221,9 +227,10 @@ class Projector:
         remaining = self.lin.residuals + left @ step
         inflation = self.variance_inflation(left, remaining)
         size = float(energy.sum())
-        return Signal(cause, probe, left, size, projected, score, inflation, followed)
+        kept = left.astype(np.float32)
+        return Signal(cause, probe, kept, size, projected, score, inflation, followed)
 
-    def variance_inflation(self, left: FloatArray, residuals: FloatArray) -> float:
+    def variance_inflation(self, left: FloatArray | SingleArray, residuals: FloatArray) -> float:
         """Spread of block sums of the score against what white residuals would give.
 
         The larger of two spreads, over blocks long enough for most disturbances and for slow ones.
@@ -239,3 +246,18 @@ class Projector:
             sums = sums_over(index, scores)
             largest = max(largest, float((np.einsum("ij,ij->j", sums, sums) / white).max()))
         return largest
+
+
+def _parts(
+    tests: Sequence[tuple[Cause, int, Sequence[int]]],
+) -> list[list[tuple[Cause, int, Sequence[int]]]]:
+    """Tests in parts of at most :data:`AT_ONCE` rows, or of one test."""
+    parts: list[list[tuple[Cause, int, Sequence[int]]]] = []
+    room = 0
+    for test in tests:
+        if not parts or len(test[2]) > room:
+            parts.append([])
+            room = AT_ONCE
+        parts[-1].append(test)
+        room -= len(test[2])
+    return parts

@@ -15,7 +15,7 @@ from functools import partial
 
 import numpy as np
 
-from fish_env.arrays import FloatArray
+from fish_env.arrays import FloatArray, SingleArray
 from fish_env.inference.adequacy import beyond_plausible, implausible_estimates
 from fish_env.inference.elimination import insignificant, off_values
 from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
@@ -58,7 +58,7 @@ class Rows:
         pull: (n, m) of the coefficients, in units of their prior.
     """
 
-    left: FloatArray
+    left: FloatArray | SingleArray
     pull: FloatArray
 
     def times(self, other: Rows) -> FloatArray:

@@ -171,7 +171,8 @@ def _coefficient_signals(projector: Projector, causes: Sequence[Cause], fit: Fit
         column = projector.lin.slopes[:, [i]]
         score = np.array([at])
         energy = float((column**2).sum())
-        signals.append(Signal(cause, -1, column, energy, np.array([[left]]), score, 1.0))
+        kept = column.astype(np.float32)
+        signals.append(Signal(cause, -1, kept, energy, np.array([[left]]), score, 1.0))
     return signals
 
 
@@ -237,5 +238,6 @@ def smallest_detectable(
 
 def confusability(a: Signal, b: Signal) -> float:
     """Largest cosine between what two causes leave after a refit of the baseline (0 to 1)."""
-    cosines = np.linalg.svd(a.span.T @ b.span, compute_uv=False)
+    shared = a.to_orthonormal.T @ inner(a.left, b.left) @ b.to_orthonormal
+    cosines = np.linalg.svd(shared, compute_uv=False)
     return float(cosines[0])

@@ -9,15 +9,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from fish_env.arrays import FloatArray
+from fish_env.arrays import FloatArray, SingleArray
 
 BLOCK = 64
 AT_ONCE = 1_000_000
 """Numbers of the blocks' products held at a time."""
 
 
-def inner(a: FloatArray, b: FloatArray, at_once: int = AT_ONCE) -> FloatArray:
-    """``a.T @ b`` of tall matrices (D, n) and (D, m).
+def inner(
+    a: FloatArray | SingleArray, b: FloatArray | SingleArray, at_once: int = AT_ONCE
+) -> FloatArray:
+    """``a.T @ b`` of tall matrices (D, n) and (D, m), the blocks summed in 64 bits.
 
     Args:
         a: (D, n) tall.
@@ -31,7 +33,8 @@ def inner(a: FloatArray, b: FloatArray, at_once: int = AT_ONCE) -> FloatArray:
     total: FloatArray = np.zeros((a.shape[1], b.shape[1]))
     step = max(1, at_once // max(1, total.size))
     for first in range(0, count, step):
-        products = rows_a[first : first + step] @ rows_b[first : first + step]
+        block = slice(first, first + step)
+        products = np.matmul(rows_a[block], rows_b[block]).astype(np.float64, copy=False)
         products[0] += total  # so that the order of the sum does not depend on the step
         total = products.sum(axis=0)
     return np.asarray(total + a[whole:].T @ b[whole:])

@@ -15,7 +15,7 @@ from fish_env.data import CommandSteps, Dataset, Run
 from fish_env.data.clock import check_seconds
 from fish_env.model.state import INPUTS
 from fish_env.params import FishParams
-from fish_env.sensing import measured_channels, true_command_times, true_times
+from fish_env.sensing import ages_s, measured_channels, true_command_times, true_times
 from fish_env.simulator import InitialState, Simulator
 
 PHASES = 16
@@ -157,12 +157,17 @@ def simulate_run(simulator: Simulator, run: Run, start: InitialState) -> dict[st
     times = true_times(simulator.model, run.time_s)
     given = true_command_times(simulator.model, run.commands.times_s)
     commands = CommandSteps(given, run.commands.values)
-    trajectory = simulator.run(commands, initial=start, sample_times_s=times)
+    ages = ages_s(simulator.model, [*run.channels])
+    # A device that is late shows what was; before the first sample, the state there.
+    shown = {age: np.maximum(times - age, times[0]) for age in {0.0, *ages.values()}}
+    every = np.unique(np.concatenate([*shown.values()]))
+    trajectory = simulator.run(commands, initial=start, sample_times_s=every)
     channels = dict(trajectory.channels)
     if "tail_angle" in run.channels:
         channels["tail_angle"] = simulator.outputs(trajectory)["tail_angle"]
     seen = measured_channels(simulator.model, channels)
-    return {name: seen[name] for name in run.channels}
+    rows = {age: np.searchsorted(every, own) for age, own in shown.items()}
+    return {name: seen[name][rows[ages[name]]] for name in run.channels}
 
 
 def mean_errors(runs: tuple[RunComparison, ...]) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Sensor delay: measurements are recorded late."""
+"""Sensor delay: measurements are recorded late, those of some devices later than others."""
 
 from __future__ import annotations
 
@@ -10,16 +10,33 @@ def true_time(recorded_s, values):
     return recorded_s - values["delay"]
 
 
+def late(values):
+    """What camera and depth sensor show is older by so much more (s)."""
+    return {device: values[device] for device in ("camera", "depth")}
+
+
+def _further(device: str, what: str) -> EffectParameter:
+    return EffectParameter(
+        device, "s", 0.0, -1.0, 1.0, (-0.05, 0.1), f"further age of what {what} shows"
+    )
+
+
 EFFECT = Effect(
     name="sensor_delay",
     section="measurement",
-    summary="All measured channels lag the commands by the same time.",
-    equation="measured(t) = true(t - delay)",
+    summary="Measured channels lag the commands, those of camera and depth sensor by more.",
+    equation=(
+        "measured(t) = true(t - delay); x, y, u, v, w: true(t - delay - camera); "
+        "z: true(t - delay - depth)"
+    ),
     source="Exposure, transmission and filtering of camera and sensors",
     parameters=(
         EffectParameter("delay", "s", 0.0, 0.0, 5.0, (0.01, 0.2), "age of the recorded values"),
+        _further("camera", "the camera"),
+        _further("depth", "the depth sensor"),
     ),
     sample_time=true_time,
+    late=late,
     order=1,
     confusable_with=(
         "clock_scale",

@@ -15,7 +15,7 @@ import numpy as np
 from fish_env.arrays import FloatArray, IntArray
 from fish_env.effects.extended import ExtendedModel
 from fish_env.identification.applied_wrench import EFFECT as APPLIED_WRENCH
-from fish_env.identification.channels import Device, codes_of
+from fish_env.identification.channels import codes_of
 from fish_env.identification.jitter import channel_rates
 from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.noise_scoring import Replayed
@@ -32,6 +32,7 @@ from fish_env.model.runtime import Kernels, kernels
 from fish_env.model.state import BASE_STATES
 from fish_env.rigidbody.kinematics import turned
 from fish_env.sensing.channels import channels_from_states
+from fish_env.sensing.devices import Device
 from fish_env.sensing.geometry import lens_of, through_geometry
 from fish_env.threads import default_threads
 
@@ -143,8 +144,9 @@ class Measurement:
     def of_run(self, run: RunData, own: FloatArray, channels: Sequence[str]) -> Measurement:
         """The same for a run with numbers of its own (K, N or 1)."""
         bias = np.ascontiguousarray(varied_bias(self.bias, own, channels))
-        delay = varied_delay(self.delay, own)
-        return replace(self, delay=delay, bias=bias, ages=run.ages(own))
+        delay, ages = varied_delay(self.delay, own), run.ages(own)
+        ages = ages if self.ages is None else self.ages + ages
+        return replace(self, delay=delay, bias=bias, ages=ages)
 
 
 Job = tuple[RunData, "Filtered", int, FloatArray, FloatArray, Measurement, FloatArray, int, int]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fish_env.arrays import FloatArray, IntArray
-from fish_env.identification.channels import Device
+from fish_env.sensing.devices import Device
 
 LATEST_S = 0.1
 """Largest delay of a device by which its samples are moved to earlier rows (s)."""

@@ -15,6 +15,7 @@ from fish_env.inference.vehicle import Coefficients
 from fish_env.model.effect import Effect
 from fish_env.params.packing import PATHS
 from fish_env.params.schema import FishParams
+from fish_env.sensing.devices import Device
 
 ALIKE = (frozenset({"body.plane_xz.drag.c0", "body.plane_xy.drag.c0"}),)
 """Coefficients that act alike: both planes' drags at zero incidence brake along the fish."""
@@ -134,6 +135,7 @@ def measurement_of(
     """
     pace, delay, by_commands = np.ones(count), np.zeros(count), np.ones(count)
     geometry: dict[str, FloatArray] = {}
+    ages = np.zeros((len(Device), count))
     gain, bias = np.ones((len(channels), count)), np.zeros((len(channels), count))
     for effect in effects:
         base = model.effects.get(effect.name, effect.neutral)
@@ -150,6 +152,9 @@ def measurement_of(
             by_commands = by_commands * effect.command_time(np.ones(count), own)
         if effect.geometry is not None:
             geometry |= effect.geometry(own)
+        if effect.late is not None:
+            for device, seconds in effect.late(own).items():
+                ages[Device[device.upper()]] += seconds
         if effect.measure is not None:
             zeros = {name: np.zeros(count) for name in channels}
             ones = {name: np.ones(count) for name in channels}
@@ -165,4 +170,5 @@ def measurement_of(
         np.ascontiguousarray(gain),
         np.ascontiguousarray(bias),
         geometry,
+        ages if ages.any() else None,
     )

@@ -8,7 +8,7 @@ from fish_env.arrays import FloatArray
 from fish_env.data.schema import Dataset, Run
 from fish_env.data.units import SI_UNIT
 from fish_env.data.vocabulary import CHANNELS, COMMANDS
-from fish_env.identification.runs import jump_times
+from fish_env.identification.command_jumps import jump_times
 from fish_env.rigidbody.recording import RecordedRun, Recording
 
 _BLOCK = [i for i, name in enumerate(COMMANDS) if name.startswith("block_")]

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Protocol
+from typing import Protocol, Self, TypeVar
 
 import numpy as np
 
 from fish_env.arrays import FloatArray
-from fish_env.identification.filtering import Filtered
+from fish_env.identification.filtering import Filtered, Measurement
 from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.runs import RunData
 from fish_env.identification.sensor_errors import sensor_slopes
@@ -37,9 +37,29 @@ class Numbered(Protocol):
         """Every run filtered."""
         ...
 
-    def with_runs(self, runs: Sequence[RunData]) -> Numbered:
+    def lane(self, point: Point) -> tuple[FloatArray, Measurement]:
+        """Parameters, and what the sensors do, at a point."""
+        ...
+
+    def with_runs(self, runs: Sequence[RunData]) -> Self:
         """The same on other runs."""
         ...
+
+
+N = TypeVar("N", bound=Numbered)
+
+
+def in_late_rows(problem: N, point: Point) -> N:
+    """The problem with its samples in rows that suit how late devices are in all runs.
+
+    Args:
+        problem: the runs.
+        point: values of the shared parameters.
+    """
+    late = problem.lane(point)[1].device_ages[:, 0]
+    if all(np.array_equal(run.late, late) for run in problem.runs):
+        return problem
+    return problem.with_runs([run.with_late(late) for run in problem.runs])
 
 
 def renumbered(
@@ -65,6 +85,7 @@ def renumbered(
     """
     if not np.isfinite(values).all():
         raise np.linalg.LinAlgError("numbers of runs have diverged")
+    problem = in_late_rows(problem, point)
     runs = list(problem.runs)
     own, errors = np.split(values, [len(VARIATIONS)], axis=1)
     if near:

@@ -10,9 +10,9 @@ import numpy as np
 
 from fish_env.arrays import BoolArray, FloatArray, IntArray
 from fish_env.data.schema import Run
-from fish_env.data.vocabulary import COMMANDS
 from fish_env.errors import DatasetError
-from fish_env.identification.channels import BY_NAME, Device, Kind, devices_of
+from fish_env.identification.channels import BY_NAME, Kind
+from fish_env.identification.command_jumps import SAME_INSTANT_S, jump_times, jumped, just_after
 from fish_env.identification.first_state import first_state
 from fish_env.identification.late_rows import in_earlier_rows, rows_to_spare
 from fish_env.identification.state_blocks import PHASE_COLUMN
@@ -24,6 +24,7 @@ from fish_env.identification.variation import (
     SENSOR_ERRORS,
     device_ages,
 )
+from fish_env.sensing.devices import Device, devices_of
 
 PHASE = PHASE_COLUMN
 UNTOLD_S = 0.15
@@ -34,23 +35,11 @@ of a run from rest, the first samples judge nothing (s)."""
 SMEARED_S = 0.16
 """How long a gyro with a low-pass of 5 Hz inside shows a jump: after 0.14 s its answer is within a
 twentieth, and its clock may be some 0.02 s off."""
-SAME_INSTANT_S = 1e-6
 BEFORE_S = 1e3
 FREQUENCY = 2  # column of the commands
 HELD_S = 1.0
 """How long a frequency is held that falls all along: of one that falls by a tenth of a per cent a
 second, the phase is then off by a thousandth of a radian."""
-SWITCH_S = 0.04
-"""After a jump of the commands a servo may move its tail as fast as it can: steps are fine."""
-JUMPS = {
-    "tail_offset": 0.02,
-    "tail_amplitude": 0.02,
-    "tail_frequency": 0.15,
-    "block_displacement": 0.005,
-    "block_angle": 0.05,
-}
-"""Larger changes (rad, Hz, m) are jumps. Smaller ones, as of commands that glide and are logged
-with every sample, leave plain steps wrong by less than a fifth of usual sensor noise."""
 FINER = 4
 """How many times finer those are than the others."""
 LONG_STEP_S = 0.02
@@ -92,6 +81,7 @@ class RunData:
         recorded: (T, C) samples in the rows that their stamps ask for, where rows may be moved with
             what is known of the devices' delays; None where rows stay.
         devices: (C,) device of each channel, where rows may be moved.
+        late: (devices,) how late each device is in all runs (s), beside what is a run's own.
         moved: (devices,) rows by which the samples of each device were moved to earlier ones.
         usual_substeps: (T,) of published estimates, where ``substeps`` are fewer; else None.
     """
@@ -117,6 +107,7 @@ class RunData:
     distortion: FloatArray | None = None
     recorded: FloatArray | None = None
     devices: IntArray | None = None
+    late: FloatArray = field(default_factory=lambda: np.zeros(len(Device)))
     moved: IntArray = field(default_factory=lambda: np.zeros(len(Device), np.int64))
     usual_substeps: IntArray | None = None
     phase_found: bool = False
@@ -144,14 +135,22 @@ class RunData:
         Samples are in the last rows before their devices took them: between two rows the motion is
         known back to the first one, and after the second a command may have changed it.
         """
-        numbered = replace(self, variation=variation, sensor_errors=sensor_errors, distortion=None)
+        own = replace(self, variation=variation, sensor_errors=sensor_errors, distortion=None)
+        return own._in_last_rows()
+
+    def with_late(self, late: FloatArray) -> RunData:
+        """The same run where devices are late by other times (devices,) in all runs (s)."""
+        return replace(self, late=late)._in_last_rows()
+
+    def _in_last_rows(self) -> RunData:
+        """The same run with its samples in the last rows before their devices took them."""
         if self.recorded is None:
-            return numbered
-        rows = np.floor(device_ages(variation) / self.step_s).astype(np.int64)
+            return self
+        rows = np.floor((device_ages(self.variation) + self.late) / self.step_s).astype(np.int64)
         rows = np.clip(rows, 0, self.most_rows)
         if np.array_equal(rows, self.moved):
-            return numbered
-        return replace(numbered, measured=self._in_rows(rows), moved=rows)
+            return self
+        return replace(self, measured=self._in_rows(rows), moved=rows)
 
     def movable(self, channels: Sequence[str]) -> RunData:
         """The same run with rows that may be moved, where its samples are evenly spaced.
@@ -196,6 +195,8 @@ class RunData:
     def ages(self, own: FloatArray) -> FloatArray:
         """How much older than its row a sample of each device is (devices, N), s.
 
+        By the run's own numbers alone: what all runs have in common comes on top.
+
         Args:
             own: (K, N) the run's own numbers.
         """
@@ -203,8 +204,8 @@ class RunData:
 
     @property
     def own_ages(self) -> FloatArray:
-        """(devices,) the same by the run's present numbers."""
-        return self.ages(self.variation[:, None])[:, 0]
+        """(devices,) the same by the run's present numbers, and all that makes devices late."""
+        return np.asarray(self.ages(self.variation[:, None])[:, 0] + self.late)
 
     def steps(self, corners: bool) -> IntArray:
         """(T,) RK4 steps up to each sample, finer for motion with corners."""
@@ -320,7 +321,7 @@ def prepare_run(
         run.time_s - run.time_s[0], np.column_stack([run.channels[name] for name in channels])
     )
     switches = run.commands.times_s - run.time_s[0]
-    fresh = _after(switches[_jumped(run.commands.values)], clock)
+    fresh = just_after(switches[jumped(run.commands.values)], clock)
     substeps = _steps(clock, np.where(fresh, dt / FINER, dt))
     state0, covariance0 = first_state(run, channels, measured, clock, noise_sd)
     if run.start == "rest":
@@ -359,31 +360,6 @@ def _commands(run: Run, switches: FloatArray) -> tuple[FloatArray, FloatArray]:
 def _steps(clock: FloatArray, longest: float | FloatArray) -> IntArray:
     spans = np.diff(clock, prepend=0.0)
     return np.maximum(1, np.ceil(spans / longest - 1e-9)).astype(np.int64)
-
-
-def _jumped(commands: FloatArray) -> BoolArray:
-    """Which switches (m,) of commands (m, 5) are jumps; the first one comes out of the unknown."""
-    least = np.array([JUMPS[name] for name in COMMANDS])
-    large = np.abs(np.diff(commands, axis=0)) > least
-    return np.concatenate([[True], large.any(axis=1)])
-
-
-def jump_times(times_s: FloatArray, values: FloatArray) -> FloatArray:
-    """Times (k,) at which commands jump, s.
-
-    Args:
-        times_s: (m,) times from which each row of commands holds, s.
-        values: (m, 5) commands, SI.
-    """
-    return times_s[_jumped(values)]
-
-
-def _after(switches: FloatArray, clock: FloatArray) -> BoolArray:
-    """Whether the interval before each sample lies, in part, in the moment after a jump."""
-    last = np.searchsorted(switches, clock - SAME_INSTANT_S) - 1
-    begin = np.concatenate([clock[:1], clock[:-1]])
-    since = begin - switches[np.maximum(last, 0)]
-    return (last >= 0) & (since < SWITCH_S - SAME_INSTANT_S)
 
 
 def _merged(clock: FloatArray, measured: FloatArray) -> tuple[FloatArray, FloatArray]:

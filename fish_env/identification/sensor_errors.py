@@ -19,7 +19,7 @@ from scipy.linalg import expm
 from scipy.signal import butter, sosfilt
 
 from fish_env.arrays import FloatArray
-from fish_env.identification.channels import BY_NAME, devices_of, has_inertial_unit
+from fish_env.identification.channels import BY_NAME
 from fish_env.identification.filtering import Filtered, Slopes
 from fish_env.identification.runs import RunData
 from fish_env.identification.state_blocks import N_ERROR, N_MOVING, columns
@@ -27,6 +27,7 @@ from fish_env.identification.variation import SENSOR_ERRORS
 from fish_env.identification.variation_slopes import leave_diverged
 from fish_env.model.frames import euler_from_quaternion
 from fish_env.rigidbody.kinematics import euler_rates, rotations
+from fish_env.sensing.devices import devices_of, has_inertial_unit
 
 CUTOFF_HZ, FINE_S = 5.0, 0.004
 """Usual low-pass of an inertial unit, and steps in which it is computed (s)."""

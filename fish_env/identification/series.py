@@ -31,7 +31,7 @@ from fish_env.identification.noise_model import RELAXED_PHASE_SD, UNEVEN_PHASE_S
 from fish_env.identification.open_loop import windows, without_feedback
 from fish_env.identification.parameters import ALIKE, Baseline, changes_of, neutral_values
 from fish_env.identification.phases import settle_phases
-from fish_env.identification.run_numbers import renumbered
+from fish_env.identification.run_numbers import in_late_rows, renumbered
 from fish_env.identification.runs import FINER, RunData, prepare_run
 from fish_env.identification.sensor_errors import slopes_of_runs
 from fish_env.identification.sensors import largest_jitter_of, largest_noise
@@ -215,7 +215,8 @@ class SeriesProblem(Problem):
 
     def settled(self, point: Point, noise: NoiseModel, nearby: bool = False) -> SeriesProblem:
         """The same problem with the likeliest phases of tails that have none, and of a wave."""
-        return settle_wave_phases(settle_phases(self, point, noise, nearby), point, noise)
+        own = settle_phases(in_late_rows(self, point), point, noise, nearby)
+        return settle_wave_phases(own, point, noise)
 
     @cached_property
     def largest_sensor_sd(self) -> FloatArray:
@@ -333,8 +334,7 @@ class SeriesProblem(Problem):
             point: values of the parameters.
             noise: noise model.
             near: not needed, a filter begins where its run does.
-            keep_slopes: whether to keep what :meth:`RunFilter.replay` needs; kept where runs
-                differ, whose numbers are estimated by them.
+            keep_slopes: keep what :meth:`RunFilter.replay` needs; in any case where runs differ.
         """
         corners, keep = self.refines_steps(point.effects), keep_slopes or bool(noise.spread.any())
         return self.filter_for(point.effects).run(*self.lane(point), noise, keep, corners)

@@ -13,9 +13,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from fish_env.arrays import FloatArray
-from fish_env.identification.channels import Device, devices_of
 from fish_env.inference.estimate.run_variation import RunVariation
 from fish_env.params.packing import RECORD_FIELDS
+from fish_env.sensing.devices import Device, devices_of
 
 USUAL_BEAT, USUAL_SAG = 4e-3, 3e-4
 """Ordinary spreads over runs of servos' frequencies, and of what batteries lose each second (1/s).

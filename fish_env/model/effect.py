@@ -102,6 +102,8 @@ class Effect(Switched):
         order: place among the effects of its section, low ones first.
         sample_time: (recorded time array, parameters) -> true time array (measurement).
         command_time: (recorded time array, parameters) -> true time array, of commands.
+        late: parameters -> name of a device, ``camera``, ``inertial`` or ``depth`` -> by how much
+            later it shows what was than the true time says (s; measurement).
         geometry: parameters -> how sensors sit and look, by the names of
             :data:`fish_env.sensing.geometry.FIELDS` (measurement).
         measure: (channel arrays by name, parameters) -> channel arrays, an affine function of each
@@ -132,6 +134,7 @@ class Effect(Switched):
     order: int = 0
     sample_time: Callable[..., Any] | None = None
     command_time: Callable[..., Any] | None = None
+    late: Callable[..., Any] | None = None
     geometry: Callable[..., Any] | None = None
     measure: Callable[..., Any] | None = None
     time_scale: Callable[[Mapping[str, float]], float] | None = None
@@ -182,7 +185,8 @@ class Effect(Switched):
     @property
     def acts_on_record(self) -> bool:
         """Whether it changes what is recorded of a motion."""
-        return any((self.sample_time, self.command_time, self.geometry, self.measure))
+        shown = (self.sample_time, self.command_time, self.late, self.geometry, self.measure)
+        return any(shown)
 
     @property
     def acts_on_motion(self) -> bool:

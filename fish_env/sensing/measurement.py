@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from fish_env.arrays import FloatArray
 from fish_env.effects.extended import ExtendedModel
+from fish_env.sensing.devices import Device, devices_of
 from fish_env.sensing.geometry import through_geometry
 
 
@@ -19,6 +20,17 @@ def true_times(model: ExtendedModel, recorded_s: npt.ArrayLike) -> FloatArray:
         if effect.sample_time is not None:
             times = effect.sample_time(times, model.effects[effect.name])
     return times
+
+
+def ages_s(model: ExtendedModel, names: Sequence[str]) -> dict[str, float]:
+    """How much older each channel is than its true time says (s), by the device that records it."""
+    ages = dict.fromkeys(Device, 0.0)
+    for effect in model.measurement:
+        if effect.late is not None:
+            for device, seconds in effect.late(model.effects[effect.name]).items():
+                ages[Device[device.upper()]] += seconds
+    devices = zip(names, devices_of(names), strict=True)
+    return {name: ages[device] for name, device in devices}
 
 
 def true_command_times(model: ExtendedModel, recorded_s: npt.ArrayLike) -> FloatArray:

@@ -7,12 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fish_env.identification.channels import Device, devices_of
+from fish_env.data import CommandSteps
+from fish_env.identification.command_jumps import jump_times
 from fish_env.identification.open_loop import without_feedback
-from fish_env.identification.runs import SMEARED_S, jump_times
+from fish_env.identification.runs import SMEARED_S
 from fish_env.identification.series import SeriesProblem
 from fish_env.identification.variation_slopes import leave_diverged
+from fish_env.inference.estimate.fit import fit
 from fish_env.inference.problem import Point
+from fish_env.sensing.devices import Device, devices_of
 from tests.identification.synthetic import PATHS, Setup, simulate
 
 DELAYS = ("camera_delay", "inertial_delay", "depth_delay")
@@ -130,3 +133,55 @@ def test_a_gyro_says_nothing_just_after_a_jump(problem):
     assert not kept[np.ix_(after, gyro)].any()
     assert np.array_equal(kept[~after], np.isfinite(run.measured[~after]))
     assert np.array_equal(kept[:, ~gyro], np.isfinite(run.measured[:, ~gyro]))
+
+
+def test_what_makes_devices_late_in_all_runs_is_as_numbers_of_each_run(problem):
+    """Two ways to the same prediction: the effect's parameters, and the runs' own numbers."""
+    movable = problem.with_runs([problem.runs[0].movable(problem.channels)])
+    noise, none = problem.default_noise(), numbers_of(problem)
+    values = numbers_of(problem, camera_delay=0.056, depth_delay=0.013)
+    own = movable.with_variation(values, problem.start, noise)
+    shared = Point(
+        np.zeros(len(PATHS)),
+        {f"effects.sensor_delay.{name}": value
+         for name, value in {"delay": 0.0, "camera": 0.056, "depth": 0.013}.items()},
+    )  # fmt: skip
+    common = movable.with_variation(none, shared, noise)
+    np.testing.assert_array_equal(common.runs[0].moved, own.runs[0].moved)
+    np.testing.assert_allclose(common.runs[0].own_ages, own.runs[0].own_ages, atol=1e-15)
+    by_effect = common.filtered(shared, noise)[0].log_likelihood
+    by_numbers = own.filtered(problem.start, noise)[0].log_likelihood
+    assert by_effect == pytest.approx(by_numbers, rel=1e-12)
+    back = common.settled(problem.start, noise)
+    np.testing.assert_array_equal(back.runs[0].moved, movable.runs[0].moved)
+
+
+def test_a_fit_finds_how_late_camera_and_depth_sensor_are():
+    """Samples of a finer simulation, taken as late as the effect says."""
+    fine = simulate(Setup(seed=3, runs=2, rate=200.0, force_sd=1e-4, moment_sd=1e-6))
+    late = {"x": 0.065, "y": 0.065, "z": 0.035}
+    runs = []
+    for run in fine.runs:
+        rows = np.arange(40, len(run.time_s), 8)
+        shown = {
+            name: values[rows - round(200.0 * (0.02 + late.get(name, 0.0)))]
+            for name, values in run.channels.items()
+        }
+        clock, told = run.time_s[rows], run.commands
+        later = told.times_s > clock[0]
+        steps = CommandSteps(
+            np.r_[clock[0], told.times_s[later]],
+            np.vstack([told.at(clock[:1]), told.values[later]]),
+        )
+        run = replace(run, time_s=clock, channels=shown, commands=steps, start="unknown")
+        runs.append(replace(run, tail_phase=None))
+    dataset = replace(fine, runs=tuple(runs))
+    series = SeriesProblem(dataset, paths=PATHS, effects=("sensor_delay",))
+    series = series.with_runs([run.movable(series.channels) for run in series.runs])
+    found = fit(series)
+    for name, truth, width in (("delay", 0.02, 0.003), ("camera", 0.065, 0.04)):
+        low, high = found.interval(f"effects.sensor_delay.{name}")
+        assert low < truth < high
+        assert high - low < width
+    low, high = found.interval("effects.sensor_delay.depth")  # it hardly dives
+    assert low < 0.035 < high

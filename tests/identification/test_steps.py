@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from fish_env.data import CommandSteps
+from fish_env.identification.command_jumps import SWITCH_S
 from fish_env.identification.open_loop import errors
-from fish_env.identification.runs import FINER, SWITCH_S
+from fish_env.identification.runs import FINER
 from fish_env.identification.series import SeriesProblem
 from fish_env.inference.effort import QUICK
 from fish_env.inference.estimate.again import refined

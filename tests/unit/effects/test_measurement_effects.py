@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from fish_env.comparison.runs import simulate_run
+from fish_env.data import CommandSteps, Run
 from fish_env.effects.extended import build_model
 from fish_env.sensing import measured_channels, true_times
+from fish_env.simulator import InitialState, Simulator
 from tests.physics.cases import swimmer
 
 ANGLES = ("roll", "pitch", "yaw")
@@ -175,3 +178,22 @@ def test_a_clock_turns_its_stamps_into_time_before_the_delay_counts():
 def test_measurement_effects_leave_the_lean_kernel():
     effects = {"sensor_delay": {"delay": 0.1}, "gyro_bias": {"p": 0.1}}
     assert build_model(swimmer(), effects).declared == ()
+
+
+def test_a_late_camera_shows_where_the_fish_was():
+    """Against a simulation that is sampled at the earlier times; other channels stay."""
+    times = np.arange(0.0, 4.01, 0.04)
+    commands = CommandSteps(np.array([0.0]), np.array([[0.2, 0.4, 1.5, 0.0, 0.0]]))
+    run = Run("r0", times, dict.fromkeys(("x", "y", "z", "yaw", "r"), times), commands, "rest")
+    start, late = InitialState(position=(0.0, 0.0, 1.0)), {"camera": 0.065, "depth": 0.02}
+    shown = simulate_run(Simulator(swimmer(), effects={"sensor_delay": late}), run, start)
+    plain = Simulator(swimmer())
+    now = simulate_run(plain, run, start)
+    for name, age in (("x", 0.065), ("y", 0.065), ("z", 0.02)):
+        was = np.unique(np.maximum(times - age, 0.0))
+        states = plain.run(commands, initial=start, sample_times_s=was)
+        rows = np.searchsorted(was, np.maximum(times - age, 0.0))
+        np.testing.assert_allclose(shown[name], states.channels[name][rows], atol=1e-6)
+        assert np.abs(shown[name] - now[name]).max() > 1e-5
+    for name in ("yaw", "r"):
+        np.testing.assert_allclose(shown[name], now[name], atol=1e-6)

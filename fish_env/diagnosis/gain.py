@@ -85,19 +85,21 @@ def measure_gain(problem: SeriesProblem, baseline: Fit, extended: Fit, gap: Clos
 
 def one_step(problem: SeriesProblem, baseline: Fit, extended: Fit) -> OneStep:
     """The runs of a problem filtered with each of two fits, both under the second one's noise."""
-    _, after = evaluated(_begun(problem, extended), extended.point, extended.noise)
+    after = _evaluated(problem, extended, extended)
     if extended is baseline:
         return after, after
-    return evaluated(_begun(problem, baseline), baseline.point, extended.noise)[1], after
+    return _evaluated(problem, baseline, extended), after
 
 
-def _begun(problem: SeriesProblem, fit: Fit) -> SeriesProblem:
-    """The runs with the numbers of their own that a fit to them has found.
+def _evaluated(problem: SeriesProblem, fit: Fit, noise_of: Fit) -> Sequence[Filtered]:
+    """The runs filtered with a fit, with the numbers of their own that it has found.
 
-    The same runs if the fit was to others.
+    Those of runs that it was not fitted to are predicted.
     """
     own = series_of(fit)
-    return own.with_refinement() if own.run_ids == problem.run_ids else problem
+    if own.run_ids == problem.run_ids:
+        return own.with_refinement().filtered(fit.point, noise_of.noise)
+    return evaluated(problem, fit.point, noise_of.noise)[1]
 
 
 def misfit_of(problem: SeriesProblem, judged: OneStep) -> dict[str, Pair]:

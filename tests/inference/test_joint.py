@@ -144,6 +144,26 @@ def test_no_number_is_negative_that_cannot_be():
     assert value > anywhere
 
 
+class Cornered(Differing):
+    """The first run has a corner: its first number does the same on either side of zero."""
+
+    def model(self, shared, own):
+        linear = super().model(shared, own)
+        linear[0] += 30.0 * abs(own[0, 0]) * self.x[0]
+        return linear
+
+
+def test_a_run_with_a_corner_stays_and_holds_back_no_other():
+    problem = Cornered(truth=(2.0, 0.3, 0.3))
+    problem.data[0] = problem.x[0]
+    moved, vector, _, _, _ = descended(problem, iterations=1)
+    assert np.abs(moved.own[0]).max() == 0.0
+    for r in range(1, RUNS):
+        y, left = problem.y[r], problem.data[r] - vector[0] * problem.x[r]
+        exact = np.linalg.solve(y.T @ y + np.eye(2), y.T @ left)
+        assert moved.own[r] == pytest.approx(exact, rel=1e-6, abs=1e-9)
+
+
 def test_a_fit_takes_joint_steps_where_runs_differ():
     problem = Differing()
     found = fit(problem, noise=Spreading(), rounds=1, iterations=3)

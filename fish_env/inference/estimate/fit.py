@@ -29,6 +29,7 @@ from fish_env.inference.estimate.gauss_newton import descend
 from fish_env.inference.estimate.information import gradient, information, leverage, prior_precision
 from fish_env.inference.estimate.joint import descend_jointly
 from fish_env.inference.estimate.run_variation import Marginal
+from fish_env.inference.estimate.settle import predicted_variation
 from fish_env.inference.evaluation import Evaluation
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
@@ -192,9 +193,13 @@ def fit(
         if last.is_close(noise, POLICY.same_noise):
             break
     if refit_noise:
+        point = free.unpack(vector)
+        # The numbers of runs were those that suit the noise before.
+        problem, marginal = predicted_variation(problem, point, noise, nearby=True)
         value, filtered = objective(problem, free, vector, noise, near=filtered)
-        marginal = marginal_of(problem, free.unpack(vector), noise, filtered)
-        value = objective_with(free, vector, filtered, marginal)
+        if marginal is not None:
+            marginal = marginal_of(problem, point, noise, filtered)
+            value = objective_with(free, vector, filtered, marginal)
     return _finish(problem, free, names, tuple(released), vector, noise, value, filtered, marginal)
 
 

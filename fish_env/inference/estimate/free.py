@@ -317,3 +317,12 @@ def objective_of(problem: Problem, free: Free, vector: FloatArray, residuals: Fl
 def _objective(free: Free, vector: FloatArray, residuals: FloatArray, possible: bool) -> float:
     value = float(residuals @ residuals + free.prior @ (vector * vector))
     return value if possible and np.isfinite(value) else np.inf
+
+
+def own_objectives(problem: Problem, filtered: Sequence[Evaluation], noise: Any) -> FloatArray:
+    """(R,) -2 log likelihood of each run together with its own numbers, but for a constant."""
+    spreads = spread_of(problem, noise)
+    active = np.flatnonzero(spreads)
+    own = problem.variation[:, active] / spreads[active]
+    of_runs = np.array([-2.0 * f.log_likelihood for f in filtered])
+    return np.asarray(of_runs + np.sum(own**2, axis=1))

@@ -24,6 +24,7 @@ from fish_env.inference.estimate.free import (
     linearise,
     marginal_of,
     objective_with,
+    own_objectives,
     quadratic,
     spread_of,
 )
@@ -34,6 +35,8 @@ from fish_env.inference.problem import Problem
 SHARES = (1.0, 0.4)
 DAMPINGS = (0.03, 0.3, 3.0, 30.0)
 """Of a step that is too long: parts of it first, then damped ones (Marquardt, 1963)."""
+OWN_SHARES = (0.4, 0.0)
+"""Parts of its own step that a run goes which loses by the whole."""
 ENOUGH, FORESEEN = 1.0, 0.1
 """Decrease of -2 log likelihood below which steps follow its roughness, and the share of what the
 linear model foresees below which it is of no use: where one run has a sharp corner, most of what is
@@ -49,12 +52,15 @@ class Joint:
         vector: (n,) shared parameters.
         filtered: evaluation there.
         value: -2 log likelihood + both priors.
+        of_runs: (R,) -2 log likelihood + prior of its own numbers, of each run; infinite where it
+            diverges.
     """
 
     problem: Problem
     vector: FloatArray
     filtered: Sequence[Evaluation]
     value: float
+    of_runs: FloatArray
 
     @property
     def residuals(self) -> FloatArray:
@@ -115,13 +121,12 @@ def descend_jointly(
 def _evaluated(problem: Problem, free: Free, vector: FloatArray, noise: Any) -> Joint:
     """Everything at a point; infinite where no vehicle can be so, or the simulation diverges."""
     if not problem.baseline.possible(vector[: free.count]):
-        return Joint(problem, vector, (), np.inf)
+        return Joint(problem, vector, (), np.inf, np.full(problem.run_count, np.inf))
     filtered = problem.filtered(free.unpack(vector), noise)
-    spreads = spread_of(problem, noise)
-    active = np.flatnonzero(spreads)
-    own = problem.variation[:, active] / spreads[active]
-    value = objective_with(free, vector, filtered) + float(np.sum(own * own))
-    return Joint(problem, vector, filtered, value if np.isfinite(value) else np.inf)
+    of_runs = own_objectives(problem, filtered, noise)
+    of_runs = np.where(np.isfinite(of_runs), of_runs, np.inf)
+    value = float(free.prior @ (vector * vector) + of_runs.sum())
+    return Joint(problem, vector, filtered, value, of_runs)
 
 
 def _agreed(at: Joint, free: Free, noise: Any) -> Joint:
@@ -198,13 +203,46 @@ def _descending(model: _Model, free: Free, noise: Any, at: Joint) -> Iterator[Jo
     """Points with a lower value, the boldest first."""
     for damping, share in (*((0.0, s) for s in SHARES), *((d, 1.0) for d in DAMPINGS)):
         vector, own = model.step(damping, share)
-        point = free.unpack(vector)
         if not at.problem.baseline.possible(vector[: free.count]):
             continue
         try:
-            moved = at.problem.with_variation(model.numbers(own), point, noise, at.filtered)
-            tried = _evaluated(moved, free, vector, noise)
+            tried = _with_own_steps(model, noise, at, vector, own)
         except np.linalg.LinAlgError:
             continue
         if tried.value < at.value:
             yield tried
+
+
+def _with_own_steps(
+    model: _Model, noise: Any, at: Joint, vector: FloatArray, own: FloatArray
+) -> Joint:
+    """Everything at a step, each run as far along its own part of it as its likelihood rises.
+
+    A run with a sharp corner stays, and does not hold back the others.
+
+    Args:
+        model: about where the step begins.
+        noise: noise model.
+        at: where it begins.
+        vector: (n,) shared parameters after it.
+        own: (R, K) the runs' own numbers after it, in units of their spread.
+    """
+    free, point = model.free, model.free.unpack(vector)
+    moved = at.problem.with_variation(model.numbers(own), point, noise, at.filtered)
+    tried = _evaluated(moved, free, vector, noise)
+    worse = np.flatnonzero(~(tried.of_runs < at.of_runs + ENOUGH)).tolist()
+    if not worse or not tried.filtered:
+        return tried
+    chosen, values, near = own.copy(), tried.of_runs[worse], [at.filtered[i] for i in worse]
+    part = at.problem.some(worse)
+    for share in OWN_SHARES:
+        less = model.own.at + share * (own - model.own.at)
+        some = part.with_variation(model.numbers(less)[worse], point, noise, near)
+        after = own_objectives(some, some.filtered(point, noise), noise)
+        better = [k for k, value in enumerate(after) if value < values[k]]
+        values[better] = after[better]
+        chosen[[worse[k] for k in better]] = less[[worse[k] for k in better]]
+    if np.array_equal(chosen, own):
+        return tried
+    moved = at.problem.with_variation(model.numbers(chosen), point, noise, at.filtered)
+    return _evaluated(moved, free, vector, noise)

@@ -9,8 +9,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from fish_env.arrays import FloatArray
-from fish_env.inference.estimate.free import least_of, marginal_of, spread_of
+from fish_env.inference.estimate.free import least_of, marginal_of, own_objectives, spread_of
 from fish_env.inference.estimate.run_variation import Marginal
 from fish_env.inference.evaluation import Evaluation
 from fish_env.inference.problem import Point, Problem
@@ -26,7 +25,7 @@ must not keep itself alive, and its evaluation."""
 
 
 def predicted_variation(
-    problem: Problem, point: Point, noise: Any
+    problem: Problem, point: Point, noise: Any, nearby: bool = False
 ) -> tuple[Problem, Marginal | None]:
     """The problem at the best prediction of what its runs differ in, and how to integrate it out.
 
@@ -37,6 +36,8 @@ def predicted_variation(
         problem: the problem, at an earlier prediction.
         point: values of the shared parameters.
         noise: noise model with the spreads.
+        nearby: whether the step is so small that what follows from the motion follows from the
+            present one.
     """
     spreads = spread_of(problem, noise)
     if not spreads.any():
@@ -46,15 +47,16 @@ def predicted_variation(
     marginal = marginal_of(problem, point, noise, filtered)
     assert marginal is not None
     residuals = np.concatenate([f.residuals for f in filtered])
-    numbers, before = problem.variation.copy(), _own_objectives(problem, filtered, noise)
+    numbers, before = problem.variation.copy(), own_objectives(problem, filtered, noise)
     worse, least = list(range(problem.run_count)), least_of(problem, active)
     for damping in DAMPING:
         trial = problem.variation.copy()
         trial[:, active] = marginal.predicted(residuals, damping, least) * spreads[active]
         better, near = [], [filtered[i] for i in worse]
         try:
-            part = problem.some(worse).with_variation(trial[worse], point, noise)
-            after = _own_objectives(part, part.filtered(point, noise, near), noise)
+            seen: Sequence[Evaluation] = near if nearby else ()
+            part = problem.some(worse).with_variation(trial[worse], point, noise, seen)
+            after = own_objectives(part, part.filtered(point, noise, near), noise)
         except np.linalg.LinAlgError:
             continue
         better = [i for i, value in zip(worse, after, strict=True) if value <= before[i]]
@@ -63,17 +65,11 @@ def predicted_variation(
         if not worse:
             break
     whole = len(better) == problem.run_count  # nothing to work out again
-    problem = part if whole else problem.with_variation(numbers, point, noise)
+    if not whole:
+        seen = filtered if nearby else ()
+        part = problem.with_variation(numbers, point, noise, seen)
+    problem = part
     return problem, replace(marginal, at=problem.variation[:, active] / spreads[active])
-
-
-def _own_objectives(problem: Problem, filtered: Sequence[Evaluation], noise: Any) -> FloatArray:
-    """(R,) -2 log likelihood of each run together with its own numbers, but for a constant."""
-    spreads = spread_of(problem, noise)
-    active = np.flatnonzero(spreads)
-    own = problem.variation[:, active] / spreads[active]
-    of_runs = np.array([-2.0 * f.log_likelihood for f in filtered])
-    return np.asarray(of_runs + np.sum(own**2, axis=1))
 
 
 def evaluated(problem: P, point: Point, noise: Any) -> tuple[P, Sequence[Any]]:

@@ -144,15 +144,17 @@ def challenged(
     """
     if disturbance_at_limit(current.fit):
         return current, ()
-    signals = {s.cause.name: s for s in shown.best()}
+    known = current.fit.problem.known  # a coefficient takes no effect's place
+    signals = {s.cause.name: s for s in shown.best() if s.cause.is_effect}
     close = [(s.cause, s.name) for s in substitutes(current, shown) if s.cost < LINEAR_DOUBT]
     pairs_of = (zip(current.causes, e.causes, strict=False) for e in rivals)
     earlier = [(a, b) for pairs in pairs_of for a, b in pairs if a != b]
-    tried = [*_of_drive(current), *earlier, *each_in_turn(close)]
-    pairs = [(c, signals[n]) for c, n in dict.fromkeys(tried) if n in signals]
+    first = [*_of_drive(current), *_of_lags(current)]
+    tried = [*first, *[*earlier, *each_in_turn(close)][:MOST]]
+    pairs = [(c, signals[n]) for c, n in dict.fromkeys(tried) if n in signals and c in known]
     if not pairs:
         return current, ()
-    best, *others = substituted(current, pairs[:MOST], POLICY.most_challenges, report)
+    best, *others = substituted(current, pairs, POLICY.most_challenges, report)
     return best, rivals_of(best, others)
 
 
@@ -166,6 +168,18 @@ def _of_drive(current: Explanation) -> list[tuple[str, str]]:
         for name in problem.out_of_step
         if name in problem.known[cause].confusable_with and name not in current.causes
     ]
+
+
+def _of_lags(current: Explanation) -> list[tuple[str, str]]:
+    """What makes a drive late, each with what else may: short lags differ little but in name.
+
+    The linear model is of no help. It begins from sizes at which the one follows another course
+    than the other.
+    """
+    problem = current.fit.problem
+    others = [name for name in problem.hidden_by_drive if name not in current.causes]
+    lags = [cause for cause in current.causes if cause in problem.hidden_by_drive]
+    return [(c, n) for c in lags for n in others if n in problem.known[c].confusable_with]
 
 
 def each_in_turn(close: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:

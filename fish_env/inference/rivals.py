@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
+from scipy.special import stdtrit
 
 from fish_env.inference.adequacy import implausible_estimates
 from fish_env.inference.explanation import Explanation
+from fish_env.inference.left_out import left_out_scores
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import same_causes
 from fish_env.inference.projection import Projector
@@ -46,11 +48,28 @@ def explained_away(cause: str, before: Screen, after: Screen) -> bool:
 def alike(best: Explanation, other: Explanation) -> bool:
     """Whether two explanations cannot be told apart on these runs.
 
-    They are alike when the evidence differs by less than :data:`DOUBT`, counted as the screen
-    counts it: with coloured residuals, divided by the variance inflation of the difference.
+    They are alike when the evidence differs by less than ``evidence_doubt``, counted as the screen
+    counts it: with coloured residuals, divided by the variance inflation of the difference. They
+    are alike too when the runs do not agree on which predicts better: what one run gains by an
+    explanation that others lose by is an error of that run's, of which the evidence knows nothing.
     """
     gap = other.score - best.score
     left, there = best.fit.linearised.residuals, other.fit.linearised.residuals
     apart = (there - left)[:, None]
     noise = left - apart[:, 0] * (apart[:, 0] @ left) / max(float(apart[:, 0] @ apart[:, 0]), 1e-12)
-    return bool(gap < POLICY.evidence_doubt * Projector(best.fit).variance_inflation(apart, noise))
+    inflation = Projector(best.fit).variance_inflation(apart, noise)
+    return bool(gap < POLICY.evidence_doubt * inflation or not agreed(best, other))
+
+
+def agreed(best: Explanation, other: Explanation) -> bool:
+    """Whether the runs agree that the best explanation predicts them better, each left out in turn.
+
+    By Student's t of the differences of their log scores. Fewer runs than make an interval always
+    agree. Source: Vehtari, Gelman and Gabry (2017), Statistics and Computing 27, section 5.1, with
+    runs in the place of samples.
+    """
+    if best.fit.problem.run_count < POLICY.fewest_runs_for_interval:
+        return True
+    gains = left_out_scores(best) - left_out_scores(other)
+    error = float(gains.std(ddof=1) / np.sqrt(len(gains)))
+    return bool(gains.mean() > stdtrit(len(gains) - 1, 1.0 - POLICY.disagreement) * error)

@@ -9,7 +9,7 @@ from fish_env.inference.explanation import Explanation
 from fish_env.inference.left_out import left_out_scores
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point
-from fish_env.inference.rivals import alike
+from fish_env.inference.rivals import agreed, alike
 from tests.diagnosis.linear import COEFFICIENTS, PATHS, LinearProblem
 from tests.inference.stated import Evaluated, Stated, effect, fit_of, size_of
 
@@ -21,9 +21,11 @@ RUN_OF = np.repeat(np.arange(RUNS), LINEAR.size // RUNS)
 KNOWN = {name: effect(name, 0.5 * RANGE) for name in ("first", "second")}
 COLUMNS = dict(zip(KNOWN, LINEAR.columns, strict=True))
 PROBLEM = Stated(lambda z, effects: (LINEAR.slopes @ z)[None], KNOWN.values(), PATHS)
+"""All residuals as those of one run, where runs are not asked whether they agree."""
+OF_RUNS = Stated(lambda z, effects: (LINEAR.slopes @ z).reshape(RUNS, -1), KNOWN.values(), PATHS)
 
 
-def explanation(data, effects=(), released=()):
+def explanation(data, effects=(), released=(), problem=PROBLEM):
     """The best fit of coefficients under their priors and of effects without any."""
     slopes = np.hstack([LINEAR.slopes, *(COLUMNS[name] for name in effects)])
     prior = np.array([0.0 if path in released else 1.0 for path in PATHS] + [0.0] * len(effects))
@@ -33,7 +35,7 @@ def explanation(data, effects=(), released=()):
     lines = Linearised(residuals, slopes, np.repeat(np.arange(RUNS), 20 * 60 // RUNS), times)
     sizes = dict(zip(map(size_of, effects), best[COEFFICIENTS:].tolist(), strict=True))
     fit = fit_of(
-        PROBLEM, effects, released, Point(best[:COEFFICIENTS], sizes), linearised=lines,
+        problem, effects, released, Point(best[:COEFFICIENTS], sizes), linearised=lines,
         objective=residuals @ residuals + prior @ best**2,
         filtered=[Evaluated(-0.5 * r @ r, r) for r in np.split(residuals, RUNS)],
     )  # fmt: skip
@@ -116,8 +118,8 @@ def test_the_ranking_is_by_runs_left_out_with_intervals_over_them():
     assert first.interval == pytest.approx((sum(gains) - half, sum(gains) + half), abs=0.5)
 
 
-def pair(y):
-    best, other = explanation(y, ("first",)), explanation(y, ("second",))
+def pair(y, problem=PROBLEM):
+    best, other = (explanation(y, (name,), problem=problem) for name in ("first", "second"))
     return best, other, other.score - best.score
 
 
@@ -147,3 +149,18 @@ def test_coloured_residuals_tell_less():
         COLUMNS.update(before)
     assert np.mean(white) < 0.3
     assert np.mean(coloured) > 0.6
+
+
+def test_explanations_are_alike_where_one_run_speaks_for_one_and_the_others_do_not():
+    """However much it says: the evidence counts it as if all had said it."""
+    everywhere, once = data(strength=6.0), data()
+    once[RUN_OF == 2] -= 15.0 * COLUMNS["first"][RUN_OF == 2, 0]
+    best, other, gap = pair(once, OF_RUNS)
+    assert gap > 30.0
+    assert alike(best, other)
+    assert agreed(*pair(everywhere, OF_RUNS)[:2])
+
+
+def test_runs_that_tell_nothing_agree_as_seldom_as_the_policy_says():
+    found = [agreed(*pair(data(seed), OF_RUNS)[:2]) for seed in range(300)]
+    assert np.mean(found) < 2.0 * POLICY.disagreement + 0.05

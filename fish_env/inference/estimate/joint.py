@@ -125,7 +125,7 @@ def _evaluated(problem: Problem, free: Free, vector: FloatArray, noise: Any) -> 
     filtered = problem.filtered(free.unpack(vector), noise)
     of_runs = own_objectives(problem, filtered, noise)
     of_runs = np.where(np.isfinite(of_runs), of_runs, np.inf)
-    value = float(free.prior @ (vector * vector) + of_runs.sum())
+    value = _with_prior(free, vector, of_runs)
     return Joint(problem, vector, filtered, value, of_runs)
 
 
@@ -233,16 +233,24 @@ def _with_own_steps(
     worse = np.flatnonzero(~(tried.of_runs < at.of_runs + ENOUGH)).tolist()
     if not worse or not tried.filtered:
         return tried
-    chosen, values, near = own.copy(), tried.of_runs[worse], [at.filtered[i] for i in worse]
-    part = at.problem.some(worse)
+    chosen, filtered, values = own.copy(), list(tried.filtered), tried.of_runs.copy()
     for share in OWN_SHARES:
         less = model.own.at + share * (own - model.own.at)
-        some = part.with_variation(model.numbers(less)[worse], point, noise, near)
-        after = own_objectives(some, some.filtered(point, noise), noise)
-        better = [k for k, value in enumerate(after) if value < values[k]]
-        values[better] = after[better]
-        chosen[[worse[k] for k in better]] = less[[worse[k] for k in better]]
-    if np.array_equal(chosen, own):
-        return tried
-    moved = at.problem.with_variation(model.numbers(chosen), point, noise, at.filtered)
-    return _evaluated(moved, free, vector, noise)
+        near = [at.filtered[i] for i in worse]
+        part = at.problem.some(worse).with_variation(model.numbers(less)[worse], point, noise, near)
+        found = part.filtered(point, noise)
+        pairs = zip(worse, found, own_objectives(part, found, noise), strict=True)
+        for i, evaluation, value in pairs:
+            if value < values[i]:
+                chosen[i], filtered[i], values[i] = less[i], evaluation, value
+        worse = [i for i in worse if not values[i] < at.of_runs[i] + ENOUGH]
+        if not worse:
+            break
+    mixed = at.problem.with_variation(model.numbers(chosen), point, noise, at.filtered)
+    value = _with_prior(free, vector, values)
+    return Joint(mixed, vector, filtered, value, values)
+
+
+def _with_prior(free: Free, vector: FloatArray, of_runs: FloatArray) -> float:
+    """-2 log likelihood + both priors, from what each run (R,) has of it."""
+    return float(free.prior @ (vector * vector) + of_runs.sum())

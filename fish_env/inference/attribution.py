@@ -24,7 +24,7 @@ from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause
 from fish_env.inference.problem import Problem
 from fish_env.inference.projection import Signal
-from fish_env.inference.rivals import explained_away, rivals_of, tied
+from fish_env.inference.rivals import agreed, explained_away, rivals_of, tied
 from fish_env.inference.screening import Screen, screen
 from fish_env.inference.search import refits, restart_from_winner
 from fish_env.inference.shortlist import like, newly_shown, shortlisted
@@ -279,7 +279,10 @@ class Search:
         if current.causes and not implausible_estimates(current.fit):
             tried = [e for e in tried if not implausible_estimates(e.fit)]
         gain = base.score - tried[0].score if tried else 0.0
-        if gain < max(POLICY.evidence_doubt, least):
+        # What else is missing pulls at a coefficient too, but not in all runs alike.
+        alone = not current.causes or not tried or tried[0].causes[-1] in problem.known
+        doubtful = not alone and not agreed(tried[0], base)
+        if doubtful or gain < max(POLICY.evidence_doubt, least):
             failed = found.failed | {signal.cause.name for signal in chosen}
             return replace(found, ranking=ranking, failed=failed)
         best, others, after = self._questioned(current, tried, chosen, shown, found.gain + gain)

@@ -202,9 +202,10 @@ def _fitted(current: Explanation, coarse: CoarseFit) -> Fit | None:
 
 
 def _led(names: list[str], current: Explanation, shown: Screen, report: Report) -> list[str]:
-    """Names of effects, the first of them replaced by what it may be an echo of if that is better.
+    """Names of effects, before the first of them what may show as it does if that is better.
 
-    Two delays in a row are nearly one: the second shows no more, and what shows is its echo.
+    Two delays in a row are nearly one: the second shows no more, and what shows is its echo. An
+    echo is left out; what is like the causes found, and not like the first, comes beside it.
     """
     alike = {n for c in (*current.causes, names[0]) for n in _confusable(current, c)} - {*names}
     echoes = [s for s in shown.best() if s.cause.name in alike][:ECHOES]
@@ -221,7 +222,8 @@ def _led(names: list[str], current: Explanation, shown: Screen, report: Report) 
         if found:
             tried.append((found.objective, name))
     best = min(tried)[1] if tried else names[0]
-    return [best, *names[1:]]
+    echo = names[0] if best in _confusable(current, names[0]) else best
+    return [best, *(name for name in names if name not in (best, echo))]
 
 
 def _together(

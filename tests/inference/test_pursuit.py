@@ -141,3 +141,21 @@ def test_what_was_measured_of_a_drive_is_doubted_first():
     assert "trying clock instead of slow" in said
     assert best is measured
     assert not rivals
+
+
+def test_what_is_like_a_cause_found_does_not_push_out_what_shows():
+    """It comes beside what shows most, which is like none of both."""
+
+    def residuals(z, effects):
+        lag, delay, bias = (effects[size_of(name)] for name in ("lag", "delay", "bias"))
+        saturating = 30.0 * np.tanh(bias / 10.0) - 90.0  # explains less than its slope says
+        return np.tile([lag - 4.0, 2.0 * delay - 80.0, saturating, float(z.sum())], (3, 1))
+
+    known = [effect("lag", 10.0, confusable_with=("delay",)), effect("delay", 80.0)]
+    problem = Stated(residuals, [*known, effect("bias", 40.0)])
+    current = Explanation(("lag",), fit(problem, ("lag",)))
+    shown = screen(current.fit, causes_of(problem), np.random.default_rng(0))
+    assert shown.best()[0].cause.name == "bias"
+    said = []
+    pursued(current, shown, said.append, most=1)
+    assert "fitting delay, bias together" in said

@@ -12,12 +12,12 @@ def true_time(recorded_s, values):
 
 def late(values):
     """What camera and depth sensor show is older by so much more (s)."""
-    return {device: values[device] for device in ("camera", "depth")}
+    return {device: values[f"{device}_later"] for device in ("camera", "depth")}
 
 
 def _further(device: str, what: str) -> EffectParameter:
     return EffectParameter(
-        device, "s", 0.0, -1.0, 1.0, (-0.05, 0.1), f"further age of what {what} shows"
+        f"{device}_later", "s", 0.0, -1.0, 1.0, (-0.05, 0.1), f"further age of what {what} shows"
     )
 
 
@@ -26,8 +26,8 @@ EFFECT = Effect(
     section="measurement",
     summary="Measured channels lag the commands, those of camera and depth sensor by more.",
     equation=(
-        "measured(t) = true(t - delay); x, y, u, v, w: true(t - delay - camera); "
-        "z: true(t - delay - depth)"
+        "measured(t) = true(t - delay); x, y, u, v, w: true(t - delay - camera_later); "
+        "z: true(t - delay - depth_later)"
     ),
     source="Exposure, transmission and filtering of camera and sensors",
     parameters=(

@@ -144,7 +144,7 @@ def test_what_makes_devices_late_in_all_runs_is_as_numbers_of_each_run(problem):
     shared = Point(
         np.zeros(len(PATHS)),
         {f"effects.sensor_delay.{name}": value
-         for name, value in {"delay": 0.0, "camera": 0.056, "depth": 0.013}.items()},
+         for name, value in {"delay": 0.0, "camera_later": 0.056, "depth_later": 0.013}.items()},
     )  # fmt: skip
     common = movable.with_variation(none, shared, noise)
     np.testing.assert_array_equal(common.runs[0].moved, own.runs[0].moved)
@@ -179,9 +179,9 @@ def test_a_fit_finds_how_late_camera_and_depth_sensor_are():
     series = SeriesProblem(dataset, paths=PATHS, effects=("sensor_delay",))
     series = series.with_runs([run.movable(series.channels) for run in series.runs])
     found = fit(series)
-    for name, truth, width in (("delay", 0.02, 0.003), ("camera", 0.065, 0.04)):
+    for name, truth, width in (("delay", 0.02, 0.003), ("camera_later", 0.065, 0.04)):
         low, high = found.interval(f"effects.sensor_delay.{name}")
         assert low < truth < high
         assert high - low < width
-    low, high = found.interval("effects.sensor_delay.depth")  # it hardly dives
+    low, high = found.interval("effects.sensor_delay.depth_later")  # it hardly dives
     assert low < 0.035 < high

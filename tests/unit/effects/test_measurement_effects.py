@@ -185,7 +185,10 @@ def test_a_late_camera_shows_where_the_fish_was():
     times = np.arange(0.0, 4.01, 0.04)
     commands = CommandSteps(np.array([0.0]), np.array([[0.2, 0.4, 1.5, 0.0, 0.0]]))
     run = Run("r0", times, dict.fromkeys(("x", "y", "z", "yaw", "r"), times), commands, "rest")
-    start, late = InitialState(position=(0.0, 0.0, 1.0)), {"camera": 0.065, "depth": 0.02}
+    start, late = (
+        InitialState(position=(0.0, 0.0, 1.0)),
+        {"camera_later": 0.065, "depth_later": 0.02},
+    )
     shown = simulate_run(Simulator(swimmer(), effects={"sensor_delay": late}), run, start)
     plain = Simulator(swimmer())
     now = simulate_run(plain, run, start)

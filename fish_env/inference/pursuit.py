@@ -164,7 +164,21 @@ def pursued(
     picks = picked(Projector(current.fit.extrapolated), shown, room, least, relaxed_log_p)
     if not picks:
         return current
-    causes = _led([pick.signal.cause.name for pick in picks], current, shown, report)
+    for causes in _led([pick.signal.cause.name for pick in picks], current, shown, report):
+        found = _needed(current, causes, picks, shown, report)
+        if found is not current:
+            return found
+    return current
+
+
+def _needed(
+    current: Explanation,
+    causes: Sequence[str],
+    picks: Sequence[Pick],
+    shown: Screen,
+    report: Report,
+) -> Explanation:
+    """The explanation with those of further causes that are needed; itself without such."""
     report(f"fitting {', '.join(causes)} together")
     coarse = _together(current, causes, picks, shown)
     if coarse is None:
@@ -201,16 +215,17 @@ def _fitted(current: Explanation, coarse: CoarseFit) -> Fit | None:
     return reached(lambda: fit(problem, *start, rounds=2, iterations=3))
 
 
-def _led(names: list[str], current: Explanation, shown: Screen, report: Report) -> list[str]:
+def _led(names: list[str], current: Explanation, shown: Screen, report: Report) -> list[list[str]]:
     """Names of effects, before the first of them what may show as it does if that is better.
 
     Two delays in a row are nearly one: the second shows no more, and what shows is its echo. An
-    echo is left out; what is like the causes found, and not like the first, comes beside it.
+    echo is left out; what is like the causes found, and not like the first, comes beside it. Where
+    coarse fits hardly tell the two best apart, the second follows in case the first is of no use.
     """
     alike = {n for c in (*current.causes, names[0]) for n in _confusable(current, c)} - {*names}
     echoes = [s for s in shown.best() if s.cause.name in alike][:ECHOES]
     if not echoes:
-        return names
+        return [names]
     base = current.fit
     fitter = CoarseFitter(base)
     tried: list[tuple[float, str]] = []
@@ -221,7 +236,13 @@ def _led(names: list[str], current: Explanation, shown: Screen, report: Report) 
         found = reached(partial(fitter.coarse_fit, effects, base.released, begin))
         if found:
             tried.append((found.objective, name))
-    best = min(tried)[1] if tried else names[0]
+    enough = min(tried)[0] + POLICY.coarse_fit_leeway if tried else np.inf
+    close = [name for objective, name in sorted(tried) if objective < enough][:2]
+    return [_in_place(name, names, current) for name in close or names[:1]]
+
+
+def _in_place(best: str, names: Sequence[str], current: Explanation) -> list[str]:
+    """The names behind the best, without the first of them if that is its echo."""
     echo = names[0] if best in _confusable(current, names[0]) else best
     return [best, *(name for name in names if name not in (best, echo))]
 

@@ -16,6 +16,7 @@ import numpy as np
 from fish_env.arrays import FloatArray
 from fish_env.identification import open_loop
 from fish_env.identification.filtering import Filtered
+from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.runs import RunData
 from fish_env.identification.series import SeriesProblem, series_of
 from fish_env.inference.estimate.fit import Fit
@@ -71,7 +72,9 @@ def measure_gain(problem: SeriesProblem, baseline: Fit, extended: Fit, gap: Clos
         extended: extended model, from the same other runs.
         gap: what the extension closes of the reachable gap, on the same runs.
     """
-    judged = one_step(problem, baseline, extended)
+    before, after = (
+        evaluated(problem, fit.point, extended.noise)[1] for fit in (baseline, extended)
+    )
     own = [_open_loop(problem, fit) for fit in (baseline, extended)]
     fit_percent = Pair(*(_fit_percent(errors, problem) for errors, problem in own))
     rmse = {
@@ -79,27 +82,21 @@ def measure_gain(problem: SeriesProblem, baseline: Fit, extended: Fit, gap: Clos
         for i, name in enumerate(problem.channels)
     }
     ids = tuple(run.id for run in problem.runs)
-    misfit = misfit_of(problem, judged)
+    misfit = misfit_of(problem, (before, after))
     return Gain(ids, fit_percent, rmse, misfit, gap.share, gap.interval)
 
 
-def one_step(problem: SeriesProblem, baseline: Fit, extended: Fit) -> OneStep:
-    """The runs of a problem filtered with each of two fits, both under the second one's noise."""
-    after = _evaluated(problem, extended, extended)
-    if extended is baseline:
-        return after, after
-    return _evaluated(problem, baseline, extended), after
+def one_step(baseline: Fit, extended: Fit) -> OneStep:
+    """The runs of two fits, filtered with each and the numbers of their own that it has found.
 
-
-def _evaluated(problem: SeriesProblem, fit: Fit, noise_of: Fit) -> Sequence[Filtered]:
-    """The runs filtered with a fit, with the numbers of their own that it has found.
-
-    Those of runs that it was not fitted to are predicted.
+    Both are under the second one's noise.
     """
-    own = series_of(fit)
-    if own.run_ids == problem.run_ids:
-        return own.with_refinement().filtered(fit.point, noise_of.noise)
-    return evaluated(problem, fit.point, noise_of.noise)[1]
+    after = _as_fitted(extended, extended.noise)
+    return after if extended is baseline else _as_fitted(baseline, extended.noise), after
+
+
+def _as_fitted(fit: Fit, noise: NoiseModel) -> Sequence[Filtered]:
+    return series_of(fit).with_refinement().filtered(fit.point, noise)
 
 
 def misfit_of(problem: SeriesProblem, judged: OneStep) -> dict[str, Pair]:

@@ -187,7 +187,7 @@ def _diagnose_runs(
             dataset = replace(dataset, notes=(*dataset.notes, USELESS))
     progress("locating the misfit")
     problem = problem.with_refinement()  # what was published, where comparisons do with less
-    judged = one_step(problem, baseline, found.accepted)
+    judged = one_step(baseline, found.accepted)
     place = localise_fits(problem, judged, np.random.default_rng([seed, 3]))
     progress("choosing the next experiment")
     proposal = propose(found.attribution, found.verdict, found.preconditions)

@@ -206,7 +206,7 @@ def test_series_are_predictions_of_the_two_models(tmp_path):
     start = Point(np.zeros_like(baseline.point.z), lag)
     extended = fit(baseline.problem, ("servo_lag",), start, rounds=1, iterations=2)
     rng = np.random.default_rng(0)
-    place = localise_fits(baseline.problem, one_step(baseline.problem, baseline, extended), rng)
+    place = localise_fits(baseline.problem, one_step(baseline, extended), rng)
     series = series_from(dataset, baseline, extended, ("r03",), place)
     assert [run.id for run in series.runs] == ["r03", "r01", "r02"]
     assert [run.final for run in series.runs] == [True, False, False]

@@ -8,14 +8,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from fish_env.arrays import FloatArray
-from fish_env.errors import ScheduleError, missing_extra
-from fish_env.files import replacing
+from fish_env.errors import ScheduleError
 from fish_env.model.state import INPUTS
+from fish_env.motion_files import write_csv_file, write_parquet_file
 from fish_env.sensing.channels import channels_from_states
-from fish_env.version import WRITER
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -78,11 +75,11 @@ class Trajectory:
         return pd.DataFrame(self.columns)
 
     def to_csv(self, path: str | Path, columns: tuple[str, ...] | None = None) -> None:
-        """Write columns (default: all) as CSV, with 17 significant digits: reads back equal."""
-        named = self._chosen(columns)
-        table = np.column_stack(list(named.values()))
-        with replacing(path) as part:
-            np.savetxt(part, table, delimiter=",", fmt="%.17g", header=",".join(named), comments="")
+        """Write columns (default: all) as CSV that reads back equal, and beside it their units.
+
+        See :mod:`fish_env.motion_files`.
+        """
+        write_csv_file(self._chosen(columns), path)
 
     def to_parquet(self, path: str | Path) -> None:
         """Write all columns as Parquet.
@@ -90,14 +87,7 @@ class Trajectory:
         Raises:
             MissingExtraError: pyarrow is not installed.
         """
-        try:
-            import pyarrow  # noqa: F401
-        except ImportError:
-            raise missing_extra("Writing Parquet", "pyarrow", "parquet") from None
-        with replacing(path) as part:
-            frame = self.to_pandas()
-            frame.attrs["written_by"] = WRITER
-            frame.to_parquet(part, index=False)
+        write_parquet_file(self.columns, path)
 
     def _chosen(self, columns: tuple[str, ...] | None) -> Mapping[str, FloatArray]:
         everything = self.columns

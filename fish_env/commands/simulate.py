@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TextIO
 
 import numpy as np
 from rich.console import Console
@@ -12,12 +12,17 @@ from rich.console import Console
 from fish_env.arrays import FloatArray
 from fish_env.commands.case import read_case
 from fish_env.commands.numbers import write_json
-from fish_env.errors import ScheduleError, missing_extra
-from fish_env.files import STANDARD, cannot_write, check_outputs, replacing
+from fish_env.errors import ScheduleError
+from fish_env.files import STANDARD, cannot_write, check_outputs
+from fish_env.motion_files import (
+    description_file,
+    write_csv,
+    write_csv_file,
+    write_parquet_file,
+)
 from fish_env.params import fish_files
 from fish_env.simulator import Simulator
 from fish_env.trajectory import POSE_COLUMNS, Trajectory
-from fish_env.version import WRITER
 
 COLUMNS = ("t", *POSE_COLUMNS)
 SUFFIXES = (".csv", ".parquet")
@@ -38,7 +43,7 @@ def simulate_case(
         case_file: The case, see :mod:`fish_env.commands.case`.
         dt: Longest physics step, s.
         rate_hz: Samples per second.
-        out: `.csv` or `.parquet` file; `-` is standard output.
+        out: `.csv` file, described beside it, or `.parquet` file; `-` is standard output.
         replay: HTML page that shows the fish swim.
         trust_effects: Run the effect files that the fish's file names.
         json_file: JSON file of the table by columns; `-` puts it in the place of the table.
@@ -51,15 +56,15 @@ def simulate_case(
     if out is not None and out.suffix not in SUFFIXES:
         raise ScheduleError(f"{out}: give the output the ending .csv or .parquet")
     case = read_case(case_file, trust_effects)
-    check_outputs([out, replay, json_file], [case_file, *fish_files(case.fish)])
+    described = None if out is None or out.suffix != ".csv" else description_file(out)
+    check_outputs([out, described, replay, json_file], [case_file, *fish_files(case.fish)])
     simulator = Simulator(case.fish, dt, case.effects)
     trajectory = simulator.run(case.commands, case.duration_s, case.initial, rate_hz)
     table = pose_table(trajectory)
     if out is not None or json_file is None or str(json_file) != STANDARD:
         write_table(table, out)
     if json_file is not None:
-        columns = dict(zip(COLUMNS, table.T.tolist(), strict=True))
-        write_json(Console(stderr=True), json_file, {"fish": case.fish.name, "columns": columns})
+        write_json(Console(stderr=True), json_file, {"fish": case.fish.name, "columns": table})
     if replay is not None:
         from fish_env.commands.replay import replay_case
 
@@ -67,45 +72,24 @@ def simulate_case(
         replay_case(Console(stderr=True), case, dt, case_file.stem, replay)
 
 
-def pose_table(trajectory: Trajectory) -> FloatArray:
-    """Time, pose and velocities, shape (T, 14), columns as `COLUMNS`.
+def pose_table(trajectory: Trajectory) -> dict[str, FloatArray]:
+    """Time, pose and velocities by the names of `COLUMNS`, each (T,).
 
     q and -q are one attitude; the one with qw >= 0 is given.
     """
     table = np.column_stack([trajectory[name] for name in COLUMNS])
     quaternion = slice(COLUMNS.index("qw"), COLUMNS.index("qz") + 1)
     table[table[:, quaternion.start] < 0.0, quaternion] *= -1.0
-    return table + 0.0  # turns -0 into 0
+    return dict(zip(COLUMNS, table.T + 0.0, strict=True))  # turns -0 into 0
 
 
-def write_table(table: FloatArray, out: Path | None) -> None:
-    """Writes a table with all digits, as its file's ending says, or as CSV to standard output."""
-    if out is None:
-        try:
-            _write_csv(table, sys.stdout)
-            sys.stdout.flush()
-        except OSError as error:
-            raise cannot_write("standard output", error) from error
-    elif out.suffix == ".parquet":
-        _write_parquet(table, out)
-    else:
-        with replacing(out) as part, part.open("w", encoding="utf-8") as file:
-            _write_csv(table, file)
-
-
-def _write_csv(table: FloatArray, file: TextIO) -> None:
-    header = ",".join(COLUMNS)
-    np.savetxt(file, table, fmt="%.17g", delimiter=",", header=header, comments="")
-
-
-def _write_parquet(table: FloatArray, out: Path) -> None:
+def write_table(columns: Mapping[str, FloatArray], out: Path | None) -> None:
+    """Writes columns with all digits, as the file's ending says, or as CSV to standard output."""
+    if out is not None:
+        (write_parquet_file if out.suffix == ".parquet" else write_csv_file)(columns, out)
+        return
     try:
-        import pyarrow  # noqa: F401
-    except ImportError:
-        raise missing_extra("Writing Parquet", "pyarrow", "parquet") from None
-    import pandas as pd
-
-    with replacing(out) as part:
-        frame = pd.DataFrame(table, columns=list(COLUMNS))
-        frame.attrs["written_by"] = WRITER
-        frame.to_parquet(part, index=False)
+        write_csv(columns, sys.stdout)
+        sys.stdout.flush()
+    except OSError as error:
+        raise cannot_write("standard output", error) from error

@@ -1,6 +1,7 @@
 """Versions agree and stand in what is written; the release checks notice what is wrong."""
 
 import json
+import os
 import tomllib
 from datetime import date
 from pathlib import Path
@@ -60,6 +61,26 @@ def test_pictures_and_parquet_name_the_version(tmp_path):
     swim.to_parquet(tmp_path / "a.parquet")
     kept = pd.read_parquet(tmp_path / "a.parquet")
     assert kept.attrs == {"written_by": f"robotic-fish {VERSION}"}
+
+
+def test_a_table_of_motion_has_version_and_units_beside_it(tmp_path):
+    swim = Simulator("zheng-2021-a").run([{"t": 0.0}], duration_s=0.1)
+    swim.to_csv(tmp_path / "a.csv")
+    described = json.loads((tmp_path / "a.csv-metadata.json").read_text())
+    assert described["url"] == "a.csv"
+    assert described["dc:creator"] == f"robotic-fish {VERSION}"
+    columns = described["tableSchema"]["columns"]
+    header = (tmp_path / "a.csv").read_text().splitlines()[0]
+    assert [column["name"] for column in columns] == header.split(",")
+    units = {column["name"]: column.get("schema:unitText") for column in columns}
+    some = {"t": "s", "x": "m", "yaw": "rad", "r": "rad/s", "tail_frequency": "Hz", "qw": "1"}
+    assert some.items() <= units.items()
+
+
+def test_what_is_no_file_gets_no_description():
+    swim = Simulator("zheng-2021-a").run([{"t": 0.0}], duration_s=0.1)
+    swim.to_csv(os.devnull)
+    assert not Path(f"{os.devnull}-metadata.json").exists()
 
 
 def test_every_item_of_the_checklists_holds():

@@ -13,6 +13,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from fish_env.files import write_text
+from fish_env.version import versioned
 
 LIST = ".robofish-files.json"
 """Part of a diagnosis -> name of a file relative to the folder -> SHA-256 of its content."""
@@ -34,7 +35,7 @@ def replace_part(folder: Path, part: str, files: Iterable[Path]) -> None:
         if name not in now and _ours(name, file, digest):
             file.unlink()
     listed[part] = now
-    write_text(folder / LIST, json.dumps(listed, indent=1) + "\n")
+    write_text(folder / LIST, json.dumps(versioned(listed), indent=1) + "\n")
 
 
 def _read(folder: Path) -> dict[str, dict[str, str]]:

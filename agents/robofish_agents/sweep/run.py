@@ -16,7 +16,7 @@ import yaml
 from fish_env.cluster import ClusterSettings, check_version, connected
 from fish_env.errors import ConfigError
 from fish_env.files import write_rows, write_text
-from fish_env.version import VERSION
+from fish_env.version import VERSION, stamped
 from robofish_agents.evaluation.suites import TRUST
 from robofish_agents.sweep.plan import Trial
 from robofish_agents.training.config import TrainConfig
@@ -63,7 +63,8 @@ def run_sweep(
         _check_folder(trial, out / trial.name)
     left = [trial for trial in trials if _evaluations(trial, out)[0] != FINISHED]
     plan = {trial.name: dict(trial.changes) | {"seed": trial.config.seed} for trial in trials}
-    write_text(out / PLAN, yaml.safe_dump(plan, sort_keys=False, allow_unicode=True))
+    text = yaml.safe_dump(plan, sort_keys=False, allow_unicode=True)
+    write_text(out / PLAN, stamped(text))
     reasons: dict[str, str] = {}
     try:
         if left:

@@ -16,6 +16,7 @@ from fish_env.model.effect import Effect
 from fish_env.params.packing import PATHS
 from fish_env.params.schema import FishParams
 from fish_env.sensing.devices import Device
+from fish_env.sensing.measurement import device_ages_s
 
 ALIKE = (frozenset({"body.plane_xz.drag.c0", "body.plane_xy.drag.c0"}),)
 """Coefficients that act alike: both planes' drags at zero incidence brake along the fish."""
@@ -152,9 +153,7 @@ def measurement_of(
             by_commands = by_commands * effect.command_time(np.ones(count), own)
         if effect.geometry is not None:
             geometry |= effect.geometry(own)
-        if effect.late is not None:
-            for device, seconds in effect.late(own).items():
-                ages[Device[device.upper()]] += seconds
+        ages += device_ages_s(effect, own, count)
         if effect.measure is not None:
             zeros = {name: np.zeros(count) for name in channels}
             ones = {name: np.ones(count) for name in channels}

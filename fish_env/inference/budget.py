@@ -21,7 +21,7 @@ import numpy as np
 from fish_env.arrays import BoolArray, FloatArray, IntArray
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.free import spread_of
-from fish_env.inference.estimate.settle import evaluated
+from fish_env.inference.estimate.settle import evaluated, usual_runs
 from fish_env.inference.hypotheses import PARAMETER, effect_of
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Problem
@@ -126,7 +126,7 @@ def _residuals(
 ) -> FloatArray:
     """Whitened residuals (sets, D) of the model with some components in place."""
     rows: list[FloatArray] = [np.zeros(0)] * len(sets)
-    plain = problem.with_variation(np.zeros_like(problem.variation), accepted.point, noise)
+    plain = usual_runs(problem, accepted.point, noise)
     varied = spread_of(accepted.problem, noise).any()
     for chosen, of_set in ((problem, True), (plain, False)):
         own = [i for i, s in enumerate(sets) if not varied or (RUN_VARIATION in s) == of_set]

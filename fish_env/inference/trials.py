@@ -10,10 +10,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-import numpy as np
-
 from fish_env.inference.adequacy import beyond_plausible
 from fish_env.inference.estimate.fit import Fit, fit
+from fish_env.inference.estimate.settle import usual_runs
 from fish_env.inference.explanation import FEW_RUNS, Explanation, fitted_again, reached
 from fish_env.inference.parallel import side_by_side
 from fish_env.inference.policy import POLICY
@@ -51,7 +50,7 @@ def tried_out(
         return None
     (name,) = {*best.effects} - {*current.fit.effects}
     report(f"fitting {name}")
-    fresh = problem.with_variation(np.zeros_like(problem.variation), best.point, best.noise)
+    fresh = usual_runs(problem, best.point, best.noise)
     whole = fitted_again(fresh, best, best.noise)
     if whole is None or beyond_plausible(whole, name):
         return None
@@ -75,6 +74,6 @@ def _trial(current: Explanation, name: str, values: dict[str, float]) -> Fit | N
     effects = (*own.effects, name) if name else own.effects
     begin = Point(few.start.z, {**own.point.effects, **values})
     noise = few.default_noise()
-    fresh = few.with_variation(np.zeros_like(few.variation), begin, noise)
+    fresh = usual_runs(few, begin, noise)
     start = (effects, begin, noise, own.released)
     return reached(lambda: fit(fresh, *start, iterations=STEPS, rounds=1))

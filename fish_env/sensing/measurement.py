@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from fish_env.arrays import FloatArray
 from fish_env.effects.extended import ExtendedModel
+from fish_env.model.effect import Effect
 from fish_env.sensing.devices import Device, devices_of
 from fish_env.sensing.geometry import through_geometry
 
@@ -24,13 +25,28 @@ def true_times(model: ExtendedModel, recorded_s: npt.ArrayLike) -> FloatArray:
 
 def ages_s(model: ExtendedModel, names: Sequence[str]) -> dict[str, float]:
     """How much older each channel is than its true time says (s), by the device that records it."""
-    ages = dict.fromkeys(Device, 0.0)
+    ages = np.zeros(len(Device))
     for effect in model.measurement:
-        if effect.late is not None:
-            for device, seconds in effect.late(model.effects[effect.name]).items():
-                ages[Device[device.upper()]] += seconds
+        ages += device_ages_s(effect, model.effects[effect.name])
     devices = zip(names, devices_of(names), strict=True)
-    return {name: ages[device] for name, device in devices}
+    return {name: float(ages[device]) for name, device in devices}
+
+
+def device_ages_s(
+    effect: Effect, values: Mapping[str, npt.ArrayLike], count: int = 0
+) -> FloatArray:
+    """How much older an effect makes what each device records (s), (devices,).
+
+    Args:
+        effect: the effect.
+        values: its parameters.
+        count: number of lanes if the parameters are arrays (count,); the result is (devices,
+            count).
+    """
+    ages = np.zeros((len(Device), count) if count else len(Device))
+    for device, seconds in effect.late(values).items() if effect.late is not None else ():
+        ages[Device[device.upper()]] += seconds
+    return ages
 
 
 def true_command_times(model: ExtendedModel, recorded_s: npt.ArrayLike) -> FloatArray:

@@ -72,6 +72,17 @@ def predicted_variation(
     return problem, replace(marginal, at=problem.variation[:, active] / spreads[active])
 
 
+def usual_runs(problem: P, point: Point, noise: Any) -> P:
+    """The problem with runs that differ in nothing: every number of their own is zero.
+
+    Args:
+        problem: the problem, with what a fit has found of its runs.
+        point: values of the shared parameters.
+        noise: noise model.
+    """
+    return cast(P, problem.with_variation(np.zeros_like(problem.variation), point, noise))
+
+
 def evaluated(problem: P, point: Point, noise: Any) -> tuple[P, Sequence[Any]]:
     """Every run with what is unknown of it where it suits these parameters best, and evaluated.
 

@@ -39,6 +39,16 @@ def fastest(values):
     return 1.0 / (TWO_PI * values["natural_frequency"] * (zeta + sqrt(zeta * zeta - 1.0)))
 
 
+def lags(values):
+    """Overdamped, its response is two lags in a row; the shorter is nearly a delay."""
+    zeta, omega = values["damping_ratio"], TWO_PI * values["natural_frequency"]
+    if zeta < 1.0 or omega == inf:
+        return {}
+    root = sqrt(zeta * zeta - 1.0)
+    shorter, longer = (zeta - root) / omega, (zeta + root) / omega
+    return {"servo_lag": {"time_constant": longer}, "servo_delay": {"delay": shorter}}
+
+
 EFFECT = Effect(
     name="tail_flexibility",
     section="actuation",
@@ -63,4 +73,5 @@ EFFECT = Effect(
         "tail_reactive",
         "wake_memory",
     ),
+    parts=lags,
 )

@@ -39,6 +39,10 @@ class EffectParameter:
         return high if abs(high - value) >= abs(low - value) else low
 
 
+Parts = Mapping[str, Mapping[str, float]]
+"""Names of effects -> their parameters."""
+
+
 class Switched:
     """Something with parameters that switch it on."""
 
@@ -76,6 +80,10 @@ class DeclaredEffect(Switched):
     step_error: float = 0.0
     drifts_in_phase: bool = False
     diagnosed: bool = True
+
+    def in_parts(self, values: Mapping[str, float]) -> Parts:
+        """Other effects that together do nearly the same: none are known."""
+        return {}
 
     def is_followed(self, values: Mapping[str, float], step: float) -> bool:
         """Whether simulation steps (s) follow it at these values: they do, at any."""

@@ -14,7 +14,7 @@ from fish_env.inference.probes import Cause
 from fish_env.inference.pursuit import pursued, substitutes
 from fish_env.inference.rivals import rivals_of
 from fish_env.inference.screening import Screen, screen
-from fish_env.inference.search import substituted, without
+from fish_env.inference.search import in_parts, substituted, without
 from fish_env.inference.shortlist import shortlisted
 from fish_env.inference.trials import tried_out
 
@@ -152,9 +152,9 @@ def challenged(
     first = [*_of_drive(current), *_of_lags(current)]
     tried = [*first, *[*earlier, *each_in_turn(close)][:MOST]]
     pairs = [(c, signals[n]) for c, n in dict.fromkeys(tried) if n in signals and c in known]
-    if not pairs:
-        return current, ()
     best, *others = substituted(current, pairs, POLICY.most_challenges, report)
+    apart = [in_parts(best, cause, report) for cause in best.causes]
+    best, *others = sorted([best, *others, *filter(None, apart)], key=lambda e: e.score)
     return best, rivals_of(best, others)
 
 

@@ -14,7 +14,7 @@ from fish_env.inference.effort import FULL, Effort
 from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.explanation import FEW_RUNS, Explanation, fitted_again, reached
-from fish_env.inference.hypotheses import PREFIX, of_effects
+from fish_env.inference.hypotheses import PREFIX, of_effects, parameter_path
 from fish_env.inference.parallel import side_by_side
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
@@ -195,6 +195,37 @@ def _swapped(fitter: CoarseFitter, own: Fit, name: str, signal: Signal) -> Coars
         turns = fitter.promising(effects, own.released, begin, MOST_TURNS)
         coarse += [reached(partial(fitter.coarse_fit, effects, own.released, [b])) for b in turns]
     return min((s for s in coarse if s), key=lambda s: s.objective, default=None)
+
+
+def in_parts(current: Explanation, cause: str, report: Report) -> Explanation | None:
+    """The explanation with effects that together do nearly what one of its causes does.
+
+    In the place of two effects, one that is neither may fit best alone.
+
+    Args:
+        current: causes with their fit.
+        cause: the one to take apart.
+        report: told what is being done.
+
+    Returns:
+        None where nothing does the same together, or the simulation diverges.
+    """
+    own = current.fit
+    known = own.problem.known
+    if cause not in own.effects:
+        return None
+    at = {p.name: own.point.effects[parameter_path(cause, p.name)] for p in known[cause].parameters}
+    parts = known[cause].in_parts(at)
+    if not parts or not {*parts} <= {*known}:
+        return None
+    report(f"fitting {' and '.join(parts)} instead of {cause}")
+    causes = tuple(dict.fromkeys(n for c in current.causes for n in (parts if c == cause else [c])))
+    effects = tuple(dict.fromkeys(n for e in own.effects for n in (parts if e == cause else [e])))
+    values = of_effects(own.point.effects, {*own.effects} - {cause})
+    values |= {parameter_path(e, p): v for e, of in parts.items() for p, v in of.items()}
+    start = (effects, Point(own.point.z, values), own.noise, own.released)
+    fitted = reached(partial(fit, own.problem, *start, refit_noise=False, iterations=4))
+    return None if fitted is None else Explanation(causes, fitted)
 
 
 def without(current: Explanation, dropped: Collection[str]) -> Explanation | None:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import bisect
 
 from fish_env.arrays import BoolArray, FloatArray
-from fish_env.inference.effects import EffectParameter
+from fish_env.inference.effects import EffectParameter, Parts
 from fish_env.inference.hypotheses import effects_of, parameter_path
 
 
@@ -60,6 +60,10 @@ class Effect(Protocol):
     @property
     def confusable_with(self) -> tuple[str, ...]:
         """Names of effects with a similar signature."""
+        ...
+
+    def in_parts(self, values: Mapping[str, float]) -> Parts:
+        """Other effects, with their parameters, that together do nearly the same; or none."""
         ...
 
     def is_followed(self, values: Mapping[str, float], step: float) -> bool:

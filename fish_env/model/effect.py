@@ -50,7 +50,7 @@ from typing import Any
 
 from fish_env.errors import EffectError
 from fish_env.inference.effects import EffectParameter as EffectParameter
-from fish_env.inference.effects import Switched
+from fish_env.inference.effects import Parts, Switched
 from fish_env.reading import shown
 
 STAGES = (
@@ -116,6 +116,8 @@ class Effect(Switched):
         diagnosed: whether a diagnosis looks for it; else it is only simulated, and fitted if asked.
         equals: baseline coefficients (paths) other values of which do exactly the same.
         confusable_with: names of effects with a similar signature.
+        parts: parameters -> other effects, with their parameters, that together do nearly the
+            same; empty where none do.
         file: source file, for effects that users bring.
     """
 
@@ -143,6 +145,7 @@ class Effect(Switched):
     diagnosed: bool = True
     equals: tuple[str, ...] = ()
     confusable_with: tuple[str, ...] = ()
+    parts: Callable[[Mapping[str, float]], Parts] | None = None
     file: Path | None = None
 
     def __post_init__(self) -> None:
@@ -192,6 +195,10 @@ class Effect(Switched):
     def acts_on_motion(self) -> bool:
         """Whether the kernel must contain it; if not, it acts on what is recorded alone."""
         return bool(self.hooks or self.command_delay)
+
+    def in_parts(self, values: Mapping[str, float]) -> Parts:
+        """Other effects, with their parameters, that together do nearly the same; or none."""
+        return self.parts(values) if self.parts is not None else {}
 
     def is_followed(self, values: Mapping[str, float], step: float) -> bool:
         """Whether RK4 steps (s) follow it: its shortest time constant is about a step or longer."""

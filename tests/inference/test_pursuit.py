@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from fish_env.inference.effects import DeclaredEffect
 from fish_env.inference.elimination import insignificant
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.explanation import Explanation
@@ -20,7 +21,7 @@ from fish_env.inference.tails import chi2_log_tail
 from fish_env.inference.vehicle import Drive
 from tests.inference.boat import sail, split
 from tests.inference.boat_problem import BoatProblem
-from tests.inference.stated import Stated, effect, size_of
+from tests.inference.stated import SIZE, Stated, effect, size_of
 from tests.inference.test_boat import BIAS, EAST, FITTED, NORTH, WALK
 
 HIDDEN = {BIAS: 0.03, NORTH: 0.05, EAST: -0.1}
@@ -140,6 +141,31 @@ def test_what_was_measured_of_a_drive_is_doubted_first():
     best, rivals = challenged(measured, shown, (), said.append)
     assert "trying clock instead of slow" in said
     assert best is measured
+    assert not rivals
+
+
+class Both(DeclaredEffect):
+    """An effect that does what two others do together."""
+
+    def in_parts(self, values):
+        return {"lag": {SIZE: values[SIZE]}, "delay": {SIZE: values[SIZE]}}
+
+
+def test_a_cause_that_does_what_two_do_is_taken_apart():
+    """Neither alone takes its place. Together they fit better."""
+
+    def residuals(z, effects):
+        lag, delay, both = (effects[size_of(name)] for name in ("lag", "delay", "both"))
+        return np.tile([lag + both - 12.0, delay + both - 8.0, float(z.sum())], (3, 1))
+
+    both = effect("both", 20.0)
+    problem = Stated(
+        residuals, [effect("lag", 20.0), effect("delay", 20.0), Both("both", both.parameters)]
+    )
+    current = Explanation(("both",), fit(problem, ("both",)))
+    shown = screen(current.fit, causes_of(problem), np.random.default_rng(0))
+    best, rivals = challenged(current, shown, (), lambda said: None)
+    assert set(best.causes) == {"lag", "delay"}
     assert not rivals
 
 

@@ -57,3 +57,21 @@ def test_the_longest_step_follows_the_faster_eigenvalue():
     stiff = Simulator(swimmer(), 0.01, {"tail_flexibility": {"natural_frequency": 30.0}})
     assert stiff.dt <= 1 / (2 * np.pi * 30.0)
     Simulator(swimmer(), 0.05, {"tail_flexibility": {"damping_ratio": 0.3}})
+
+
+@pytest.mark.parametrize(("natural", "zeta", "part"), [(7.9, 1.49, 0.02), (4.0, 1.0, 0.15)])
+def test_overdamped_it_is_a_lag_and_nearly_a_delay(natural, zeta, part):
+    """The tail then beats as with both, but for a part of what it is late."""
+    values = {"natural_frequency": natural, "damping_ratio": zeta}
+    parts = get_effect("tail_flexibility").in_parts(values)
+    assert set(parts) == {"servo_lag", "servo_delay"}
+    bent, apart, stiff = (
+        tail(effects, run(effects, seconds=3.0, dt=0.002))[0][50:]
+        for effects in ({"tail_flexibility": values}, parts, {})
+    )
+    assert np.abs(bent - apart).max() < part * np.abs(bent - stiff).max()
+
+
+def test_what_rings_is_no_lag():
+    assert not get_effect("tail_flexibility").in_parts(EFFECTS["tail_flexibility"])
+    assert not get_effect("tail_flexibility").in_parts(get_effect("tail_flexibility").neutral)

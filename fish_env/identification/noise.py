@@ -35,8 +35,6 @@ GAIN = 0.1
 """The noise model is found when a step gains no more log likelihood."""
 FELT = 0.1
 """Of the largest believable disturbance: how long a weaker one lasts no run tells."""
-LEAST_SENSOR_SHARE = 1e-3
-"""Of the largest noise of a channel, the least one."""
 
 
 def white_noise_sd(dataset: Dataset, channel: str) -> float:
@@ -283,7 +281,9 @@ def fit_noise(
         names, limits = [*names, "jitter_sd"], [*limits, within.jitter]
     sensors = largest_sensor_sd is not None
     if largest_sensor_sd is not None:
-        limits += [(LEAST_SENSOR_SHARE * largest, largest) for largest in largest_sensor_sd]
+        # A strong disturbance could follow one channel through every sample: noise of none.
+        share = POLICY.least_sensor_share
+        limits += [(share * largest, largest) for largest in largest_sensor_sd]
 
     def model(x: FloatArray) -> NoiseModel:
         # The exponential of a bound's logarithm may lie beyond the bound.

@@ -56,6 +56,7 @@ class DecisionPolicy:
         same_noise: relative change of the noise below which its alternation with the fit ends.
         run_variation_gain: gain in -2 log likelihood from which a spread over runs is used.
         jitter_gain: gain in -2 log likelihood from which jitter of the sample times is used.
+        least_sensor_share: least noise of a sensor, over what quiet stretches of its samples show.
         noisier_than_declared: median ratio of found to declared noise that replaces the declared.
         fewest_runs_for_spread: smallest number of runs for a spread over runs.
         fewest_runs_for_interval: smallest number of runs for an interval over runs.
@@ -106,6 +107,7 @@ class DecisionPolicy:
     jitter_gain: float = _number(
         10.0, 0.0, 30.0, "very strong evidence: Kass and Raftery (1995), JASA 90, section 3.2"
     )
+    least_sensor_share: float = _number(0.1, 1e-3, 1.0, "scripts/calibrate_sensor_share.py")
     noisier_than_declared: float = _number(1.1, 1.0, 2.0, "scripts/calibrate_declared_noise.py")
     fewest_runs_for_spread: int = _number(3, 2, 10, "two degrees of freedom")
     fewest_runs_for_interval: int = _number(3, 2, 10, "two degrees of freedom")

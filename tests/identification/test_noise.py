@@ -15,6 +15,7 @@ from fish_env.identification.noise import (
 from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.noise_scoring import Replayed
 from fish_env.identification.series import SeriesProblem
+from fish_env.inference.policy import POLICY
 from fish_env.params import load_fish
 from tests.identification.synthetic import PATHS, SENSOR_SD, Setup, simulate
 
@@ -75,6 +76,14 @@ def test_sensor_noise_only_goes_down_from_its_bound():
 
     assert of(0.01) == 0.001
     assert of(0.0008) == pytest.approx(0.0008, rel=0.01)
+
+
+def test_no_disturbance_makes_a_sensor_exact():
+    """One that follows a channel through every sample would have the noise vanish."""
+    start = NoiseModel(np.array([0.001]), 3e-3, 1e-4, 1.0)
+    replay = toy([1e-9], lambda noise: noise.sensor_sd)
+    found = fit_noise(replay, start, WIDE, start.sensor_sd).sensor_sd[0]
+    assert found == pytest.approx(POLICY.least_sensor_share * 0.001)
 
 
 def test_a_disturbance_does_not_grow_beyond_what_a_tank_makes():

@@ -172,17 +172,24 @@ def fit(
     noise = noise or problem.default_noise()
     filtered: Sequence[Evaluation] = ()
     marginal: Marginal | None = None
+    last = noise
     for round_ in range(rounds if refit_noise else 1):
-        problem = problem.settled(free.unpack(vector), noise)
         report(f"fitting parameters, round {round_ + 1}")
-        if spread_of(problem, noise).any():
-            problem, vector, value, filtered, marginal = descend_jointly(
-                problem, free, vector, noise, iterations, tolerance, give_up_above
-            )
-        else:
-            vector, value, filtered = gauss_newton(
-                problem, free, vector, noise, iterations, tolerance, give_up_above, near=filtered
-            )
+        limits = (noise, iterations, tolerance, give_up_above)
+        try:
+            begun = problem.settled(free.unpack(vector), noise)
+            if spread_of(begun, noise).any():
+                problem, vector, value, filtered, marginal = descend_jointly(
+                    begun, free, vector, *limits
+                )
+            else:
+                vector, value, filtered = gauss_newton(begun, free, vector, *limits, near=filtered)
+                problem = begun
+        except np.linalg.LinAlgError:
+            if round_ == 0:
+                raise
+            noise = last  # a filter that follows the data less is not stable beside this model
+            break
         if not refit_noise:
             break
         report(f"fitting the noise, round {round_ + 1}")

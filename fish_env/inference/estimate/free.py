@@ -26,6 +26,8 @@ DIFFERENCE = 0.3
 """Step for differences by what runs differ in, in usual spreads."""
 LARGEST_SLOPE = 1e9
 """In standard deviations of the noise per unit; what exceeds it has diverged."""
+LARGEST_RESIDUAL = 1e9
+"""In standard deviations of the noise; where their mean square is larger, they have diverged."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -320,9 +322,14 @@ def _objective(free: Free, vector: FloatArray, residuals: FloatArray, possible: 
 
 
 def own_objectives(problem: Problem, filtered: Sequence[Evaluation], noise: Any) -> FloatArray:
-    """(R,) -2 log likelihood of each run together with its own numbers, but for a constant."""
+    """(R,) -2 log likelihood of each run together with its own numbers, but for a constant.
+
+    Infinite where the simulation diverges.
+    """
     spreads = spread_of(problem, noise)
     active = np.flatnonzero(spreads)
     own = problem.variation[:, active] / spreads[active]
     of_runs = np.array([-2.0 * f.log_likelihood for f in filtered])
+    sizes = np.array([len(f.residuals) for f in filtered])
+    of_runs[~(of_runs < LARGEST_RESIDUAL**2 * sizes)] = np.inf
     return np.asarray(of_runs + np.sum(own**2, axis=1))

@@ -124,7 +124,6 @@ def _evaluated(problem: Problem, free: Free, vector: FloatArray, noise: Any) -> 
         return Joint(problem, vector, (), np.inf, np.full(problem.run_count, np.inf))
     filtered = problem.filtered(free.unpack(vector), noise)
     of_runs = own_objectives(problem, filtered, noise)
-    of_runs = np.where(np.isfinite(of_runs), of_runs, np.inf)
     value = _with_prior(free, vector, of_runs)
     return Joint(problem, vector, filtered, value, of_runs)
 

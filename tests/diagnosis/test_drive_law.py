@@ -68,6 +68,20 @@ def test_a_law_is_found_with_its_size(law):
     assert found.common == pytest.approx(0.98, abs=0.01)
 
 
+def test_runs_of_one_window_each_have_a_common_beat():
+    """Nothing then tells how the beats of the runs scatter from how windows do."""
+    times, rng = np.arange(0.0, 5.0, 1.0 / 60.0), np.random.default_rng(5)
+    runs = []
+    for i, frequency in enumerate(np.linspace(0.5, 2.25, 9)):
+        told = CommandSteps(np.zeros(1), np.array([[0.0, 0.4, frequency, 0.0, 0.0]]))
+        swing = 0.1 * np.sin(2.0 * np.pi * 0.97 * frequency * times)
+        yaw = swing + 0.002 * rng.standard_normal(len(times))
+        runs.append(Run.from_steps(f"r{i}", times, {"yaw": yaw}, told, start="unknown"))
+    law = drive_law(Dataset("short", "zheng-2021-a", tuple(runs)))
+    assert law.common == pytest.approx(0.97, abs=0.01)
+    assert not law.sizes
+
+
 def test_tails_that_obey_have_no_law():
     found = [drive_law(swaying(seed, own=0.002)) for seed in range(20)]
     assert sum(bool(law.sizes) for law in found) <= 2  # each term is tested at 5 per cent

@@ -172,7 +172,8 @@ def _own_offsets(
 ) -> tuple[FloatArray, FloatArray]:
     """Best predictions (R,) of the runs' own offsets, and the share (R,) of means to take off.
 
-    Their variance is that of DerSimonian and Laird (1986), Controlled Clinical Trials 7, 177.
+    Their variance is that of DerSimonian and Laird (1986), Controlled Clinical Trials 7, 177. With
+    one window in each run nothing tells it from the noise of a window, and all are zero.
 
     Args:
         left: (N,) residuals.
@@ -181,7 +182,9 @@ def _own_offsets(
     """
     whole = np.maximum(np.bincount(own, weight), 1e-300)
     mean = np.bincount(own, weight * left) / whole
-    freedom = max(int(np.count_nonzero(weight)) - len(whole), 1)
+    freedom = int(np.count_nonzero(weight)) - len(whole)
+    if freedom < 1:
+        return np.zeros(len(whole)), np.zeros(len(whole))
     noise = max(float(weight @ (left - mean[own]) ** 2) / freedom, 1e-300)
     total = whole.sum()
     apart = float(whole @ mean**2) / noise - (len(whole) - 1)

@@ -41,6 +41,7 @@ EFFECT = Effect(
     confusable_with=(
         "clock_scale",
         "clock_skew",
+        "imu_lowpass",
         "servo_delay",
         "servo_lag",
         "wake_memory",

@@ -175,6 +175,7 @@ def test_the_catalogue_is_that_of_the_specification():
         "camera_tilt": {"roll": 0, "pitch": 0},
         "refraction": {"height": np.inf},
         "soft_iron": {"amplitude": 0, "angle": None},
+        "imu_lowpass": {"cutoff": np.inf},
         "sensor_delay": {"delay": 0, "camera_later": 0, "depth_later": 0},
         "gyro_bias": dict.fromkeys("pqr", 0),
         "attitude_misalignment": dict.fromkeys(("roll", "pitch", "yaw"), 0),

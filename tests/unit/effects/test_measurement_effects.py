@@ -2,12 +2,14 @@
 
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfilt
 from scipy.spatial.transform import Rotation
 
 from fish_env.comparison.runs import simulate_run
 from fish_env.data import CommandSteps, Run
 from fish_env.effects.extended import build_model
 from fish_env.sensing import measured_channels, true_times
+from fish_env.sensing.measurement import ages_s
 from fish_env.simulator import InitialState, Simulator
 from tests.physics.cases import swimmer
 
@@ -200,3 +202,25 @@ def test_a_late_camera_shows_where_the_fish_was():
         assert np.abs(shown[name] - now[name]).max() > 1e-5
     for name in ("yaw", "r"):
         np.testing.assert_allclose(shown[name], now[name], atol=1e-6)
+
+
+@pytest.mark.parametrize("frequency", [0.8, 1.5])
+def test_a_filtered_inertial_unit_is_late_by_what_a_butterworth_filter_is(frequency):
+    """A beat that scipy's filter has passed, and the same beat earlier by the effect's delay."""
+    cutoff, step = 5.0, 0.001
+    model = build_model(swimmer(), {"imu_lowpass": {"cutoff": cutoff}})
+    ages = ages_s(model, ("x", "z", "yaw", "r"))
+    assert ages["x"] == ages["z"] == 0.0
+    assert ages["yaw"] == ages["r"]
+    times = np.arange(0.0, 10.0, step)
+    sections = butter(2, cutoff, fs=1.0 / step, output="sos")
+    filtered = sosfilt(sections, np.sin(2.0 * np.pi * frequency * times))[times > 5.0]
+    late = np.sin(2.0 * np.pi * frequency * (times - ages["yaw"]))[times > 5.0]
+    assert np.abs(filtered - late).max() < 0.02
+    now = np.sin(2.0 * np.pi * frequency * times)[times > 5.0]
+    assert np.abs(filtered - now).max() > 0.2
+
+
+def test_an_unfiltered_inertial_unit_is_on_time():
+    model = build_model(swimmer(), {"imu_lowpass": {}})
+    assert set(ages_s(model, ("x", "yaw", "r")).values()) == {0.0}

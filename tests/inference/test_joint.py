@@ -177,3 +177,23 @@ def test_what_diverges_at_the_start_is_refused():
     problem.data = np.full_like(problem.data, np.nan)
     with pytest.raises(np.linalg.LinAlgError, match="start of the fit"):
         descended(problem)
+
+
+class Unstable(Differing):
+    """A filter that diverges under less noise than it begins with."""
+
+    def fitted_noise(self, point, noise, final, filtered, leverage):
+        return Spreading(sd=0.5)
+
+    def filtered(self, point, noise, near=()):
+        found = super().filtered(point, noise, near)
+        if noise.sd >= 1.0:
+            return found
+        return [Evaluated(-1e238, 1e119 * run.residuals) for run in found]
+
+
+def test_a_fit_keeps_the_noise_under_which_its_filter_is_stable():
+    """The next one is finite, and of no use: no step can be taken there."""
+    found = fit(Unstable(), noise=Spreading(), rounds=3)
+    assert found.noise == Spreading()
+    assert found.objective == pytest.approx(fit(Differing(), noise=Spreading()).objective, rel=1e-3)

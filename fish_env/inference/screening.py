@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from scipy.special import chdtrc
 
 from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.fit import Fit
@@ -18,7 +17,7 @@ from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause, Probe, best_of_each, effect_values, finer, of_visible
 from fish_env.inference.problem import Problem
 from fish_env.inference.projection import Projector, Signal
-from fish_env.inference.tails import noncentrality
+from fish_env.inference.tails import chi2_log_tail, noncentrality
 
 LANES_AT_ONCE = 96
 SETTINGS_AT_ONCE = LANES_AT_ONCE - 1
@@ -215,7 +214,7 @@ def null_threshold(
             largest[s.freedom] = np.maximum(largest.get(s.freedom, 0.0), statistic)
             at += s.freedom
     for settings, statistic in largest.items():
-        smallest = np.minimum(smallest, np.log(chdtrc(settings, statistic / size)))
+        smallest = np.minimum(smallest, chi2_log_tail(statistic / size, settings))
     coefficients = sum(s.probe < 0 for s in signals)
     if coefficients:
         uniform = rng.random(POLICY.null_draws)

@@ -34,6 +34,9 @@ Errors = dict[str, float]
 """Quantity -> mean absolute error of a run, SI."""
 STEPS = 4
 """Most Gauss-Newton steps of a fit that begins at one close by."""
+CLOSE = 0.03
+"""Its tolerance, in standard errors: one run of R less moves estimates by about 1 / sqrt(R) of one.
+With the usual tolerance the fit could end where it has begun, having seen what is left out."""
 
 
 class Objective(Protocol):
@@ -227,7 +230,10 @@ def refit(objective: Objective, near: Fit, problem: Problem) -> Fit:
         problem: the other runs, with the same effects.
     """
     noise = problem.noise_of(near)
-    return fit(problem, near.effects, near.point, noise, refit_noise=False, iterations=STEPS)
+    return fit(
+        problem, near.effects, near.point, noise, refit_noise=False, iterations=STEPS,
+        tolerance=CLOSE,
+    )  # fmt: skip
 
 
 def _runs(dataset: Dataset | SteadyDataset, objective: str) -> Dataset:

@@ -185,3 +185,16 @@ def test_a_refit_keeps_the_weights(odd):
     part = refit(WHOLE, whole, whole.problem.some([0, 1]))
     assert part.noise == whole.noise
     assert part.effects == whole.effects
+
+
+def test_a_refit_forgets_what_is_left_out_however_little_it_says():
+    """Runs of one fish: one less moves the estimates by a part of their error."""
+    problem = WholeRunProblem(swum([{}] * 4, FEW, seconds=6.0), paths=PATHS)
+    whole = fit(problem.settled(problem.start, problem.default_noise()), rounds=2)
+    kept = whole.problem.some([0, 1, 2])
+    part = refit(WHOLE, whole, kept)
+    own = {"refit_noise": False, "iterations": 10, "tolerance": 1e-3}
+    without = fit(kept, whole.effects, whole.point, whole.noise, **own)
+    sd = np.sqrt(np.diag(without.covariance))
+    assert np.abs((without.estimates - whole.estimates) / sd).max() > 0.05
+    np.testing.assert_allclose(part.estimates / sd, without.estimates / sd, atol=0.03)

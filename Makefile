@@ -10,7 +10,7 @@ CLEANRL := .venv-cleanrl
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test lint docs bench benchmark-diagnosis benchmark-realistic benchmark-power benchmark-time benchmark-agents benchmark-loop clients measure-export fuzz check-release walks clone-to-verdict clean
+.PHONY: help setup demo test test-long lint docs bench benchmark-diagnosis benchmark-realistic benchmark-power benchmark-time benchmark-agents benchmark-loop clients measure-export fuzz check-release walks clone-to-verdict clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 28
@@ -23,6 +23,9 @@ demo: $(VENV)/.with-base  ## diagnose a small data set, compare a real fish, swi
 test: setup lint  ## check style, types and layering, then run the tests
 	$(BIN)/python -m scripts.warm_kernels --processes $(JOBS)
 	$(BIN)/python -m pytest -n $(JOBS) --dist loadfile
+
+test-long: setup  ## the tests that take minutes each, which make test leaves out
+	$(BIN)/python -m pytest -n $(JOBS) -m long
 
 lint: setup  ## style, types and import direction
 	$(BIN)/ruff check .

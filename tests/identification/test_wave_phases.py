@@ -73,6 +73,7 @@ def test_without_a_wave_or_differences_nothing_is_settled(problem):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_the_wave_is_found_as_it_is(problem):
     """With one phase for all runs it fades; with own phases size, period and heading come out."""
     start = begin(problem, amplitude=0.01, frequency=0.505, heading=0.8)

@@ -44,5 +44,6 @@ EFFECT = Effect(
         "battery_sag",
         "frequency_scale",
         "servo_torque_limit",
+        "side_load",
     ),
 )

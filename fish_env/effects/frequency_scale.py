@@ -33,6 +33,7 @@ EFFECT = Effect(
         "beat_load",
         "clock_scale",
         "clock_skew",
+        "side_load",
         "tail_gain",
     ),
 )

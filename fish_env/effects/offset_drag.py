@@ -30,6 +30,7 @@ EFFECT = Effect(
         "cross_flow_drag",
         "linear_drag",
         "offset_gain",
+        "side_load",
         "surface_drag",
         "swing_loss",
     ),

@@ -41,6 +41,7 @@ EFFECT = Effect(
         "angle_limit",
         "offset_drag",
         "offset_gain",
+        "side_load",
         "tail_gain",
     ),
 )

@@ -42,6 +42,7 @@ EFFECT = Effect(
         "servo_lag",
         "servo_rate_limit",
         "servo_torque_limit",
+        "side_load",
         "swing_loss",
         "tail_flexibility",
         "tail_reactive",

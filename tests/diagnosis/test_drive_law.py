@@ -14,20 +14,20 @@ RATE, LENGTH, HELD, RUNS = 25.0, 30.0, 2.5, 6
 FREQUENCY = 2
 
 
-def swaying(seed, common=1.0, rate=0.0, offset=0.0, load=0.0, own=0.0):
+def swaying(seed, common=1.0, own=0.0, **law):
     """Runs whose hulls sway with tails that beat by a law; `own` is what runs differ by."""
     rng = np.random.default_rng(seed)
     return Dataset(
         "swaying",
         "zheng-2021-a",
         tuple(
-            _run(f"r{i}", rng, common * (1.0 + own * rng.standard_normal()), rate, offset, load)
+            _run(f"r{i}", rng, common * (1.0 + own * rng.standard_normal()), **law)
             for i in range(RUNS)
         ),
     )
 
 
-def _run(name, rng, common, rate, offset, load):
+def _run(name, rng, common, rate=0.0, offset=0.0, load=0.0, beat=0.0):
     starts = np.arange(0.0, LENGTH, HELD)
     count = len(starts)
     values = np.column_stack(
@@ -42,6 +42,7 @@ def _run(name, rng, common, rate, offset, load):
     told = values[np.searchsorted(starts, fine, side="right") - 1]
     speed = 2.0 * np.pi * told[:, 1] * told[:, 2]
     law = (1.0 - rate * fine) * (1.0 - offset * np.abs(told[:, 0])) * (1.0 - load * speed)
+    law *= 1.0 - beat * np.tanh(np.abs(told[:, 0]) / 0.1)
     phase = 2.0 * np.pi * np.cumsum(common * law * told[:, 2]) * 1e-3
     times = np.arange(0.0, LENGTH, 1.0 / RATE)
     at = np.rint(times / 1e-3).astype(int)
@@ -55,6 +56,8 @@ LAWS = (
     {"offset": 0.25},
     {"offset": 0.15, "load": 0.015},
     {"rate": 0.002, "offset": 0.2},
+    {"beat": 0.05},
+    {"beat": 0.05, "load": 0.015},
 )
 
 

@@ -106,6 +106,7 @@ REAL: dict[str, dict[str, float]] = {
     "swing_loss": {"per_radian": 0.0},
     "angle_limit": {"lower": -INF, "upper": INF},
     "beat_load": {"offset": 0.0, "load": 0.0},
+    "side_load": {"swing": 0.0, "beat": 0.0},
     "tail_stall": {"loss": 0.0, "onset": 0.5, "width": 0.06},
     "servo_torque_limit": {"torque": INF},
     "body_flexibility": {"stiffness": INF},

@@ -37,7 +37,8 @@ def slowed(row, e, table):
     """Share of the commanded frequency that is left under offset and stroke speed."""
     stroke = TWO_PI * table[row, AMPLITUDE] * table[row, FREQUENCY]
     by_offset = 1.0 - e.beat_load_offset * abs(table[row, OFFSET])
-    return by_offset * (1.0 - e.beat_load_load * stroke)
+    aside = 1.0 - e.side_load_beat * math.tanh(10.0 * abs(table[row, OFFSET]))
+    return by_offset * aside * (1.0 - e.beat_load_load * stroke)
 
 
 @helper
@@ -64,6 +65,7 @@ def sent(t, late, e, table, drive):
     reach = table[row, AMPLITUDE] * e.tail_gain_gain * (1.0 + drive[SIDE] * e.tail_asymmetry_ratio)
     offset = table[row, OFFSET] * e.offset_gain_gain
     reach *= 1.0 - e.swing_loss_per_radian * abs(offset)
+    reach *= 1.0 - e.side_load_swing * math.tanh(10.0 * abs(table[row, OFFSET]))
     angle = offset + e.tail_bias_offset + reach * swing
     stopped = min(max(angle, e.angle_limit_lower), e.angle_limit_upper)
     if late < 0 or stopped != angle:

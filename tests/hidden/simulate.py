@@ -162,7 +162,8 @@ class Swim:
         """Share of the commanded frequency that is left in rows of the commands."""
         stroke = 2.0 * np.pi * rows[:, AMPLITUDE] * rows[:, FREQUENCY]
         by_offset = 1.0 - float(self.extra["beat_load_offset"]) * np.abs(rows[:, OFFSET])
-        return by_offset * (1.0 - float(self.extra["beat_load_load"]) * stroke)
+        aside = 1.0 - float(self.extra["side_load_beat"]) * np.tanh(10.0 * np.abs(rows[:, OFFSET]))
+        return by_offset * aside * (1.0 - float(self.extra["beat_load_load"]) * stroke)
 
 
 def simulate(

@@ -56,6 +56,7 @@ FURTHER = {
     "swing_loss": {"per_radian": 0.5},
     "angle_limit": {"lower": -0.35, "upper": 0.3},
     "beat_load": {"offset": 0.25, "load": 0.012},
+    "side_load": {"swing": 0.2, "beat": 0.05},
     "tail_stall": {"loss": 0.6, "onset": 1.0, "width": 0.06},
     "clock_skew": {"scale": 1.02},
     "servo_torque_limit": {"torque": 0.02},

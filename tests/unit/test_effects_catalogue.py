@@ -129,6 +129,7 @@ def test_the_catalogue_is_that_of_the_specification():
         "swing_loss": {"per_radian": 0},
         "angle_limit": {"lower": -np.inf, "upper": np.inf},
         "beat_load": {"offset": 0, "load": 0},
+        "side_load": {"swing": 0, "beat": 0},
         "servo_lag": {"time_constant": 0},
         "servo_rate_limit": {"rate": np.inf},
         "servo_torque_limit": {"torque": np.inf, "speed": None},

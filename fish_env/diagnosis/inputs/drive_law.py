@@ -16,18 +16,19 @@ from scipy.special import stdtr
 from fish_env.arrays import BoolArray, FloatArray, IntArray
 from fish_env.data.schema import CommandSteps, Dataset, Run
 from fish_env.diagnosis.inputs.clocks import strokes_of
-from fish_env.diagnosis.inputs.orders import FREQUENCY, OFFSET, stroke_speed, windows_of
+from fish_env.diagnosis.inputs.orders import FREQUENCY, drive_terms, windows_of
 from fish_env.diagnosis.inputs.ratios import peaks_of, ratio_near
 from fish_env.identification.tail_drive import SCALE
 
-TERMS = ("battery_sag.rate", "beat_load.offset", "beat_load.load")
+TERMS = ("battery_sag.rate", "beat_load.offset", "beat_load.load", "side_load.beat")
 """Effect parameters by which the beat falls, in the order of the windows' terms."""
 SAID = {
     "battery_sag.rate": "more with each second of a run (`battery_sag`)",
     "beat_load.offset": "for each radian of its offset (`beat_load`)",
     "beat_load.load": "for each rad/s of its stroke (`beat_load`)",
+    "side_load.beat": "with any offset (`side_load`)",
 }
-SMALLEST = (2e-4, 0.05, 2e-3)
+SMALLEST = (2e-4, 0.05, 2e-3, 0.02)
 """The least that the catalogue takes for plausible. Without any such effect the regression finds
 less than a third of it."""
 LEVEL = 0.05
@@ -80,10 +81,9 @@ class DriveLaw:
 
     def _following(self, run: Run) -> Run:
         values = run.commands.values.copy()
-        speed = stroke_speed(values)
-        aside = 1.0 - self.sizes.get("beat_load.offset", 0.0) * np.abs(values[:, OFFSET])
-        loaded = 1.0 - self.sizes.get("beat_load.load", 0.0) * speed
-        left = np.maximum(aside, 0.0) * np.maximum(loaded, 0.0)
+        terms = drive_terms(np.zeros(len(values)), values)
+        sizes = np.array([self.sizes.get(name, 0.0) for name in TERMS])
+        left = np.prod(np.maximum(1.0 - sizes * terms, 0.0), axis=1)
         values[:, FREQUENCY] *= left * (self.common or 1.0)
         return replace(run, commands=CommandSteps(run.commands.times_s, values))
 

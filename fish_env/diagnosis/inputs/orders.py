@@ -17,6 +17,7 @@ import numpy as np
 from fish_env.arrays import FloatArray, IntArray
 from fish_env.data.schema import CommandSteps
 from fish_env.data.vocabulary import COMMANDS
+from fish_env.effects.side_load import ONSET
 from fish_env.rigidbody.gridded import GridRun
 
 SWAYING = ("r", "yaw", "v", "y")
@@ -46,6 +47,20 @@ def stroke_speed(commands: FloatArray) -> FloatArray:
     return speed
 
 
+def drive_terms(since_s: FloatArray, commands: FloatArray) -> FloatArray:
+    """What may slow a drive, (n, 4), a column each.
+
+    Time since the start of the run (s), offset without its sign (rad), speed of the stroke (rad/s),
+    and the share of its full size that friction has under a load on one side.
+
+    Args:
+        since_s: (n,) time since the start of the run.
+        commands: (n, 5) in the order of :data:`COMMANDS`.
+    """
+    aside = np.abs(commands[:, OFFSET])
+    return np.column_stack([since_s, aside, stroke_speed(commands), np.tanh(aside / ONSET)])
+
+
 @dataclass(frozen=True, eq=False)
 class Stroke:
     """The commanded stroke of a run on its grid, and what it makes the hull do.
@@ -55,8 +70,7 @@ class Stroke:
         amplitude: (n,) commanded amplitude, rad.
         sway: (n,) channel in which the beat shows, NaN in gaps.
         step_s: s.
-        terms: (n, 3) what may slow a drive: time since the start of the run (s), offset without
-            its sign (rad), and speed of the stroke, 2 pi times amplitude times frequency (rad/s).
+        terms: (n, 4) what may slow a drive, see :func:`drive_terms`.
     """
 
     phase: FloatArray
@@ -78,8 +92,7 @@ def stroke_of(run: GridRun, steps: CommandSteps) -> Stroke | None:
     row = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, len(frequency) - 1)
     cycles = turned[row] + np.maximum(times - steps.times_s[row], 0.0) * frequency[row]
     amplitude = steps.values[row, AMPLITUDE]
-    speed = stroke_speed(steps.values[row])
-    terms = np.column_stack([run.since_s, np.abs(steps.values[row, OFFSET]), speed])
+    terms = drive_terms(run.since_s, steps.values[row])
     return Stroke(2.0 * np.pi * cycles, amplitude, run.channels[channel], run.step_s, terms)
 
 
@@ -93,7 +106,7 @@ class Window:
         slow: (n, k) orthonormal basis of what is slow.
         sway: (n,) what is left of the channel.
         rate: commanded frequency at its quickest, cycles a sample.
-        terms: (3,) mean of the stroke's.
+        terms: (4,) mean of the stroke's.
     """
 
     phase: FloatArray

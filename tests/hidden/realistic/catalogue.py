@@ -129,6 +129,7 @@ ALONE: dict[str, Size] = {
     "surface_piercing": Size({"height": 0.05}),
     "bubbles": Size({"mass": 0.004}, shape={"x": (-0.06, 0.06)}),
     "water_density": Size({"scale": 1.002}, signed=True),
+    "side_load": Size({"swing": 0.16, "beat": 0.05}),
 }
 """Sizes of a suspect that acts alone."""
 PLANT_SIZES: dict[str, Size] = {

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from fish_env.effects import get_effect
+from fish_env.model.records import Inputs
 from tests.unit.effects.support import assert_same_motion, run, tail
 
 TURN = {"t": 0.0, "tail_offset": 0.3, "tail_amplitude": 0.3, "tail_frequency": 2.0}
@@ -40,6 +42,43 @@ def test_a_loaded_beat_is_another_frequency():
     loaded = run({"beat_load": {"offset": 0.25, "load": 0.02}}, told(), 2.0)
     left = (1 - 0.25 * 0.3) * (1 - 0.02 * 2 * np.pi * 0.3 * 2.0)
     assert_same_motion(loaded, run(None, told(tail_frequency=2.0 * left), 2.0), atol=1e-9)
+
+
+SIDE = {"side_load": {"swing": 0.2, "beat": 0.05}}
+
+
+@pytest.mark.parametrize("offset", [0.6, -0.3, 0.05])
+def test_a_side_load_is_another_stroke(offset):
+    """Alike on both sides, and the same at any offset well beyond 0.1 rad."""
+    share = np.tanh(abs(offset) / 0.1)
+    assert share > 0.99 or abs(offset) < 0.1
+    stroke = {"tail_amplitude": 0.3 * (1 - 0.2 * share), "tail_frequency": 2 * (1 - 0.05 * share)}
+    loaded = run(SIDE, told(tail_offset=offset), 2.0)
+    assert_same_motion(loaded, run(None, told(tail_offset=offset, **stroke), 2.0), atol=1e-9)
+
+
+def test_a_stroke_about_the_centre_has_no_side_load():
+    straight = told(tail_offset=0.0)
+    assert_same_motion(run(SIDE, straight, 2.0), run(None, straight, 2.0), atol=0.0)
+
+
+def test_a_side_load_that_sets_in_has_the_rates_of_its_stroke():
+    """Rates of amplitude and frequency are the slopes of both while the offset slews."""
+    effect = get_effect("side_load")
+    values = effect.record_type(**SIDE["side_load"])
+    rest = Inputs(*np.zeros(10))
+
+    def loaded(time):
+        slewed = rest._replace(
+            tail_offset=0.1 - 0.5 * time, tail_offset_rate=-0.5, tail_amplitude=0.3 + time,
+            tail_amplitude_rate=1.0, tail_frequency=2.0 - time, tail_frequency_rate=-1.0,
+        )  # fmt: skip
+        return effect.hooks["inputs"](slewed, time, None, values)
+
+    before, now, after = loaded(-1e-5), loaded(0.0), loaded(1e-5)
+    for name in ("tail_amplitude", "tail_frequency"):
+        slope = (getattr(after, name) - getattr(before, name)) / 2e-5
+        assert getattr(now, f"{name}_rate") == pytest.approx(slope, abs=1e-8)
 
 
 STOPS = {"angle_limit": {"lower": -0.2, "upper": 0.25}}

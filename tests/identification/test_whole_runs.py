@@ -192,7 +192,8 @@ def test_the_identified_fish_is_shipped_with_its_intervals():
     assert "tail.lift.c1" in fish.posterior.names
     assert fish.info("tail.lift.c1").status == "identified"
     assert np.linalg.eigvalsh(np.array(fish.posterior.covariance)).min() > -1e-9
-    assert 0.9 < fish.effects["frequency_scale"]["scale"] < 0.97
+    assert 0.967 < fish.effects["frequency_scale"]["scale"] < 0.982  # measured straight ahead
+    assert 0.02 < fish.effects["side_load"]["beat"] < 0.08
 
 
 @pytest.mark.measured
@@ -203,6 +204,6 @@ def test_the_identified_fish_predicts_the_measured_runs():
     found = fit_whole_runs(problem, start, steps=0, refit_noise=False)
     errors = [p.errors for p in prediction_errors(problem, found)]
     mean = {name: np.mean([e[name] for e in errors]) for name in errors[0]}
-    assert mean["surge"] < 3.3e-3
+    assert mean["surge"] < 2.7e-3
     assert mean["yaw_rate"] < 11e-3
-    assert mean["path"] < 0.017
+    assert mean["path"] < 0.014

@@ -31,6 +31,7 @@ def beside(folder, effects):
     return found, nothing, truth, steps
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_a_wake_is_found_beside_a_slow_beat(tmp_path):
     hidden = {"wake_memory": 1.0, "frequency_scale": 1.0}

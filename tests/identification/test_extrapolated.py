@@ -40,6 +40,7 @@ def test_what_steps_get_wrong_goes_with_their_length(fitted):
     assert wrong[0] / wrong[1] == pytest.approx(expected, rel=0.25)
 
 
+@pytest.mark.slow
 @pytest.mark.long
 def test_one_step_leads_to_where_fits_in_ever_finer_steps_end(fitted):
     held = {"refit_noise": False, "iterations": 2}

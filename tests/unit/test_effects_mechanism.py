@@ -209,6 +209,8 @@ def test_the_whole_catalogue_still_runs_in_vector_registers():
     """
     whole = build_model(swimmer(), whole_catalogue=True)
     assert share_in_vector_registers(whole) > 0.75
+    without_load = tuple(effect for effect in whole.declared if not effect.loaded)
+    assert share_in_vector_registers(replace(whole, declared=without_load)) > 0.8
     without_memory = tuple(effect for effect in whole.declared if not effect.memory)
     assert share_in_vector_registers(replace(whole, declared=without_memory)) > 0.95
 

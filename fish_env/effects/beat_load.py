@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fish_env.model.effect import Effect, EffectParameter
-from fish_env.model.inputs import with_tail_frequency
+from fish_env.model.inputs import offset_size, with_tail_frequency
 from fish_env.model.jit import kernel
 from fish_env.model.tail import TWO_PI
 
@@ -16,11 +16,11 @@ def slow_beat(inputs, time, fish, e):
         inputs.tail_amplitude_rate * inputs.tail_frequency
         + inputs.tail_amplitude * inputs.tail_frequency_rate
     )
-    side = 1.0 if inputs.tail_offset > 0.0 else -1.0
-    aside = max(1.0 - e.offset * abs(inputs.tail_offset), 0.0)
+    size, size_rate = offset_size(inputs)
+    aside = max(1.0 - e.offset * size, 0.0)
     loaded = max(1.0 - e.load * speed, 0.0)
     left = aside * loaded
-    loss = e.offset * (side * inputs.tail_offset_rate) * loaded + aside * (e.load * speed_rate)
+    loss = e.offset * size_rate * loaded + aside * (e.load * speed_rate)
     return with_tail_frequency(
         inputs,
         left * inputs.tail_frequency,

@@ -7,7 +7,7 @@ possible reason: Coulomb's law has a size and a sign, and no slope.
 from __future__ import annotations
 
 from fish_env.model.effect import Effect, EffectParameter
-from fish_env.model.inputs import with_tail_command
+from fish_env.model.inputs import offset_size, with_tail_command
 from fish_env.model.jit import kernel
 from fish_env.model.trigonometry import exponential
 
@@ -19,9 +19,9 @@ offsets between 0 and 0.35 rad, so nothing is known of it but that it is small."
 @kernel
 def slow_and_shorten(inputs, time, fish, e):
     """A1 -> A1 (1 - swing s) and f1 -> f1 (1 - beat s), s = tanh(|xi1_bar| / 0.1 rad)."""
-    side = 1.0 if inputs.tail_offset > 0.0 else -1.0
-    share = 1.0 - 2.0 / (1.0 + exponential(2.0 * side * inputs.tail_offset / ONSET))
-    rate = (1.0 - share * share) / ONSET * side * inputs.tail_offset_rate
+    size, size_rate = offset_size(inputs)
+    share = 1.0 - 2.0 / (1.0 + exponential(2.0 * size / ONSET))
+    rate = (1.0 - share * share) / ONSET * size_rate
     swing, beat = 1.0 - e.swing * share, 1.0 - e.beat * share
     return with_tail_command(
         inputs,

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from fish_env.model.effect import Effect, EffectParameter
-from fish_env.model.inputs import with_tail_command
+from fish_env.model.inputs import offset_size, with_tail_command
 from fish_env.model.jit import kernel
 
 
 @kernel
 def lose_swing(inputs, time, fish, e):
     """A1 -> A1 (1 - per_radian |xi1_bar|), never below zero."""
-    left = max(1.0 - e.per_radian * abs(inputs.tail_offset), 0.0)
-    side = 1.0 if inputs.tail_offset > 0.0 else -1.0
-    loss = e.per_radian * (side * inputs.tail_offset_rate) if left > 0.0 else 0.0
+    size, size_rate = offset_size(inputs)
+    left = max(1.0 - e.per_radian * size, 0.0)
+    loss = e.per_radian * size_rate if left > 0.0 else 0.0
     return with_tail_command(
         inputs,
         inputs.tail_offset,

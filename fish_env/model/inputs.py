@@ -7,6 +7,13 @@ from fish_env.model.records import Inputs
 
 
 @kernel
+def offset_size(inputs):
+    """|xi1_bar|, the tail offset without its sign (rad), and its rate (rad/s)."""
+    side = 1.0 if inputs.tail_offset > 0.0 else -1.0
+    return abs(inputs.tail_offset), side * inputs.tail_offset_rate
+
+
+@kernel
 def with_tail_command(
     inputs, offset, amplitude, frequency, offset_rate, amplitude_rate, frequency_rate
 ):  # fmt: skip

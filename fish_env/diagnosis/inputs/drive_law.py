@@ -18,7 +18,9 @@ from fish_env.data.schema import CommandSteps, Dataset, Run
 from fish_env.diagnosis.inputs.clocks import strokes_of
 from fish_env.diagnosis.inputs.orders import FREQUENCY, drive_terms, windows_of
 from fish_env.diagnosis.inputs.ratios import peaks_of, ratio_near
+from fish_env.effects import catalogue
 from fish_env.identification.tail_drive import SCALE
+from fish_env.inference.hypotheses import effect_of, parameter_of
 
 TERMS = ("battery_sag.rate", "beat_load.offset", "beat_load.load", "side_load.beat")
 """Effect parameters by which the beat falls, in the order of the windows' terms."""
@@ -28,7 +30,14 @@ SAID = {
     "beat_load.load": "for each rad/s of its stroke (`beat_load`)",
     "side_load.beat": "with any offset (`side_load`)",
 }
-SMALLEST = (2e-4, 0.05, 2e-3, 0.02)
+SMALLEST = tuple(
+    next(
+        p.plausible[0]
+        for p in catalogue()[effect_of(term)].parameters
+        if p.name == parameter_of(term)
+    )
+    for term in TERMS
+)
 """The least that the catalogue takes for plausible. Without any such effect the regression finds
 less than a third of it."""
 LEVEL = 0.05

@@ -41,6 +41,7 @@ def test_it_swims_nearly_as_well_as_its_teacher():
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_a_teacher_that_says_nothing_is_noticed(monkeypatch):
     act = PIDController.act
     monkeypatch.setattr(PIDController, "act", lambda self, seen: 0.0 * act(self, seen))

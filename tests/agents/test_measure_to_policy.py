@@ -61,6 +61,8 @@ def finished(tiny, tmp_path_factory) -> tuple[Path, dict]:
     return folder, run(tiny, folder)
 
 
+@pytest.mark.slow
+@pytest.mark.long
 def test_the_loop_ends_with_scores_of_all_and_tables(finished):
     folder, record = finished
     assert len(record["scores"]) == 2 * 2 * len(ARMS)
@@ -70,6 +72,8 @@ def test_the_loop_ends_with_scores_of_all_and_tables(finished):
     assert "drifting" in page.read_text()
 
 
+@pytest.mark.slow
+@pytest.mark.long
 def test_every_model_teaches_something_else(finished):
     """Scores of one fish and seed differ from model to model, or the loop compares nothing."""
     _, record = finished
@@ -77,6 +81,8 @@ def test_every_model_teaches_something_else(finished):
     assert len({json.dumps(score["means"]) for score in chosen}) >= len(ARMS) - 1
 
 
+@pytest.mark.slow
+@pytest.mark.long
 def test_a_second_run_trains_nothing(finished, tiny, monkeypatch):
     folder, record = finished
     monkeypatch.setattr(training, "train", None)
@@ -84,6 +90,8 @@ def test_a_second_run_trains_nothing(finished, tiny, monkeypatch):
     assert again["scores"] == record["scores"]
 
 
+@pytest.mark.slow
+@pytest.mark.long
 def test_a_stopped_run_goes_on_to_the_same_scores(finished, tiny, tmp_path, monkeypatch):
     class Killed(training.Quiet):
         def stepped(self, steps: int) -> None:
@@ -98,6 +106,8 @@ def test_a_stopped_run_goes_on_to_the_same_scores(finished, tiny, tmp_path, monk
     assert scores[0] == scores[1]
 
 
+@pytest.mark.slow
+@pytest.mark.long
 def test_another_extended_model_is_trained_anew(finished, tiny, tmp_path):
     """Nothing stale is read: a score is kept under what it depends on."""
     declared = load_declaration(tiny)
@@ -114,6 +124,8 @@ def test_another_extended_model_is_trained_anew(finished, tiny, tmp_path):
     assert again.means == first.means
 
 
+@pytest.mark.slow
+@pytest.mark.long
 def test_without_an_extended_model_the_printed_fish_is_all_there_is(tiny, tmp_path):
     record = run(tiny, tmp_path, BLIND)
     assert not any(entry["extended"] for entry in record["fish"])

@@ -134,6 +134,7 @@ EFFECT = Effect(
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_an_effect_of_ones_own_lies_beside_the_fish(tmp_path):
     """<name>.py beside the YAML is found, compiled in, and can be changed for an episode."""
     fish = tmp_path / "leaky.yaml"

@@ -85,6 +85,8 @@ def test_a_fit_leaves_the_bound_at_which_an_effect_is_absent(reactive):
     assert own.objective < from_truth.objective + 0.5
 
 
+@pytest.mark.slow
+@pytest.mark.long
 def test_the_interval_holds_the_truth_and_a_better_minimum_is_taken(reactive):
     own, scale = reactive
     known = profiled(own)
@@ -96,6 +98,8 @@ def test_the_interval_holds_the_truth_and_a_better_minimum_is_taken(reactive):
     assert profiled(begun).objective < begun.objective - 0.9
 
 
+@pytest.mark.slow
+@pytest.mark.long
 def test_a_refit_is_not_stuck_where_its_first_noise_led(tmp_path):
     """Under the first guess of the noise another minimum is nearer."""
     make_case("steady", 5002, tmp_path / "case")

@@ -229,6 +229,7 @@ def test_series_are_predictions_of_the_two_models(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_series_of_a_table_hold_its_repeats_together():
     from fish_env.data import load_dataset
     from fish_env.diagnosis.report.steady import steady_series_from

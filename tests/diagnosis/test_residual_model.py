@@ -39,6 +39,8 @@ def swirled(tmp_path_factory):
     return residual_model(own, left.threshold, final), left, own, final, truth
 
 
+@pytest.mark.slow
+@pytest.mark.long
 def test_a_foreign_moment_is_described_by_what_makes_it(swirled):
     """The generator knows amplitude times frequency as (2 pi beat)."""
     model, left, own, _, truth = swirled
@@ -52,6 +54,8 @@ def test_a_foreign_moment_is_described_by_what_makes_it(swirled):
     assert first is None or abs(first.terms[0].coefficient - right) > 3.0 * term.error
 
 
+@pytest.mark.slow
+@pytest.mark.long
 def test_it_predicts_runs_that_did_not_choose_it(swirled):
     model, *_ = swirled
     assert model.judged.gain_ci95[0] > 0.0
@@ -59,6 +63,8 @@ def test_it_predicts_runs_that_did_not_choose_it(swirled):
     assert beside.moment_sd < 0.5 * without.moment_sd
 
 
+@pytest.mark.slow
+@pytest.mark.long
 def test_a_model_that_does_not_hold_elsewhere_says_so(swirled):
     """The same judgement of runs in which the moment acts the other way round."""
     *_, own, final, _ = swirled
@@ -82,6 +88,8 @@ def test_where_nothing_is_missing_there_is_nothing_to_describe(tmp_path):
     assert residual_model(own, left.threshold, final) is None
 
 
+@pytest.mark.slow
+@pytest.mark.long
 def test_runs_kept_for_judging_refute_chance_and_nothing_else(swirled, tmp_path):
     """Chance gets its say by a threshold that it just passes."""
     own, final, _ = fits("null", 9, tmp_path / "data")

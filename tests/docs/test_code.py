@@ -23,6 +23,16 @@ EXTRAS = set(
 )
 
 
+COMPILING = {"your-own.md", "evaluation.md"}
+"""Pages whose code needs kernels that no other test does, a minute or so to compile."""
+
+
+def with_its_mark(page: Path):
+    """A page as a parameter of a test."""
+    marks = [pytest.mark.slow, pytest.mark.long] if page.name in COMPILING else []
+    return pytest.param(page, id=page.name, marks=marks)
+
+
 @pytest.fixture
 def folder(tmp_path, monkeypatch) -> Path:
     """An empty folder with the examples, to run in."""
@@ -31,7 +41,7 @@ def folder(tmp_path, monkeypatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+@pytest.mark.parametrize("page", [with_its_mark(page) for page in PAGES])
 def test_the_code_of_a_page_runs(page: Path, folder):
     run_page(page, folder)
     if page.name == "tutorial.md":

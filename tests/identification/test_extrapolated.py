@@ -28,6 +28,8 @@ def distances(own, estimates):
     return np.abs(own.estimates - estimates) / np.sqrt(np.diag(own.covariance))
 
 
+@pytest.mark.slow
+@pytest.mark.long
 def test_what_steps_get_wrong_goes_with_their_length(fitted):
     """As extrapolating needs: what is left of it is what does not."""
     usual, finer = fitted.problem, fitted.problem.refined()[0]
@@ -54,6 +56,8 @@ def test_one_step_leads_to_where_fits_in_ever_finer_steps_end(fitted):
     assert distances(fitted, end).max() > 2.0
 
 
+@pytest.mark.slow
+@pytest.mark.long
 def test_it_leads_towards_the_truth(case, fitted):
     def off(found):
         at = found.names.index(f"effects.{LIMIT}.rate")

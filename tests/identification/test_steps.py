@@ -117,6 +117,8 @@ def unlikeness(dataset, in_long_steps=SeriesProblem.with_long_steps):
     return problem, worst
 
 
+@pytest.mark.slow
+@pytest.mark.long
 def test_causes_look_the_same_in_long_steps(dataset):
     problem, worst = unlikeness(dataset)
     cornered = {name for name in worst if problem.known[name].step_error > 0.0}
@@ -128,6 +130,8 @@ def test_causes_look_the_same_in_long_steps(dataset):
     assert max(worst[name] for name in cornered) < 0.25
 
 
+@pytest.mark.slow
+@pytest.mark.long
 def test_still_longer_steps_would_not_do(dataset):
     def longer(problem):
         fastest = problem.model.longest_step()

@@ -196,8 +196,9 @@ def test_the_identified_fish_is_shipped_with_its_intervals():
     assert 0.02 < fish.effects["side_load"]["beat"] < 0.08
 
 
-@pytest.mark.measured
 @pytest.mark.slow
+@pytest.mark.long
+@pytest.mark.measured
 def test_the_identified_fish_predicts_the_measured_runs():
     problem = WholeRunProblem(load_dataset(measured_runs()), load_fish(IDENTIFIED))
     start = Point(np.zeros(len(problem.baseline)), problem.neutral(problem.effects))

@@ -22,6 +22,8 @@ def push(strength):
     return Effect("push", "hydrodynamics", "", "", "", (parameter,), hooks={"wrench": force})
 
 
+@pytest.mark.slow
+@pytest.mark.long
 def test_two_effects_of_one_name_do_not_share_machine_code():
     """The second would silently run the first one's kernel, in this process or a later one."""
     for strength in (1.0, 10.0):

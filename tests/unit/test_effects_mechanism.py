@@ -201,6 +201,8 @@ def share_in_vector_registers(model):
     return sum(kind != "double" for kind in found) / len(found)
 
 
+@pytest.mark.slow
+@pytest.mark.long
 def test_the_whole_catalogue_still_runs_in_vector_registers():
     """A hook that does not vectorise takes all others out of the vector registers with it.
 
@@ -224,6 +226,8 @@ def halve_until_small(motion, tail, inputs, centre, fish, e):
     return Wrench(e.on * speed, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
+@pytest.mark.slow
+@pytest.mark.long
 def test_a_hook_that_does_not_vectorise_is_seen():
     mine = Effect(
         "halved", "hydrodynamics", "s", "e", "s", (ON,), hooks={"wrench": halve_until_small}

@@ -24,7 +24,7 @@ test: setup lint  ## check style, types and layering, then run the tests
 	$(BIN)/python -m scripts.warm_kernels --processes $(JOBS)
 	$(BIN)/python -m pytest -n $(JOBS) --dist loadfile
 
-test-long: setup  ## the tests that take minutes each, which make test leaves out
+test-long: setup  ## the tests of ten seconds and more that make test leaves out
 	$(BIN)/python -m pytest -n $(JOBS) -m long
 
 lint: setup  ## style, types and import direction

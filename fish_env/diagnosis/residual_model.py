@@ -40,7 +40,9 @@ MOST = 8
 APART = 1e-3
 """Share of a wrench that those already chosen must leave."""
 ROUNDS, ROUNDS_BESIDE = 4, 1
-"""Most rounds of choosing and fitting: alone, and beside causes, where a round takes longest."""
+"""Most rounds of choosing and fitting: alone, and beside causes or where the runs differ.
+
+The latter rounds take longest."""
 RESTING = 0.3
 """Standard errors by which sizes may still move at the end."""
 
@@ -130,7 +132,7 @@ def residual_model(
         explanation: the best one there is.
         threshold: log p-value of a wrench that chance passes rarely enough.
         final: runs that chose nothing.
-        rounds: most rounds of choosing and fitting; default: fewer beside causes.
+        rounds: most rounds of choosing and fitting; default: fewer where a round takes long.
 
     Returns:
         None where the data ask for no wrench beyond chance, or where they are not explained better
@@ -138,7 +140,8 @@ def residual_model(
     """
     like = forces = generic_forces(series_of(explanation).runs, explanation.filtered)
     state = _State(explanation, np.zeros(0, np.int64), np.zeros(0), np.zeros(0))
-    most = ROUNDS_BESIDE if explanation.effects else ROUNDS
+    differing = bool(np.any(series_of(explanation).variation))
+    most = ROUNDS_BESIDE if explanation.effects or differing else ROUNDS
     for _ in range(most if rounds is None else rounds):
         chosen = _enlarged(state, forces, threshold)
         if not len(chosen.columns):

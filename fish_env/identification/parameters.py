@@ -7,6 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from fish_env.arrays import FloatArray
+from fish_env.data.schema import Dataset
+from fish_env.data.vocabulary import COMMANDS
 from fish_env.effects.extended import PREFIX, ExtendedModel
 from fish_env.errors import ParameterError
 from fish_env.identification.filtering import Measurement
@@ -42,6 +44,16 @@ PLANAR_PATHS = (
 """Coefficients that a fish swimming level shows to a camera overhead; the others keep their values.
 Its mass is among those: forces over mass is all that a path shows, and a mass that leaves the
 buoyancy behind would let the fish sink, unseen, and so find another drag."""
+LEVEL_PATHS = (
+    *PLANAR_PATHS,
+    "mass.static_moment_rest[1]",
+    "mass.static_moment_rest[2]",
+    "mass.total",
+    "mass.buoyancy",
+)
+"""The same for steps between samples, where the mass is free too and the buoyancy follows it."""
+HELD = 1e-3
+"""Share of its prior standard deviation that is left to a coefficient that is held."""
 VERTICAL = frozenset({"z", "roll", "pitch", "w", "p", "q"})
 """Channels that show more than motion in a horizontal plane."""
 
@@ -52,9 +64,13 @@ class Baseline(Coefficients):
     Args:
         fish: nominal parameters and priors.
         paths: which coefficients are free; default: all with a prior that the model reads.
+        held: those among ``paths`` that only follow the ones before them that their prior ties
+            them to, as the buoyancy follows the mass.
     """
 
-    def __init__(self, fish: FishParams, paths: Sequence[str] | None = None) -> None:
+    def __init__(
+        self, fish: FishParams, paths: Sequence[str] | None = None, held: Iterable[str] = ()
+    ) -> None:
         self.fish = fish
         read = set(PATHS.values()) - {"weight_block.crank.l1", "weight_block.crank.l2"}
         free = [p for p in fish.values() if p in read and fish.prior_sd(p) > 0]
@@ -63,7 +79,7 @@ class Baseline(Coefficients):
         super().__init__(
             chosen,
             np.array([fish.get(path) for path in chosen]),
-            fish.prior_covariance(list(chosen)),
+            _with_held(fish.prior_covariance(list(chosen)), [chosen.index(path) for path in held]),
             (np.array([i.lower for i in known]), np.array([i.upper for i in known])),
             [i.unit for i in known],
             self._is_a_fish,
@@ -75,6 +91,34 @@ class Baseline(Coefficients):
         except ParameterError:
             return False
         return True
+
+
+def shows_level_swimming(dataset: Dataset) -> bool:
+    """Whether a camera overhead saw a fish whose weight block was never moved."""
+    block = ["block" in name for name in COMMANDS]
+    still = not any(run.commands.values[:, block].any() for run in dataset.runs)
+    return still and not VERTICAL.intersection(dataset.channels)
+
+
+def baseline_of(dataset: Dataset, fish: FishParams, paths: Sequence[str] | None = None) -> Baseline:
+    """Coefficients that some data may show.
+
+    Args:
+        dataset: measured runs.
+        fish: nominal parameters and priors.
+        paths: which are free; default: all with a prior, or those of level swimming where a camera
+            overhead saw nothing else.
+    """
+    if paths is None and shows_level_swimming(dataset):
+        return Baseline(fish, LEVEL_PATHS, LEVEL_PATHS[-1:])
+    return Baseline(fish, paths)
+
+
+def _with_held(covariance: FloatArray, held: Sequence[int]) -> FloatArray:
+    """A prior's covariance with hardly any of what some rows have beyond the rows before them."""
+    factor = np.linalg.cholesky(covariance)
+    factor[:, held] *= HELD
+    return factor @ factor.T
 
 
 def neutral_values(

@@ -29,7 +29,7 @@ from fish_env.identification.noise import (
 )
 from fish_env.identification.noise_model import RELAXED_PHASE_SD, UNEVEN_PHASE_SD, NoiseModel
 from fish_env.identification.open_loop import windows, without_feedback
-from fish_env.identification.parameters import ALIKE, Baseline, changes_of, neutral_values
+from fish_env.identification.parameters import ALIKE, baseline_of, changes_of, neutral_values
 from fish_env.identification.phases import settle_phases
 from fish_env.identification.run_numbers import in_late_rows, renumbered
 from fish_env.identification.runs import FINER, RunData, prepare_run
@@ -93,7 +93,7 @@ class SeriesProblem(Problem):
             prepare_run(dataset.run(i), self.channels, self.sensor_sd, dt)
             for i in (dataset.ids if run_ids is None else run_ids)
         )
-        self.baseline = Baseline(self.fish, paths)
+        self.baseline = baseline_of(dataset, self.fish, paths)
         self.effects = tuple(effects)
         self.unrefined, self.drive = False, TailDrive()
         self._filters: dict[frozenset[str], RunFilter] = {}

@@ -11,10 +11,10 @@ from scipy.special import stdtrit
 
 from fish_env.arrays import FloatArray
 from fish_env.inference.adequacy import disturbance_at_limit, implausible_estimates
-from fish_env.inference.drive import beside_drive, measured
+from fish_env.inference.drive import beside_drive, drifting, measured, under_relaxed_noise
 from fish_env.inference.effort import FULL, Effort
 from fish_env.inference.elimination import backward_elimination
-from fish_env.inference.estimate.again import finished, refined
+from fish_env.inference.estimate.again import to_publish
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.left_out import left_out_scores
@@ -142,21 +142,27 @@ def extended(
             found = more or found
             break
         found = more
-    return settled(found, effort.retries)
+    return settled(found, effort.retries, report)
 
 
-def settled(found: Attribution, thoroughly: bool) -> Attribution:
+def settled(
+    found: Attribution, thoroughly: bool, report: Callable[[str], None] = lambda step: None
+) -> Attribution:
     """The attribution without causes that are not needed, its estimates fitted to the end.
 
     Args:
         found: what the search has found.
         thoroughly: whether estimates are to be published.
+        report: told what is being done.
     """
+    if found.accepted.causes:
+        report("dropping causes that are not needed")
     current = backward_elimination(found.accepted)
     failed = found.failed if current.causes == found.accepted.causes else frozenset()
     # What else is missing moves estimates by more than a few steps more would.
     if current.causes and thoroughly and not disturbance_at_limit(current.fit):
-        final = reached(lambda: finished(refined(current.fit)))
+        report("fitting the estimates to the end")
+        final = reached(lambda: to_publish(current.fit))
         current = Explanation(current.causes, final) if final else current
     # A rival that contains the accepted causes is no rival once a cause is dropped.
     rivals = tuple(e for e in found.rivals if not set(current.causes) <= set(e.causes))
@@ -213,7 +219,7 @@ class Search:
     def together(self, found: Attribution) -> Attribution:
         """With further effects that are needed beside those found, and what the runs differ in."""
         before, rough = found.accepted, roughness(found.accepted)
-        current, after = pursue(
+        current, after, replaced = pursue(
             before, found.shown, self.causes, self.rng, self.report,
             rough * found.gain, self.relaxed_log_p,
         )  # fmt: skip
@@ -223,7 +229,7 @@ class Search:
         if current.causes == before.causes:
             alike = tuple(e.varied(beside_misfit=True) for e in found.rivals)
             return replace(found, accepted=current, rivals=alike, shown=after, gain=gain)
-        current, rivals = challenged(current, after, found.rivals, self.report)
+        current, rivals = challenged(current, after, found.rivals, self.report, replaced)
         return replace(
             found, accepted=current, rivals=rivals, shown=after, gain=gain,
             failed=frozenset(),
@@ -296,10 +302,10 @@ class Search:
         self, current: Explanation, chosen: Sequence[Signal], shown: Screen, effort: Effort
     ) -> tuple[list[Explanation], Explanation | None]:
         """Full fits with one cause more, and the present one under the best one's noise."""
-        unseen = _drifting(current, shown, chosen)
+        unseen = drifting(current, shown, chosen)
         relaxed = None
         if effort.retries:
-            relaxed = _under_relaxed_noise(current, chosen, self.causes, self.rng)
+            relaxed = under_relaxed_noise(current, chosen, self.causes, self.rng)
         problem = current.fit.problem
         alike = partial(like, before=shown, chosen=[*chosen, *unseen], problem=problem)
         return refits(current, chosen, self.report, relaxed, effort, alike, unseen)
@@ -357,44 +363,3 @@ def roughness(explanation: Explanation) -> float:
     """
     known = explanation.fit.problem.known
     return max((known[name].step_error ** 2 for name in explanation.fit.effects), default=0.0)
-
-
-def _under_relaxed_noise(
-    current: Explanation,
-    chosen: Sequence[Signal],
-    causes: Sequence[Cause],
-    rng: np.random.Generator,
-) -> tuple[Fit, Sequence[Signal]] | None:
-    """The fit under relaxed noise where a drive may be out of step, and the effects it shows."""
-    if not _may_be_out_of_step(current, chosen):
-        return None
-    relaxed = current.with_relaxed_noise
-    if relaxed is None:
-        return None
-    shown = screen(relaxed, causes, rng)
-    effects = sorted((s for s in shown.best() if s.cause.is_effect), key=lambda s: -s.uncorrected)
-    first = [s for s in effects[: POLICY.most_relaxed] if s.uncorrected > POLICY.worth_coarse_fit]
-    tried_anyway = current.fit.problem.out_of_step
-    return relaxed, first + [s for s in effects if s.cause.name in tried_anyway and s not in first]
-
-
-def _drifting(current: Explanation, screen: Screen, chosen: Sequence[Signal]) -> list[Signal]:
-    """Effects that drift in phase.
-
-    After many periods out of step the screen shows them no more than it shows others.
-    """
-    if not _may_be_out_of_step(current, chosen):
-        return []
-    known = current.fit.problem.known
-    effects = [s for s in screen.best() if s.cause.is_effect and s not in chosen]
-    return [s for s in effects if known[s.cause.name].drifts_in_phase]
-
-
-def _may_be_out_of_step(current: Explanation, chosen: Sequence[Signal]) -> bool:
-    """Whether a periodic drive may be out of step: no plausible disturbance explains the misfit.
-
-    A drive out of step hides everything else, so it is the first cause to be found or none.
-    """
-    if current.causes or current.fit.problem.drive.known:
-        return False
-    return bool(chosen) and bool(disturbance_at_limit(current.fit))

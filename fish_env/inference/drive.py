@@ -14,7 +14,7 @@ from functools import partial
 
 import numpy as np
 
-from fish_env.inference.adequacy import implausible_estimates
+from fish_env.inference.adequacy import disturbance_at_limit, implausible_estimates
 from fish_env.inference.effort import Effort
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.estimate.settle import usual_runs
@@ -23,7 +23,8 @@ from fish_env.inference.hypotheses import effect_of
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause
 from fish_env.inference.problem import Point
-from fish_env.inference.screening import screen
+from fish_env.inference.projection import Signal
+from fish_env.inference.screening import Screen, screen
 from fish_env.inference.search import refits
 from fish_env.inference.shortlist import shortlisted
 from fish_env.inference.starts import baselines
@@ -150,3 +151,44 @@ def _with_drive(
     if few is None or not shown:
         return []
     return refits(begun, shown, report, (few, shown), effort)[0]
+
+
+def under_relaxed_noise(
+    current: Explanation,
+    chosen: Sequence[Signal],
+    causes: Sequence[Cause],
+    rng: np.random.Generator,
+) -> tuple[Fit, Sequence[Signal]] | None:
+    """The fit under relaxed noise where a drive may be out of step, and the effects it shows."""
+    if not _may_be_out_of_step(current, chosen):
+        return None
+    relaxed = current.with_relaxed_noise
+    if relaxed is None:
+        return None
+    shown = screen(relaxed, causes, rng)
+    effects = sorted((s for s in shown.best() if s.cause.is_effect), key=lambda s: -s.uncorrected)
+    first = [s for s in effects[: POLICY.most_relaxed] if s.uncorrected > POLICY.worth_coarse_fit]
+    tried_anyway = current.fit.problem.out_of_step
+    return relaxed, first + [s for s in effects if s.cause.name in tried_anyway and s not in first]
+
+
+def drifting(current: Explanation, shown: Screen, chosen: Sequence[Signal]) -> list[Signal]:
+    """Effects that drift in phase.
+
+    After many periods out of step the screen shows them no more than it shows others.
+    """
+    if not _may_be_out_of_step(current, chosen):
+        return []
+    known = current.fit.problem.known
+    effects = [s for s in shown.best() if s.cause.is_effect and s not in chosen]
+    return [s for s in effects if known[s.cause.name].drifts_in_phase]
+
+
+def _may_be_out_of_step(current: Explanation, chosen: Sequence[Signal]) -> bool:
+    """Whether a periodic drive may be out of step: no plausible disturbance explains the misfit.
+
+    A drive out of step hides everything else, so it is the first cause to be found or none.
+    """
+    if current.causes or current.fit.problem.drive.known:
+        return False
+    return bool(chosen) and bool(disturbance_at_limit(current.fit))

@@ -12,7 +12,7 @@ from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import PARAMETER, PREFIX
 from fish_env.inference.policy import POLICY
-from fish_env.inference.search import without
+from fish_env.inference.substitution import without
 from fish_env.inference.tails import chi2_log_tail
 
 

@@ -14,8 +14,8 @@ from fish_env.inference.probes import Cause
 from fish_env.inference.pursuit import pursued, substitutes
 from fish_env.inference.rivals import rivals_of
 from fish_env.inference.screening import Screen, screen
-from fish_env.inference.search import in_parts, substituted, without
 from fish_env.inference.shortlist import shortlisted
+from fish_env.inference.substitution import in_parts, substituted, without
 from fish_env.inference.trials import tried_out
 
 LINEAR_DOUBT = 3.0 * POLICY.evidence_doubt
@@ -36,7 +36,7 @@ def pursue(
     report: Callable[[str], None],
     least: float,
     relaxed_log_p: float,
-) -> tuple[Explanation, Screen]:
+) -> tuple[Explanation, Screen, list[tuple[str, str]]]:
     """The explanation with all further causes that are needed together, and its screen.
 
     Beside a misfit too with what the runs differ in: else a cause stands in for that.
@@ -49,11 +49,15 @@ def pursue(
         report: told what is being done.
         least: statistic below which a simulation error explains a cause.
         relaxed_log_p: added to the log p-value that makes a cause significant.
+
+    Returns:
+        The explanation, its screen, and causes that took the place of another effect on the way,
+        each with that effect.
     """
     problem = current.fit.problem
     if not shortlisted(problem, shown, 1, least, relaxed_log_p):
-        return current, shown
-    begun = current
+        return current, shown, []
+    begun, replaced = current, []
     if disturbance_at_limit(current.fit):
         varied = current.varied(beside_misfit=True)
         if varied.score < current.score - POLICY.evidence_doubt:
@@ -69,6 +73,7 @@ def pursue(
         shown = screen(more.fit, causes, rng)
         current = _against_likes(more, shown, report)
         if current is not more:
+            replaced += [p for p in zip(current.causes, more.causes, strict=True) if p[0] != p[1]]
             shown = screen(current.fit, causes, rng)
     for _ in range(POLICY.pursuits):
         more = pursued(current, _beside_drive(current, shown), report, least, relaxed_log_p)
@@ -80,7 +85,7 @@ def pursue(
             # Much is still unknown, and what would be picked next stands in for it.
             current = _told_apart(current, begun.causes, shown)
             break
-    return current, shown
+    return current, shown, replaced
 
 
 def _against_likes(
@@ -129,6 +134,7 @@ def challenged(
     shown: Screen,
     rivals: Sequence[Explanation],
     report: Callable[[str], None],
+    replaced: Sequence[tuple[str, str]] = (),
 ) -> tuple[Explanation, tuple[Explanation, ...]]:
     """The explanation after the effects closest to its causes were tried in their place.
 
@@ -141,21 +147,41 @@ def challenged(
         shown: all other causes against it.
         rivals: explanations that were as good before the last causes were found.
         report: told what is being done.
+        replaced: causes with the effects whose place they took then.
     """
     if disturbance_at_limit(current.fit):
         return current, ()
     known = current.fit.problem.known  # a coefficient takes no effect's place
     signals = {s.cause.name: s for s in shown.best() if s.cause.is_effect}
-    close = [(s.cause, s.name) for s in substitutes(current, shown) if s.cost < LINEAR_DOUBT]
+    close = _close(current, shown)
     pairs_of = (zip(current.causes, e.causes, strict=False) for e in rivals)
     earlier = [(a, b) for pairs in pairs_of for a, b in pairs if a != b]
-    first = [*_of_drive(current), *_of_lags(current)]
+    first = [*_of_drive(current), *_of_lags(current), *replaced]
     tried = [*first, *[*earlier, *each_in_turn(close)][:MOST]]
     pairs = [(c, signals[n]) for c, n in dict.fromkeys(tried) if n in signals and c in known]
     best, *others = substituted(current, pairs, POLICY.most_challenges, report)
     apart = [in_parts(best, cause, report) for cause in best.causes]
     best, *others = sorted([best, *others, *filter(None, apart)], key=lambda e: e.score)
     return best, rivals_of(best, others)
+
+
+def _close(current: Explanation, shown: Screen) -> list[tuple[str, str]]:
+    """Causes, each with an effect that may be in its place; first those known to look like it.
+
+    Of motion with corners the linear model tells little: there such an effect is always tried.
+
+    Args:
+        current: causes with their fit.
+        shown: all other causes against it.
+    """
+    problem = current.fit.problem
+    alike: list[tuple[str, str]] = []
+    others: list[tuple[str, str]] = []
+    for s in substitutes(current, shown):
+        is_alike = s.name in problem.known[s.cause].confusable_with
+        if s.cost < LINEAR_DOUBT or (is_alike and problem.is_nonsmooth((s.cause, s.name))):
+            (alike if is_alike else others).append((s.cause, s.name))
+    return [*alike, *others]
 
 
 def _of_drive(current: Explanation) -> list[tuple[str, str]]:

@@ -27,7 +27,7 @@ from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
 from fish_env.inference.projection import Projector, Signal
 from fish_env.inference.result import ResidualModel
-from fish_env.inference.search import without
+from fish_env.inference.substitution import without
 from fish_env.inference.tails import chi2_log_tail
 
 Describe = Callable[[Fit, float, Problem | None], ResidualModel | None]

@@ -14,21 +14,18 @@ from fish_env.inference.effort import FULL, Effort
 from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.explanation import FEW_RUNS, Explanation, fitted_again, reached
-from fish_env.inference.hypotheses import PREFIX, of_effects, parameter_path
+from fish_env.inference.hypotheses import PREFIX
 from fish_env.inference.parallel import side_by_side
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
 from fish_env.inference.projection import Signal
-from fish_env.inference.starts import baselines, probed, starts
+from fish_env.inference.starts import starts
 
 Report = Callable[[str], None]
 NamedCoarseFit = tuple[str, CoarseFit]
 """With the name of the cause that it has added."""
 Way = Callable[[float, Signal], list[NamedCoarseFit]]
 """Coarse fits of a cause, given up where they will not get below an objective."""
-
-MOST_TURNS = 6
-"""Sizes from which a coarse fit is tried in turn."""
 
 
 def refits(
@@ -89,7 +86,7 @@ def refits(
         return [], None
     tried, noise = _best_first(found, None if settled else found[0])
     # A baseline that diverges under the smaller disturbance keeps the one that suits it.
-    return tried, Explanation(current.causes, _at_noise(base.problem, base, noise, 2) or base)
+    return tried, Explanation(current.causes, at_noise(base.problem, base, noise, 2) or base)
 
 
 def _all(tasks: Iterable[Callable[[], list[NamedCoarseFit]]]) -> list[NamedCoarseFit]:
@@ -128,125 +125,6 @@ def restart_from_winner(
     return _best_first([*tried, *more], tried[0])[0]
 
 
-def substituted(
-    current: Explanation,
-    pairs: Sequence[tuple[str, Signal]],
-    most: int,
-    report: Report,
-    beside_misfit: bool = False,
-) -> list[Explanation]:
-    """The explanation, and others with another effect in place of one of its causes, best first.
-
-    A cause is chosen while others are still missing. A similar one may then win because it
-    compensates for part of them. Beside a misfit so may what the runs differ in, which settles
-    anew beside every effect.
-
-    Args:
-        current: causes with their fit.
-        pairs: cause, and the effect to try in its place.
-        most: how many to fit in full.
-        report: told what is being done.
-        beside_misfit: whether much is still unknown.
-    """
-    own = current.fit
-    fitter = CoarseFitter(own)
-    leeway = dict.fromkeys((name for name, _ in pairs), POLICY.coarse_fit_leeway)
-    if beside_misfit:
-        leeway = {name: max(least, _part(fitter, own, name)) for name, least in leeway.items()}
-    found: list[tuple[float, tuple[str, ...], CoarseFit]] = []
-    for name, signal in pairs:
-        report(f"trying {signal.cause.name} instead of {name}")
-        causes = tuple(signal.cause.name if c == name else c for c in current.causes)
-        coarse = _swapped(fitter, own, name, signal)
-        if coarse is not None and coarse.objective < fitter.base + leeway[name]:
-            found.append((coarse.objective, causes, coarse))
-    others = []
-    for _, causes, coarse in sorted(found, key=lambda f: f[0])[:most]:
-        report(f"fitting {' and '.join(causes)}")
-        fitted = _at_noise(own.problem, coarse, own.noise, 4)
-        if fitted is not None:
-            others.append(Explanation(causes, fitted))
-    found_all = [current, *others]
-    if beside_misfit and others:
-        report("fitting what the runs differ in")
-        found_all = side_by_side([e.varied_to_the_end for e in found_all])
-    return sorted(found_all, key=lambda e: e.score)
-
-
-def _part(fitter: CoarseFitter, own: Fit, name: str) -> float:
-    """The part of what a cause explains in a coarse fit that a finalist may lack."""
-    effects = tuple(e for e in own.effects if e != name)
-    begin = [Point(own.point.z, of_effects(own.point.effects, effects))]
-    left = reached(partial(fitter.coarse_fit, effects, own.released, begin))
-    return np.inf if left is None else POLICY.coarse_fit_behind * (left.objective - fitter.base)
-
-
-def _swapped(fitter: CoarseFitter, own: Fit, name: str, signal: Signal) -> CoarseFit | None:
-    """The coarse fit with one effect in place of another, from all its sizes.
-
-    One that ends switched off had begun too far away, and is tried from each size in turn.
-    """
-    kept = of_effects(own.point.effects, {*own.effects} - {name})
-    effects = tuple(signal.cause.name if e == name else e for e in own.effects)
-    sizes = probed(own.problem, signal, every=True)
-    begin = [Point(z, {**kept, **values}) for z in baselines(own) for values in sizes]
-    coarse = [reached(partial(fitter.coarse_fit, effects, own.released, begin))]
-    if coarse[0] is None or _off(own.problem, coarse[0].point, signal.cause.name):
-        turns = fitter.promising(effects, own.released, begin, MOST_TURNS)
-        coarse += [reached(partial(fitter.coarse_fit, effects, own.released, [b])) for b in turns]
-    return min((s for s in coarse if s), key=lambda s: s.objective, default=None)
-
-
-def in_parts(current: Explanation, cause: str, report: Report) -> Explanation | None:
-    """The explanation with effects that together do nearly what one of its causes does.
-
-    In the place of two effects, one that is neither may fit best alone.
-
-    Args:
-        current: causes with their fit.
-        cause: the one to take apart.
-        report: told what is being done.
-
-    Returns:
-        None where nothing does the same together, or the simulation diverges.
-    """
-    own = current.fit
-    known = own.problem.known
-    if cause not in own.effects:
-        return None
-    at = {p.name: own.point.effects[parameter_path(cause, p.name)] for p in known[cause].parameters}
-    parts = known[cause].in_parts(at)
-    if not parts or not {*parts} <= {*known}:
-        return None
-    report(f"fitting {' and '.join(parts)} instead of {cause}")
-    causes = tuple(dict.fromkeys(n for c in current.causes for n in (parts if c == cause else [c])))
-    effects = tuple(dict.fromkeys(n for e in own.effects for n in (parts if e == cause else [e])))
-    values = of_effects(own.point.effects, {*own.effects} - {cause})
-    values |= {parameter_path(e, p): v for e, of in parts.items() for p, v in of.items()}
-    start = (effects, Point(own.point.z, values), own.noise, own.released)
-    fitted = reached(partial(fit, own.problem, *start, refit_noise=False, iterations=4))
-    return None if fitted is None else Explanation(causes, fitted)
-
-
-def without(current: Explanation, dropped: Collection[str]) -> Explanation | None:
-    """The fit when some of its causes are dropped, under the same noise model.
-
-    None where the simulation diverges without them.
-    """
-    own = current.fit
-    effects = tuple(e for e in own.effects if e not in dropped)
-    released = tuple(p for p in own.released if f"parameter:{p}" not in dropped)
-    begin = Point(own.point.z, of_effects(own.point.effects, effects))
-    smaller = reached(
-        lambda: fit(
-            own.problem, effects, begin, own.noise, released, refit_noise=False, iterations=4
-        )
-    )
-    if smaller is None:
-        return None
-    return Explanation(tuple(c for c in current.causes if c not in dropped), smaller)
-
-
 def _coarse_fits(
     fitter: CoarseFitter,
     base: Fit,
@@ -265,12 +143,12 @@ def _coarse_fits(
     found = reached(lambda: fitter.coarse_fit(effects, released, begin, give_up_above))
     if found is None:
         return []
-    if cause.is_effect and _off(base.problem, found.point, cause.name):
+    if cause.is_effect and is_off(base.problem, found.point, cause.name):
         found = replace(found, point=begin[0])
     return [(cause.name, found)]
 
 
-def _off(problem: Problem, point: Point, name: str) -> bool:
+def is_off(problem: Problem, point: Point, name: str) -> bool:
     """Whether an effect does nothing at a point."""
     switching = problem.known[name].switching
     return all(point.effects[f"{PREFIX}{name}.{p.name}"] == p.neutral for p in switching)
@@ -342,7 +220,7 @@ def _rest(
 
     def fitted(name: str, coarse: CoarseFit) -> Explanation | None:
         report(f"fitting {name}")
-        found = _at_noise(leader.problem, coarse, leader.noise, 4, give_up_above)
+        found = at_noise(leader.problem, coarse, leader.noise, 4, give_up_above)
         return None if found is None else Explanation((*current.causes, name), found)
 
     tasks = [partial(fitted, name, coarse) for name, coarse in finalists]
@@ -364,7 +242,7 @@ def _best_first(
     first = None if ranked[0] is leader else _noise_too(problem, own)
     if first is None:
         return ranked, own.noise
-    tasks = [partial(_at_noise, problem, e.fit, first.noise, 2) for e in ranked[1:]]
+    tasks = [partial(at_noise, problem, e.fit, first.noise, 2) for e in ranked[1:]]
     pairs = zip(ranked[1:], side_by_side(tasks), strict=True)
     others = [Explanation(e.causes, fitted) for e, fitted in pairs if fitted]
     return [Explanation(ranked[0].causes, first), *others], first.noise
@@ -380,13 +258,22 @@ def in_full(problem: Problem, coarse: CoarseFit, noise: Any) -> Fit | None:
     return first if first is None or few is problem else _noise_too(problem, first)
 
 
-def _at_noise(
+def at_noise(
     problem: Problem,
     at: CoarseFit | Fit,
     noise: Any,
     iterations: int,
     give_up_above: float = np.inf,
 ) -> Fit | None:
+    """A few steps on from a fit under one noise model; None where the simulation diverges.
+
+    Args:
+        problem: the runs.
+        at: where to begin, and what is free.
+        noise: noise model, which is kept.
+        iterations: most steps.
+        give_up_above: stop where the objective will not get below this.
+    """
     return reached(
         lambda: fit(
             problem, at.effects, at.point, noise, at.released, refit_noise=False,

@@ -7,7 +7,8 @@ from fish_env.inference import elimination
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.hypotheses import effects_of
-from fish_env.inference.search import refits, without
+from fish_env.inference.search import refits
+from fish_env.inference.substitution import without
 from tests.inference.stated import Stated, White, apart, cause_of, effect, signal_of
 
 SIZES = {"a": 60.0, "b": 50.0, "c": 40.0}

@@ -7,7 +7,7 @@ from fish_env.inference.estimate.coarse_fit import CoarseFitter
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.problem import Point
-from fish_env.inference.search import substituted
+from fish_env.inference.substitution import substituted
 from tests.inference.stated import Stated, cause_of, effect, signal_of, size_of
 
 SOFT, DELAY, LAG, CURRENT = NAMES = ("soft_tail", "delay", "lag", "current")

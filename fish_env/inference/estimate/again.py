@@ -47,12 +47,22 @@ def finished(own: Fit) -> Fit:
     return own
 
 
-def refined(own: Fit) -> Fit:
+def refined(own: Fit, rounds: int = 1) -> Fit:
     """The fit in finer steps where an effect asks for them, if it was made without."""
     if not own.problem.is_coarse(own.point.effects):
         return own
-    problem = own.problem.with_refinement()
-    return fit(problem, own.effects, own.point, own.noise, own.released, rounds=1, iterations=3)
+    problem, start = own.problem.with_refinement(), (own.point, own.noise, own.released)
+    return fit(problem, own.effects, *start, rounds=rounds, iterations=3)
+
+
+def to_publish(own: Fit) -> Fit:
+    """The fit in the steps that its effects ask for, iterated to convergence.
+
+    Where runs have numbers of their own it is fitted once more at most: such a fit takes longest.
+    """
+    varied = bool(spread_of(own.problem, own.noise).any())
+    finer = refined(own, rounds=2 if varied else 1)
+    return finer if varied and finer is not own else finished(finer)
 
 
 def run_variation(own: Fit) -> Spread:

@@ -1,0 +1,150 @@
+"""Fits with other effects in the place of causes, with causes taken apart, or without some."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from functools import partial
+
+import numpy as np
+
+from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
+from fish_env.inference.estimate.fit import Fit, fit
+from fish_env.inference.explanation import Explanation, reached
+from fish_env.inference.hypotheses import of_effects, parameter_path
+from fish_env.inference.parallel import side_by_side
+from fish_env.inference.policy import POLICY
+from fish_env.inference.problem import Point
+from fish_env.inference.projection import Signal
+from fish_env.inference.search import at_noise, is_off
+from fish_env.inference.starts import baselines, probed
+
+Report = Callable[[str], None]
+
+MOST_TURNS = 6
+"""Sizes from which a coarse fit is tried in turn."""
+
+
+def substituted(
+    current: Explanation,
+    pairs: Sequence[tuple[str, Signal]],
+    most: int,
+    report: Report,
+    beside_misfit: bool = False,
+) -> list[Explanation]:
+    """The explanation, and others with another effect in place of one of its causes, best first.
+
+    A cause is chosen while others are still missing. A similar one may then win because it
+    compensates for part of them. Beside a misfit so may what the runs differ in, which settles
+    anew beside every effect.
+
+    Args:
+        current: causes with their fit.
+        pairs: cause, and the effect to try in its place.
+        most: how many to fit in full.
+        report: told what is being done.
+        beside_misfit: whether much is still unknown.
+    """
+    own = current.fit
+    fitter = CoarseFitter(own)
+    leeway = dict.fromkeys((name for name, _ in pairs), POLICY.coarse_fit_leeway)
+    if beside_misfit:
+        leeway = {name: max(least, _part(fitter, own, name)) for name, least in leeway.items()}
+    found: list[tuple[float, tuple[str, ...], CoarseFit]] = []
+    for name, signal in pairs:
+        report(f"trying {signal.cause.name} instead of {name}")
+        causes = tuple(signal.cause.name if c == name else c for c in current.causes)
+        enough = fitter.base + leeway[name]
+        coarse = _swapped(fitter, own, name, signal, enough)
+        if coarse is not None and coarse.objective < enough:
+            found.append((coarse.objective, causes, coarse))
+    others = []
+    # Beside a misfit the numbers of the runs have not settled yet, and no fit is hopeless.
+    give_up_above = np.inf if beside_misfit else own.objective + POLICY.out_of_reach
+    for _, causes, coarse in sorted(found, key=lambda f: f[0])[:most]:
+        report(f"fitting {' and '.join(causes)}")
+        fitted = at_noise(own.problem, coarse, own.noise, 4, give_up_above)
+        if fitted is not None:
+            others.append(Explanation(causes, fitted))
+    found_all = [current, *others]
+    if beside_misfit and others:
+        report("fitting what the runs differ in")
+        found_all = side_by_side([e.varied_to_the_end for e in found_all])
+    return sorted(found_all, key=lambda e: e.score)
+
+
+def _part(fitter: CoarseFitter, own: Fit, name: str) -> float:
+    """The part of what a cause explains in a coarse fit that a finalist may lack."""
+    effects = tuple(e for e in own.effects if e != name)
+    begin = [Point(own.point.z, of_effects(own.point.effects, effects))]
+    left = reached(partial(fitter.coarse_fit, effects, own.released, begin))
+    return np.inf if left is None else POLICY.coarse_fit_behind * (left.objective - fitter.base)
+
+
+def _swapped(
+    fitter: CoarseFitter, own: Fit, name: str, signal: Signal, enough: float
+) -> CoarseFit | None:
+    """The coarse fit with one effect in place of another, from all its sizes.
+
+    It is given up where it will not get below ``enough``. One that ends switched off had begun too
+    far away, and is tried from each size in turn.
+    """
+    kept = of_effects(own.point.effects, {*own.effects} - {name})
+    effects = tuple(signal.cause.name if e == name else e for e in own.effects)
+    sizes = probed(own.problem, signal, every=True)
+    begin = [Point(z, {**kept, **values}) for z in baselines(own) for values in sizes]
+    trying = partial(fitter.coarse_fit, effects, own.released, give_up_above=enough)
+    coarse = [reached(partial(trying, begin))]
+    if coarse[0] is None or is_off(own.problem, coarse[0].point, signal.cause.name):
+        turns = fitter.promising(effects, own.released, begin, MOST_TURNS)
+        coarse += [reached(partial(trying, [b])) for b in turns]
+    return min((s for s in coarse if s), key=lambda s: s.objective, default=None)
+
+
+def in_parts(current: Explanation, cause: str, report: Report) -> Explanation | None:
+    """The explanation with effects that together do nearly what one of its causes does.
+
+    In the place of two effects, one that is neither may fit best alone.
+
+    Args:
+        current: causes with their fit.
+        cause: the one to take apart.
+        report: told what is being done.
+
+    Returns:
+        None where nothing does the same together, or the simulation diverges.
+    """
+    own = current.fit
+    known = own.problem.known
+    if cause not in own.effects:
+        return None
+    at = {p.name: own.point.effects[parameter_path(cause, p.name)] for p in known[cause].parameters}
+    parts = known[cause].in_parts(at)
+    if not parts or not {*parts} <= {*known}:
+        return None
+    report(f"fitting {' and '.join(parts)} instead of {cause}")
+    causes = tuple(dict.fromkeys(n for c in current.causes for n in (parts if c == cause else [c])))
+    effects = tuple(dict.fromkeys(n for e in own.effects for n in (parts if e == cause else [e])))
+    values = of_effects(own.point.effects, {*own.effects} - {cause})
+    values |= {parameter_path(e, p): v for e, of in parts.items() for p, v in of.items()}
+    start = (effects, Point(own.point.z, values), own.noise, own.released)
+    fitted = reached(partial(fit, own.problem, *start, refit_noise=False, iterations=4))
+    return None if fitted is None else Explanation(causes, fitted)
+
+
+def without(current: Explanation, dropped: Collection[str]) -> Explanation | None:
+    """The fit when some of its causes are dropped, under the same noise model.
+
+    None where the simulation diverges without them.
+    """
+    own = current.fit
+    effects = tuple(e for e in own.effects if e not in dropped)
+    released = tuple(p for p in own.released if f"parameter:{p}" not in dropped)
+    begin = Point(own.point.z, of_effects(own.point.effects, effects))
+    smaller = reached(
+        lambda: fit(
+            own.problem, effects, begin, own.noise, released, refit_noise=False, iterations=4
+        )
+    )
+    if smaller is None:
+        return None
+    return Explanation(tuple(c for c in current.causes if c not in dropped), smaller)

@@ -26,6 +26,7 @@ from fish_env.diagnosis.tables.pipeline import diagnose_steady
 from fish_env.diagnosis.writing import outputs, write_answer
 from fish_env.errors import DatasetError
 from fish_env.files import check_outputs
+from fish_env.heap import give_back_large_arrays
 from fish_env.identification.beats import with_measured_beats
 from fish_env.identification.copies import without_copies
 from fish_env.identification.model_outliers import without_model_outliers
@@ -143,6 +144,7 @@ def diagnose_runs(
     Raises:
         DatasetError: no diagnosis should be built on these runs.
     """
+    give_back_large_arrays()
     # The filter has its own threads; those of the linear algebra would wait for each other.
     with threadpool_limits(1, "blas"):
         return _diagnose_runs(dataset, fish, seed, quick, progress)

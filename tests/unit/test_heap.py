@@ -1,0 +1,40 @@
+"""Freed arrays go back to the system."""
+
+import subprocess
+import sys
+
+import pytest
+
+CODE = """
+import numpy as np
+from fish_env.heap import give_back_large_arrays
+
+told = {told} and give_back_large_arrays()
+
+def resident():
+    with open("/proc/self/statm") as file:
+        return int(file.read().split()[1]) * 4096
+
+block = np.ones(3 * 2**20)
+del block  # which raises the size up to which the library keeps blocks
+before = resident()
+large, small = zip(*[(np.ones(2**18), np.ones(2**12)) for _ in range(30)])
+del large
+print(told, resident() - before)
+"""
+
+
+def grown(told: bool) -> tuple[str, int]:
+    done = subprocess.run(
+        [sys.executable, "-c", CODE.format(told=told)], capture_output=True, text=True, check=True
+    )
+    word, grown = done.stdout.split()
+    return word, int(grown)
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="about glibc")
+def test_large_arrays_are_given_back_when_they_are_freed():
+    word, left = grown(True)
+    assert word == "True"
+    assert left < 10 * 2**20
+    assert grown(False)[1] > 40 * 2**20

@@ -51,7 +51,7 @@ def confirmed(
     What is left may be a disturbance of implausible strength: it is estimated with the rest, and
     the evidence for a cause is counted beside it. What was measured of a drive without a model
     needs no model to confirm it. Where coefficients as a whole contradict their priors they make up
-    for what is missing, and so may any cause that was found beside them: none is believed.
+    for what is missing, and so may any cause that depends on them: none of those is believed.
 
     Args:
         accepted: causes that explain part of the data.
@@ -62,9 +62,15 @@ def confirmed(
         The causes that are left with their fit; None where none is.
     """
     measured = _measured(accepted)
-    if contradicts_priors(accepted.fit) and (doubtful := {*accepted.causes} - measured):
-        report(f"leaving out {', '.join(sorted(doubtful))}: coefficients contradict their priors")
-        return without(accepted, tuple(doubtful)) if measured else None
+    if contradicts_priors(accepted.fit):
+        doubtful = {*accepted.causes} - measured - independent(accepted.fit)
+        if doubtful:
+            why = "coefficients contradict their priors"
+            report(f"leaving out {', '.join(sorted(doubtful))}: {why}")
+            left = without(accepted, tuple(doubtful)) if doubtful < {*accepted.causes} else None
+            if left is None:
+                return None
+            accepted = left
     while others := [name for name in accepted.causes if name not in measured]:
         words = implausible_estimates(accepted.fit)
         weakest = _blamed(others, words)
@@ -82,6 +88,32 @@ def confirmed(
             return None
         accepted = smaller
     return accepted if accepted.causes else None
+
+
+def owed_to_coefficients(fit: Fit) -> dict[str, float]:
+    """How much further each effect parameter is, path -> value, than with nominal coefficients.
+
+    In the linear model, all effects following.
+    """
+    count = len(fit.problem.baseline)
+    hessian = Projector(fit).hessian
+    moved = np.linalg.solve(hessian[count:, count:], hessian[count:, :count] @ fit.point.z)
+    return dict(zip(fit.names[count:], (-moved).tolist(), strict=True))
+
+
+def independent(fit: Fit) -> frozenset[str]:
+    """Effects that owe nothing to how far the coefficients are from their priors.
+
+    No parameter that switches the effect on owes them more than its standard error.
+    """
+    own = fit.extrapolated
+    owed = owed_to_coefficients(own)
+    error = dict(zip(own.names, np.sqrt(np.diag(own.covariance)).tolist(), strict=True))
+    found = []
+    for name in own.effects:
+        if all(abs(owed[path]) < error[path] for path in off_values(own, name)):
+            found.append(name)
+    return frozenset(found)
 
 
 def _measured(found: Explanation) -> frozenset[str]:

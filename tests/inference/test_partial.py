@@ -10,10 +10,16 @@ import pytest
 from fish_env.inference.adequacy import contradicts_priors
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.explanation import Explanation
-from fish_env.inference.partial import StandIns, confirmed, sustained
+from fish_env.inference.partial import (
+    StandIns,
+    confirmed,
+    independent,
+    owed_to_coefficients,
+    sustained,
+)
 from fish_env.inference.pipeline import infer
 from fish_env.inference.problem import Point
-from fish_env.inference.vehicle import Drive
+from fish_env.inference.vehicle import Coefficients, Drive
 from tests.inference.boat import sail
 from tests.inference.boat_problem import BoatProblem
 from tests.inference.test_boat import BIAS, EAST, FITTED, NORTH, problems, wind
@@ -88,7 +94,7 @@ def test_what_was_measured_of_a_drive_needs_no_simulation(certain):
     assert (confirmed(alone, THRESHOLD) is not None) == certain
 
 
-def test_no_cause_is_believed_where_coefficients_contradict_their_priors():
+def test_no_cause_that_depends_on_coefficients_is_believed_where_they_contradict_their_priors():
     """A boat whose coefficients are all four prior deviations off is not the boat described."""
     boat = BoatProblem(sail(np.random.default_rng(7), FITTED, {NORTH: 0.15, EAST: -0.2}))
     right = fit(boat, ("current",))
@@ -98,3 +104,24 @@ def test_no_cause_is_believed_where_coefficients_contradict_their_priors():
     assert "contradict their priors" in said[0]
     assert not contradicts_priors(right)
     assert contradicts_priors(off)
+
+
+def test_what_effects_owe_to_coefficients_is_what_a_fit_with_nominal_ones_lacks():
+    boat = BoatProblem(sail(np.random.default_rng(7), FITTED, {NORTH: 0.15, EAST: -0.2}))
+    free = fit(boat, ("current",))
+    held = BoatProblem(sail(np.random.default_rng(7), FITTED, {NORTH: 0.15, EAST: -0.2}))
+    known = boat.baseline
+    held.baseline = Coefficients(known.paths, known.mean, 1e-8 * np.diag(known.sd**2), known.bounds)
+    nominal = fit(held, ("current",), noise=free.noise, refit_noise=False, iterations=10)
+    owed = owed_to_coefficients(free)
+    for path in (NORTH, EAST):
+        change = free.point.effects[path] - nominal.point.effects[path]
+        assert owed[path] == pytest.approx(change, rel=0.2, abs=2e-4)
+
+
+@pytest.mark.parametrize(("off", "expected"), [(0.0, {"current"}), (4.0, set())])
+def test_a_cause_is_independent_of_coefficients_that_are_nominal(off, expected):
+    boat = BoatProblem(sail(np.random.default_rng(7), FITTED, {NORTH: 0.15, EAST: -0.2}))
+    own = fit(boat, ("current",))
+    there = replace(own, point=Point(np.full_like(own.point.z, off), own.point.effects))
+    assert independent(there) == expected

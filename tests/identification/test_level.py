@@ -10,7 +10,7 @@ from fish_env.identification import SeriesProblem
 from fish_env.inference.probes import causes_of
 from tests.identification.synthetic import Setup, simulate
 
-UNSEEN = ("inertia.rest[0]", "inertia.rest[1]", "body.rotational_damping[0]", "body.area[2]")
+UNSEEN = ("inertia.rest[1]", "body.rotational_damping[1]", "body.area[2]", "weight_block.d2")
 PLANE = ("x", "y", "yaw")
 
 

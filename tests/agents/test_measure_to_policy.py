@@ -136,6 +136,8 @@ def test_without_an_extended_model_the_printed_fish_is_all_there_is(tiny, tmp_pa
     assert record["summary"][0]["closed"]["extended"]["mean"] == 0.0
 
 
+@pytest.mark.slow
+@pytest.mark.long
 def test_draws_from_the_posterior_are_other_fish_each_time(finished, tiny):
     declared = load_declaration(tiny)
     folder, _ = finished

@@ -23,7 +23,7 @@ EXTRAS = set(
 )
 
 
-COMPILING = {"your-own.md", "evaluation.md"}
+COMPILING = {"your-own.md", "evaluation.md", "paths.md"}
 """Pages whose code needs kernels that no other test does, a minute or so to compile."""
 
 

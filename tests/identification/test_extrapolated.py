@@ -66,6 +66,8 @@ def test_it_leads_towards_the_truth(case, fitted):
     assert abs(off(fitted)) > abs(off(fitted.extrapolated)) + 1.0
 
 
+@pytest.mark.slow
+@pytest.mark.long
 def test_everything_else_stays(fitted):
     moved = fitted.extrapolated
     assert moved.linearised.slopes is fitted.linearised.slopes

@@ -27,6 +27,7 @@ from fish_env.identification.runs import RunData
 from fish_env.identification.series import SeriesProblem, series_of
 from fish_env.inference.adequacy import NOTHING, generic_signals
 from fish_env.inference.estimate.fit import Fit, fit
+from fish_env.inference.estimate.free import spread_of
 from fish_env.inference.estimate.settle import evaluated
 from fish_env.inference.gain import by_window
 from fish_env.inference.problem import Problem
@@ -140,7 +141,7 @@ def residual_model(
     """
     like = forces = generic_forces(series_of(explanation).runs, explanation.filtered)
     state = _State(explanation, np.zeros(0, np.int64), np.zeros(0), np.zeros(0))
-    differing = bool(np.any(series_of(explanation).variation))
+    differing = spread_of(explanation.problem, explanation.noise).any()
     most = ROUNDS_BESIDE if explanation.effects or differing else ROUNDS
     for _ in range(most if rounds is None else rounds):
         chosen = _enlarged(state, forces, threshold)

@@ -56,7 +56,7 @@ LEVEL_PATHS = (
 """The same for steps between samples, where the mass is free too and the buoyancy follows it.
 
 The beat rolls the fish, and a camera sees that by a marker above the axis: with the roll inertia
-held, predictions of a real fish are worse by half in x and in y."""
+held, predictions of a real fish are worse by a third to a half in x and in y."""
 HELD = 1e-3
 """Share of its prior standard deviation that is left to a coefficient that is held."""
 VERTICAL = frozenset({"z", "roll", "pitch", "w", "p", "q"})

@@ -145,9 +145,7 @@ def extended(
     return settled(found, effort.retries, report)
 
 
-def settled(
-    found: Attribution, thoroughly: bool, report: Callable[[str], None] = lambda step: None
-) -> Attribution:
+def settled(found: Attribution, thoroughly: bool, report: Callable[[str], None]) -> Attribution:
     """The attribution without causes that are not needed, its estimates fitted to the end.
 
     Args:

@@ -168,7 +168,8 @@ def challenged(
 def _close(current: Explanation, shown: Screen) -> list[tuple[str, str]]:
     """Causes, each with an effect that may be in its place; first those known to look like it.
 
-    Of motion with corners the linear model tells little: there such an effect is always tried.
+    Of motion with corners the linear model tells little: there such an effect counts
+    whatever it says.
 
     Args:
         current: causes with their fit.

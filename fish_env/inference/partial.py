@@ -62,15 +62,12 @@ def confirmed(
         The causes that are left with their fit; None where none is.
     """
     measured = _measured(accepted)
-    if contradicts_priors(accepted.fit):
-        doubtful = {*accepted.causes} - measured - independent(accepted.fit)
-        if doubtful:
-            why = "coefficients contradict their priors"
-            report(f"leaving out {', '.join(sorted(doubtful))}: {why}")
-            left = without(accepted, tuple(doubtful)) if doubtful < {*accepted.causes} else None
-            if left is None:
-                return None
-            accepted = left
+    if doubtful := _dependent(accepted) - measured:
+        report(f"leaving out {', '.join(sorted(doubtful))}: coefficients contradict their priors")
+        smaller = without(accepted, doubtful) if doubtful < {*accepted.causes} else None
+        if smaller is None:
+            return None
+        accepted = smaller
     while others := [name for name in accepted.causes if name not in measured]:
         words = implausible_estimates(accepted.fit)
         weakest = _blamed(others, words)
@@ -88,6 +85,13 @@ def confirmed(
             return None
         accepted = smaller
     return accepted if accepted.causes else None
+
+
+def _dependent(found: Explanation) -> frozenset[str]:
+    """Causes that depend on coefficients which contradict their priors; none where these do not."""
+    if not contradicts_priors(found.fit):
+        return frozenset()
+    return frozenset(found.causes) - independent(found.fit)
 
 
 def owed_to_coefficients(fit: Fit) -> dict[str, float]:
@@ -109,11 +113,11 @@ def independent(fit: Fit) -> frozenset[str]:
     own = fit.extrapolated
     owed = owed_to_coefficients(own)
     error = dict(zip(own.names, np.sqrt(np.diag(own.covariance)).tolist(), strict=True))
-    found = []
-    for name in own.effects:
-        if all(abs(owed[path]) < error[path] for path in off_values(own, name)):
-            found.append(name)
-    return frozenset(found)
+    return frozenset(
+        name
+        for name in own.effects
+        if all(abs(owed[path]) < error[path] for path in off_values(own, name))
+    )
 
 
 def _measured(found: Explanation) -> frozenset[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from functools import partial
 
 import numpy as np
@@ -15,10 +15,8 @@ from fish_env.inference.parallel import side_by_side
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point
 from fish_env.inference.projection import Signal
-from fish_env.inference.search import at_noise, is_off
+from fish_env.inference.search import Report, at_noise, is_off
 from fish_env.inference.starts import baselines, probed
-
-Report = Callable[[str], None]
 
 MOST_TURNS = 6
 """Sizes from which a coarse fit is tried in turn."""

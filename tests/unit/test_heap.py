@@ -1,9 +1,12 @@
 """Freed arrays go back to the system."""
 
+import platform
 import subprocess
 import sys
 
 import pytest
+
+from fish_env.heap import give_back_large_arrays
 
 CODE = """
 import numpy as np
@@ -24,6 +27,9 @@ print(told, resident() - before)
 """
 
 
+GLIBC = platform.libc_ver()[0] == "glibc"
+
+
 def grown(told: bool) -> tuple[str, int]:
     done = subprocess.run(
         [sys.executable, "-c", CODE.format(told=told)], capture_output=True, text=True, check=True
@@ -32,7 +38,11 @@ def grown(told: bool) -> tuple[str, int]:
     return word, int(grown)
 
 
-@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="about glibc")
+def test_only_glibc_is_told():
+    assert give_back_large_arrays() == GLIBC
+
+
+@pytest.mark.skipif(not GLIBC, reason="other C libraries have no such setting")
 def test_large_arrays_are_given_back_when_they_are_freed():
     word, left = grown(True)
     assert word == "True"

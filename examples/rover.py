@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fish_env.inference.effects import DeclaredEffect, EffectParameter
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Problem
 from fish_env.inference.vehicle import Coefficients
 
@@ -13,6 +14,8 @@ EFFECTS = (
     DeclaredEffect("headwind", (EffectParameter("force", "N", 0.0, plausible=(-2.0, 2.0)),)),
     DeclaredEffect("air_drag", (EffectParameter("k", "kg/m", 0.0, 0.0, 9.0, (0.1, 1.0)),)),
 )
+WIND = EffectParameterId("headwind", "force")
+AIR = EffectParameterId("air_drag", "k")
 
 
 @dataclass(frozen=True)
@@ -74,8 +77,8 @@ class Rover(Problem):
         """Simulate N rovers at once; return their whitened residuals (N, R T)."""
         thrust, drag = self.baseline.values(z)[:, :, None]
         zero = np.zeros((z.shape[1], 1))
-        wind = effects.get("effects.headwind.force", zero).reshape(-1, 1)
-        air = effects.get("effects.air_drag.k", zero).reshape(-1, 1)
+        wind = effects.get(WIND, zero).reshape(-1, 1)
+        air = effects.get(AIR, zero).reshape(-1, 1)
         push = np.broadcast_to(push, (z.shape[1], *self.speed.shape))
         u = np.repeat(self.speed[None, :, 0], z.shape[1], axis=0)
         simulated = []
@@ -88,7 +91,7 @@ class Rover(Problem):
 
     def filtered(self, point, noise, near=()):
         """Evaluate each run at one point."""
-        effects = {path: np.array([value]) for path, value in point.effects.items()}
+        effects = {id: np.array([value]) for id, value in point.effects.items()}
         rows = self.innovations(point.z[:, None], effects, noise, ())
         runs = rows.reshape(self.speed.shape)
         return [Evaluated(-0.5 * r @ r - len(r) * np.log(noise.sd), r) for r in runs]
@@ -131,6 +134,6 @@ class Forces:
         push = np.array([np.zeros_like(push[0]), *push])
         point, fit = self.fit.point, self.fit
         z = np.repeat(point.z[:, None], len(push), axis=1)
-        effects = {path: np.full(len(push), value) for path, value in point.effects.items()}
+        effects = {id: np.full(len(push), value) for id, value in point.effects.items()}
         rows = self.rover.innovations(z, effects, fit.noise, fit.filtered, push)
         return (rows[1:] - rows[0]).T

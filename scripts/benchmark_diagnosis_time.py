@@ -129,9 +129,9 @@ def make(case: Experiment, folder: Path) -> None:
 
 def fewer(causes: Sequence[Any], effects: int | None) -> tuple[Any, ...]:
     """All coefficients, the hidden effect, and as many others as are wanted."""
-    names = sorted((c.name for c in causes if c.is_effect), key=lambda name: name not in HIDDEN)
+    names = sorted((c.id for c in causes if c.is_effect), key=lambda name: name not in HIDDEN)
     kept = names[:effects]
-    return tuple(cause for cause in causes if not cause.is_effect or cause.name in kept)
+    return tuple(cause for cause in causes if not cause.is_effect or cause.id in kept)
 
 
 def table(rows: Sequence[dict[str, Any]]) -> str:

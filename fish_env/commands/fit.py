@@ -104,7 +104,7 @@ def print_fit(console: Console, result: DatasetFit) -> None:
         f"condition number {result.fit.condition:.2g}"
     )
     if result.fit.at_bounds:
-        console.print(f"at a bound: {', '.join(result.fit.at_bounds)}")
+        console.print(f"at a bound: {', '.join(map(str, result.fit.at_bounds))}")
     if result.unseen:
         console.print(f"not fitted, as these runs do not show it: {', '.join(result.unseen)}")
     for step in result.steps:

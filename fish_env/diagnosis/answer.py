@@ -33,6 +33,7 @@ from fish_env.inference.effort import effort_of
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.free import least_of, spread_of
 from fish_env.inference.estimate.run_variation import shown_spread
+from fish_env.inference.hypotheses import name_of
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import coefficient_sizes
 from fish_env.inference.screening import smallest_detectable
@@ -67,7 +68,7 @@ def shared_entries(diagnosis: Diagnosed) -> Plain:
     """What ``diagnosis.json`` holds of every diagnosis."""
     verdict, attribution = diagnosis.verdict, diagnosis.attribution
     alternatives = [
-        [cause_entry(rival.fit, name) for name in rival.causes]
+        [cause_entry(rival.fit, cause) for cause in rival.causes]
         for rival in attribution.rivals
         if rival.causes in verdict.alternatives
     ]
@@ -82,7 +83,7 @@ def shared_entries(diagnosis: Diagnosed) -> Plain:
         "policy": POLICY.as_dict(),
         "runtime_s": diagnosis.runtime_s,
         "verdict": verdict.name,
-        "causes": [cause_entry(diagnosis.accepted, name) for name in verdict.causes],
+        "causes": [cause_entry(diagnosis.accepted, cause) for cause in verdict.causes],
         "alternatives": alternatives,
         "parameters": coefficient_entries(diagnosis.accepted, sizes),
         "run_variation": run_variation_entry(diagnosis.accepted),
@@ -105,7 +106,7 @@ def _beats(dataset: Dataset) -> Plain:
 
 
 def _rank(ranked: Ranked) -> Plain:
-    return {"name": ranked.name, "score": ranked.score, "ci95": list(ranked.interval)}
+    return {"name": name_of(ranked.cause), "score": ranked.score, "ci95": list(ranked.interval)}
 
 
 def _noise(fit: Fit) -> Plain:

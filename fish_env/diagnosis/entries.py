@@ -14,11 +14,16 @@ from fish_env.arrays import FloatArray
 from fish_env.diagnosis.gain import Gain, Pair
 from fish_env.diagnosis.next_experiment import Proposal
 from fish_env.diagnosis.residual_model import ResidualModel, Term
-from fish_env.effects.extended import PREFIX
 from fish_env.identification.generic_forces import wrench_unit
 from fish_env.identification.noise_model import NoiseModel
 from fish_env.inference.budget import Budget
-from fish_env.inference.hypotheses import PARAMETER
+from fish_env.inference.hypotheses import (
+    CauseId,
+    Coefficient,
+    EffectParameterId,
+    ParameterId,
+    name_of,
+)
 from fish_env.inference.preconditions import Precondition
 from fish_env.inference.vehicle import Coefficients, Effect
 
@@ -46,57 +51,55 @@ class Identified(Protocol):
         """What was fitted."""
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Free parameters, (n,), baseline paths first."""
+    def ids(self) -> tuple[ParameterId, ...]:
+        """Free parameters, (n,), coefficients first."""
 
     @property
     def estimates(self) -> FloatArray:
         """(n,) in physical units."""
 
-    def interval(self, name: str, /) -> tuple[float, float]:
+    def interval(self, parameter: ParameterId, /) -> tuple[float, float]:
         """95 % interval of one of them."""
 
 
-def cause_entry(fit: Identified, name: str) -> Plain:
+def cause_entry(fit: Identified, cause: CauseId) -> Plain:
     """A cause with its parameters: estimate, interval, unit."""
-    if name.startswith(PARAMETER):
-        path = name.removeprefix(PARAMETER)
-        units: Mapping[str, tuple[str, str]] = {"value": (path, fit.problem.baseline.unit(path))}
+    if isinstance(cause, Coefficient):
+        entries = {"value": _estimate(fit, cause, fit.problem.baseline.unit(cause))}
     else:
-        parameters = fit.problem.known[name].parameters
-        units = {p.name: (f"{PREFIX}{name}.{p.name}", p.unit) for p in parameters}
-    return {
-        "name": name,
-        "parameters": {key: _estimate(fit, path, unit) for key, (path, unit) in units.items()},
-    }
+        parameters = fit.problem.known[cause].parameters
+        entries = {
+            p.name: _estimate(fit, EffectParameterId(cause, p.name), p.unit) for p in parameters
+        }
+    return {"name": name_of(cause), "parameters": entries}
 
 
-def _estimate(fit: Identified, path: str, unit: str) -> Plain:
-    value = float(fit.estimates[fit.names.index(path)])
-    return {"estimate": value, "ci95": list(fit.interval(path)), "unit": unit}
+def _estimate(fit: Identified, parameter: ParameterId, unit: str) -> Plain:
+    value = float(fit.estimates[fit.ids.index(parameter)])
+    return {"estimate": value, "ci95": list(fit.interval(parameter)), "unit": unit}
 
 
-def coefficient_entries(fit: Identified, detectable: Mapping[str, float]) -> list[Plain]:
+def coefficient_entries(fit: Identified, detectable: Mapping[Coefficient, float]) -> list[Plain]:
     """Every baseline coefficient: nominal, estimated, and how surprising under its prior.
 
     Args:
         fit: estimates.
-        detectable: path -> how far off it would be found, in prior standard deviations; a path
+        detectable: coefficient -> how far off it would be found, in prior standard deviations; one
             that is missing cannot be found.
     """
     baseline = fit.problem.baseline
     return [
         {
-            "name": f"{PARAMETER}{path}",
+            "name": name_of(one),
             "nominal": float(baseline.mean[i]),
             "estimate": float(fit.estimates[i]),
-            "ci95": list(fit.interval(path)),
+            "ci95": list(fit.interval(one)),
             "prior_sd": float(baseline.sd[i]),
             "prior_sds_off": float((fit.estimates[i] - baseline.mean[i]) / baseline.sd[i]),
-            "smallest_detectable": _in_units(detectable.get(path), float(baseline.sd[i])),
-            "unit": baseline.unit(path),
+            "smallest_detectable": _in_units(detectable.get(one), float(baseline.sd[i])),
+            "unit": baseline.unit(one),
         }
-        for i, path in enumerate(baseline.paths)
+        for i, one in enumerate(baseline.ids)
     ]
 
 

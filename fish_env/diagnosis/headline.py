@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from fish_env.inference.hypotheses import PARAMETER
+from fish_env.inference.hypotheses import short_name
 from fish_env.inference.policy import POLICY
 
 Answer = Mapping[str, Any]
@@ -85,7 +85,7 @@ def _verdict(answer: Answer) -> str:
 
 
 def _cause(cause: Answer) -> str:
-    name = cause["name"].removeprefix(PARAMETER)
+    name = short_name(cause["name"])
     values = [
         f"{'' if key == 'value' else key.replace('_', ' ') + ' '}{p['estimate']:.3g} "
         f"{'' if p['unit'] in ('-', '1') else p['unit']}".strip()

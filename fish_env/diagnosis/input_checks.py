@@ -15,6 +15,7 @@ from fish_env.errors import DatasetError
 from fish_env.identification.channels import body_channels, usable_channels
 from fish_env.identification.recorded import recorded_run
 from fish_env.identification.series import SeriesProblem
+from fish_env.inference.hypotheses import short_name
 from fish_env.inference.policy import POLICY
 from fish_env.rigidbody.recording_faults import check_clock_jumps, check_stuck
 
@@ -134,9 +135,7 @@ def _far_coefficients(parameters: Sequence[Mapping[str, Any]]) -> str:
     if not far:
         return ""
     far.sort(key=lambda p: -abs(p["prior_sds_off"]))
-    named = ", ".join(
-        f"{p['name'].removeprefix('parameter:')} by {abs(p['prior_sds_off']):.0f}" for p in far[:3]
-    )
+    named = ", ".join(f"{short_name(p['name'])} by {abs(p['prior_sds_off']):.0f}" for p in far[:3])
     return (
         "The refit moved coefficients much further than their priors allow, in standard deviations "
         f"{named}. Perhaps the parameter file is of another fish, or the fish was rebuilt: check "

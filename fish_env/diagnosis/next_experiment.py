@@ -20,7 +20,7 @@ from fish_env.identification.runs import RunData
 from fish_env.identification.series import SeriesProblem, series_of
 from fish_env.inference.attribution import Attribution
 from fish_env.inference.estimate.fit import Fit
-from fish_env.inference.hypotheses import effects_of
+from fish_env.inference.hypotheses import CauseId, EffectParameterId, effects_of, listed
 from fish_env.inference.preconditions import Precondition
 from fish_env.inference.probes import effect_values
 from fish_env.inference.problem import Point, Problem
@@ -87,7 +87,7 @@ def best_of(
 
 def rivals_of(
     verdict: Verdict,
-    others: Mapping[tuple[str, ...], Point],
+    others: Mapping[tuple[CauseId, ...], Point],
     shown: Sequence[Precondition],
     plausible: Callable[[str], Point],
 ) -> dict[str, Point]:
@@ -100,7 +100,7 @@ def rivals_of(
         plausible: the present explanation with an effect at a plausible size.
     """
     if verdict.name == "ambiguous":
-        return {" + ".join(causes): point for causes, point in others.items()}
+        return {listed(causes, " + "): point for causes, point in others.items()}
     if verdict.name not in ("no_misfit", "not_excited"):
         return {}
     return {p.name: plausible(p.name) for p in shown if not p.excited}
@@ -119,8 +119,8 @@ def plausible_sizes(effect: Effect) -> dict[str, float]:
 def plausible(fit: Fit, name: str) -> Point:
     """The present explanation with an effect at a plausible size."""
     values = effect_values(fit.problem, name, plausible_sizes(fit.problem.known[name]))
-    bounds = {f.path: (f.lower, f.upper) for f in fit.problem.freedoms([name])}
-    clipped = {path: float(np.clip(value, *bounds[path])) for path, value in values.items()}
+    bounds = {f.id: (f.lower, f.upper) for f in fit.problem.freedoms([name])}
+    clipped = {id: float(np.clip(value, *bounds[id])) for id, value in values.items()}
     return Point(fit.point.z, {**fit.point.effects, **clipped})
 
 
@@ -170,13 +170,12 @@ def information_of(fit: Fit) -> FloatArray:
     return np.asarray(slopes.T @ slopes + np.eye(count))
 
 
-def _lanes(problem: Problem, points: Sequence[Point]) -> tuple[FloatArray, dict[str, FloatArray]]:
-    paths = list(dict.fromkeys(path for point in points for path in point.effects))
-    neutral = problem.neutral(effects_of(paths))
-    effects = {
-        path: np.array([point.effects.get(path, neutral[path]) for point in points])
-        for path in paths
-    }
+def _lanes(
+    problem: Problem, points: Sequence[Point]
+) -> tuple[FloatArray, dict[EffectParameterId, FloatArray]]:
+    ids = list(dict.fromkeys(id for point in points for id in point.effects))
+    neutral = problem.neutral(effects_of(ids))
+    effects = {id: np.array([point.effects.get(id, neutral[id]) for point in points]) for id in ids}
     return np.column_stack([point.z for point in points]), effects
 
 

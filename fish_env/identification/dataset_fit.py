@@ -28,7 +28,7 @@ from fish_env.identification.objectives import (
     objective_named,
 )
 from fish_env.inference.estimate.fit import Fit
-from fish_env.inference.hypotheses import PREFIX, effect_of, effects_of, parameter_of
+from fish_env.inference.hypotheses import Coefficient
 from fish_env.params.io import load_fish, save_fish
 from fish_env.params.schema import FishParams
 from fish_env.version import versioned
@@ -95,7 +95,7 @@ class DatasetFit:
     @property
     def unseen(self) -> tuple[str, ...]:
         """Effects that were asked for, of which the runs show no parameter."""
-        free = effects_of(e.name for e in self.estimates if e.name.startswith(PREFIX))
+        free = {id.effect for id in self.fit.ids if not isinstance(id, Coefficient)}
         return tuple(name for name in self.effects if name not in free)
 
     @property
@@ -206,7 +206,7 @@ def _result(
     problem = found.problem
     own = objective.errors(problem, found)
     errors = tuple(RunErrors(i, None, e) for i, e in zip(problem.run_ids, own, strict=True))
-    estimates = [_estimate(found, i) for i in range(len(found.names))]
+    estimates = [_estimate(found, i) for i in range(len(found.ids))]
     units = {quantity: objective.unit(quantity) for quantity in mean_errors(errors)}
     return DatasetFit(
         name, objective.name, found.effects, found, objective.fish(found, f"{name}-identified"),
@@ -215,19 +215,18 @@ def _result(
 
 
 def _estimate(found: Fit, i: int) -> Estimate:
-    name, value = found.names[i], float(found.estimates[i])
-    low, high = found.interval(name)
+    id, value = found.ids[i], float(found.estimates[i])
+    low, high = found.interval(id)
     baseline, known = found.problem.baseline, catalogue()
-    if name.startswith(PREFIX):
-        parameters = {p.name: p for p in known[effect_of(name)].parameters}
-        parameter = parameters[parameter_of(name)]
-        lower, upper, unit = parameter.lower, parameter.upper, parameter.unit
-        before = found.problem.neutral([effect_of(name)])[name]
-        moved = None
-    else:
-        at = baseline.paths.index(name)
+    moved = None
+    if isinstance(id, Coefficient):
+        at = baseline.ids.index(id)
         lower, upper = (float(bound[at]) for bound in baseline.bounds)
-        unit, before = baseline.unit(name), float(baseline.mean[at])
+        unit, before = baseline.unit(id), float(baseline.mean[at])
         moved = (value - before) / float(baseline.sd[at])
+    else:
+        parameter = next(p for p in known[id.effect].parameters if p.name == id.name)
+        lower, upper, unit = parameter.lower, parameter.upper, parameter.unit
+        before = found.problem.neutral([id.effect])[id]
     low, high = max(low, lower), min(high, upper)
-    return Estimate(name, unit, before, value, low, high, moved, name in found.at_bounds)
+    return Estimate(str(id), unit, before, value, low, high, moved, id in found.at_bounds)

@@ -27,6 +27,7 @@ from fish_env.identification.variation import (
     varied_delay,
     varied_records,
 )
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.model.history import history_rows
 from fish_env.model.runtime import Kernels, kernels
 from fish_env.model.state import BASE_STATES
@@ -38,7 +39,6 @@ from fish_env.threads import default_threads
 
 POSITIONS = {"x": 0, "y": 1, "z": 2}
 TAIL_PHASE = 13  # row of the state
-WAVE_PHASE = "effects.wave.phase"
 CORRECTIONS = 4
 """Each leaves a tenth or less of the error of a start."""
 TEMPLATES = tuple(
@@ -169,7 +169,7 @@ class RunFilter:
         self.channels = tuple(channels)
         self.codes = codes_of(channels)
         self.kernels = filter_kernels(model)
-        self.wave_row = model.row_of(WAVE_PHASE)
+        self.wave_row = model.row_of(str(EffectParameterId("wave", "phase")))
 
     @cached_property
     def rates(self) -> list[FloatArray]:

@@ -17,6 +17,7 @@ from fish_env.identification.filtering import Filtered, Pushes
 from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.runs import RunData
 from fish_env.inference.estimate.fit import Fit
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.sensing.channels import channels_from_states
 
 DIRECTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
@@ -85,7 +86,7 @@ class Prodded(Protocol):
     def changes(
         self,
         z: FloatArray,
-        effects: Mapping[str, FloatArray],
+        effects: Mapping[EffectParameterId, FloatArray],
         noise: NoiseModel,
         filtered: Sequence[Filtered],
         pushes: Pushes | None = None,
@@ -127,7 +128,7 @@ class BoundForces:
         """
         fit, count = self.fit, 1 + len(columns)  # the first gets none
         z = np.repeat(fit.point.z[:, None], count, axis=1)
-        effects = {path: np.full(count, value) for path, value in fit.point.effects.items()}
+        effects = {id: np.full(count, value) for id, value in fit.point.effects.items()}
         pushes = Pushes(self.forces.bases, np.r_[0, columns], np.r_[0.0, probes(columns)])
 
         def pushed(problem: Any) -> FloatArray:

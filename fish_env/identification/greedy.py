@@ -16,6 +16,7 @@ from fish_env.identification.objectives import Objective
 from fish_env.identification.whole_runs.problem import WholeRunProblem
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.explanation import reached
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point, Problem
 
 MOST_EFFECTS = 6
@@ -123,12 +124,12 @@ def _leaders(
     return [(name, point) for _, name, point in found[:FINALISTS]]
 
 
-def _switched_on(problem: Problem, name: str) -> dict[str, float]:
+def _switched_on(problem: Problem, name: str) -> dict[EffectParameterId, float]:
     """Values of an effect a little away from neutral, where many an effect is flat."""
     values = problem.beginning([name])
     for p in problem.known[name].parameters:
-        path = next(v for v in values if v.endswith(f".{p.name}"))
-        values[path] += 0.3 * (p.far_end(values[path]) - values[path])
+        id = EffectParameterId(name, p.name)
+        values[id] += 0.3 * (p.far_end(values[id]) - values[id])
     return values
 
 

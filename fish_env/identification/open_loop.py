@@ -12,6 +12,7 @@ from fish_env.arrays import FloatArray
 from fish_env.identification.filtering import Filtered
 from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.runs import RunData
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
 from fish_env.model.state import BASE_STATES
 
@@ -21,14 +22,14 @@ class Predicting(Protocol):
 
     runs: tuple[RunData, ...]
 
-    def refines_steps(self, effects: Iterable[str]) -> bool:
+    def refines_steps(self, effects: Iterable[EffectParameterId]) -> bool:
         """Whether one of these effect parameters makes the tail's rate jump."""
         ...
 
     def innovations(
         self,
         z: FloatArray,
-        effects: Mapping[str, FloatArray],
+        effects: Mapping[EffectParameterId, FloatArray],
         noise: NoiseModel,
         filtered: Sequence[Filtered],
     ) -> FloatArray:
@@ -66,7 +67,7 @@ def without_feedback(
 
 def errors(problem: Predicting, point: Point, noise: NoiseModel) -> list[FloatArray]:
     """Measured minus predicted of each run from its initial state, (T, C), NaN where missing."""
-    effects = {path: np.array([value]) for path, value in point.effects.items()}
+    effects = {id: np.array([value]) for id, value in point.effects.items()}
     corners = problem.refines_steps(point.effects)
     still = [without_feedback(run, corners=corners) for run in problem.runs]
     flat = problem.innovations(point.z[:, None], effects, noise, still)[0]

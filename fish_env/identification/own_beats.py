@@ -23,6 +23,7 @@ from fish_env.identification.runs import PHASE, RunData
 from fish_env.identification.series import SeriesProblem
 from fish_env.identification.tail_drive import RATE, SCALE, TailDrive
 from fish_env.identification.variation import USUAL_BEAT, USUAL_SAG
+from fish_env.inference.hypotheses import EffectParameterId
 
 COARSE: FloatArray = np.asarray(1.0 + np.arange(-24, 25) * 5e-3)
 """Frequencies over the commanded one of all runs together, tried on their beginnings."""
@@ -187,7 +188,9 @@ def _with_free_phase(run: RunData) -> RunData:
     return replace(run, covariance0=covariance)
 
 
-def _left(problem: SeriesProblem, comb: Mapping[str, FloatArray]) -> FloatArray | None:
+def _left(
+    problem: SeriesProblem, comb: Mapping[EffectParameterId, FloatArray]
+) -> FloatArray | None:
     """Squared innovations (n, R) that each tooth of a comb leaves in each run; None if none can be.
 
     Args:
@@ -203,7 +206,7 @@ def _left(problem: SeriesProblem, comb: Mapping[str, FloatArray]) -> FloatArray 
         return None
     count = len(next(iter(comb.values())))
     z = np.repeat(begin.z[:, None], count, axis=1)
-    held = {path: np.full(count, value) for path, value in begin.effects.items()}
+    held = {id: np.full(count, value) for id, value in begin.effects.items()}
     if RATE in comb:
         comb = {**comb, RATE: held[RATE] + comb[RATE]}
     rows = settled.innovations(z, {**held, **comb}, noise, filtered)

@@ -9,10 +9,10 @@ import numpy as np
 from fish_env.arrays import FloatArray
 from fish_env.data.schema import Dataset
 from fish_env.data.vocabulary import COMMANDS
-from fish_env.effects.extended import PREFIX, ExtendedModel
+from fish_env.effects.extended import ExtendedModel
 from fish_env.errors import ParameterError
 from fish_env.identification.filtering import Measurement
-from fish_env.inference.hypotheses import effects_of
+from fish_env.inference.hypotheses import Coefficient, EffectParameterId, effects_of
 from fish_env.inference.vehicle import Coefficients
 from fish_env.model.effect import Effect
 from fish_env.params.packing import PATHS
@@ -20,7 +20,7 @@ from fish_env.params.schema import FishParams
 from fish_env.sensing.devices import Device
 from fish_env.sensing.measurement import device_ages_s
 
-ALIKE = (frozenset({"body.plane_xz.drag.c0", "body.plane_xy.drag.c0"}),)
+ALIKE = (frozenset(map(Coefficient, ("body.plane_xz.drag.c0", "body.plane_xy.drag.c0"))),)
 """Coefficients that act alike: both planes' drags at zero incidence brake along the fish."""
 
 PLANAR_PATHS = (
@@ -128,12 +128,12 @@ def _with_held(covariance: FloatArray, held: Sequence[int]) -> FloatArray:
 
 def neutral_values(
     model: ExtendedModel, known: Mapping[str, Effect], names: Iterable[str]
-) -> dict[str, float]:
+) -> dict[EffectParameterId, float]:
     """Parameters of effects as the fish's file has them, neutral where it says nothing."""
-    values: dict[str, float] = {}
+    values: dict[EffectParameterId, float] = {}
     for name in names:
         own = model.effects.get(name, known[name].neutral)
-        values |= {f"{PREFIX}{name}.{p}": v for p, v in own.items()}
+        values |= {EffectParameterId(name, p): v for p, v in own.items()}
     return values
 
 
@@ -142,10 +142,10 @@ def changes_of(
     known: Mapping[str, Effect],
     baseline: Coefficients,
     z: FloatArray,
-    effects: Mapping[str, FloatArray],
+    effects: Mapping[EffectParameterId, FloatArray],
     channels: Sequence[str],
 ) -> tuple[dict[str, FloatArray], Measurement]:
-    """Values of parameters by path, each (N,), and what the sensors do, for N points.
+    """Values of parameters by their text, each (N,), and what the sensors do, for N points.
 
     Args:
         model: the fish.
@@ -158,7 +158,7 @@ def changes_of(
     values = dict(zip(baseline.paths, baseline.values(z), strict=True))
     names = effects_of(effects)
     moving = {n for n in names if known[n].acts_on_motion}
-    values |= {path: own for path, own in effects.items() if effects_of([path]) <= moving}
+    values |= {str(id): own for id, own in effects.items() if id.effect in moving}
     sensing = [known[n] for n in sorted(names - moving)]
     own = [e for e in model.measurement if e.name not in names]
     return values, measurement_of(model, [*own, *sensing], effects, channels, z.shape[1])
@@ -167,7 +167,7 @@ def changes_of(
 def measurement_of(
     model: ExtendedModel,
     effects: Sequence[Effect],
-    values: Mapping[str, FloatArray],
+    values: Mapping[EffectParameterId, FloatArray],
     channels: Sequence[str],
     count: int,
 ) -> Measurement:
@@ -179,7 +179,7 @@ def measurement_of(
     Args:
         model: unused effects of the model keep their own values.
         effects: measurement effects in play.
-        values: ``effects.<name>.<parameter>`` -> (count,).
+        values: effect parameter -> (count,).
         channels: measured channels.
         count: number of lanes.
     """
@@ -190,7 +190,7 @@ def measurement_of(
     for effect in effects:
         base = model.effects.get(effect.name, effect.neutral)
         own = {
-            p: np.broadcast_to(values.get(f"{PREFIX}{effect.name}.{p}", base[p]), (count,))
+            p: np.broadcast_to(values.get(EffectParameterId(effect.name, p), base[p]), (count,))
             for p in base
         }
         if effect.sample_time is not None:

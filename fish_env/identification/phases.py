@@ -18,6 +18,7 @@ from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.runs import FREQUENCY, RunData
 from fish_env.identification.state_blocks import PHASE_COLUMN
 from fish_env.identification.variation import START
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
 
 COARSE = np.arange(24, dtype=np.float64) * (np.pi / 12.0)
@@ -42,11 +43,11 @@ class Filtering(Protocol):
         """Parameter record (parameters, 1) of a point, and what its sensors do."""
         ...
 
-    def filter_for(self, effects: Iterable[str]) -> RunFilter:
+    def filter_for(self, effects: Iterable[EffectParameterId]) -> RunFilter:
         """The quickest filter that computes with these effect parameters."""
         ...
 
-    def refines_steps(self, effects: Iterable[str]) -> bool:
+    def refines_steps(self, effects: Iterable[EffectParameterId]) -> bool:
         """Whether one of these effect parameters makes the tail's rate jump."""
         ...
 

@@ -40,7 +40,7 @@ from fish_env.identification.variation import EVERY, USUAL, VARIATIONS
 from fish_env.identification.variation_slopes import swum_slopes
 from fish_env.identification.wave_phases import settle_wave_phases
 from fish_env.inference.estimate.fit import Fit
-from fish_env.inference.hypotheses import effects_of
+from fish_env.inference.hypotheses import EffectParameterId, effect_names, effects_of
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import phase_grid
 from fish_env.inference.problem import Point, Problem
@@ -67,7 +67,7 @@ class SeriesProblem(Problem):
     known: dict[str, Effect]
     drive: TailDrive
     hidden_by_drive = LATE
-    out_of_step = ("frequency_scale", "battery_sag", "clock_scale", "clock_skew")
+    out_of_step = effect_names("frequency_scale", "battery_sag", "clock_scale", "clock_skew")
     interchangeable = ALIKE
     variations = EVERY
 
@@ -105,14 +105,9 @@ class SeriesProblem(Problem):
         """Compiled filter on these runs without effects on the motion."""
         return self._filter_of(LEAN)
 
-    def filter_for(self, effects: Iterable[str]) -> RunFilter:
+    def filter_for(self, effects: Iterable[EffectParameterId]) -> RunFilter:
         """The quickest filter that computes with these effect parameters."""
-        return self._filter_of(self.stages_for(effects))
-
-    def stages_for(self, effects: Iterable[str]) -> frozenset[str]:
-        """Stages in the quickest kernel that computes with these effect parameters."""
-        names = {*effects_of(effects), *self.model.effects}
-        return quickest({stage for name in names for stage in self.known[name].needs})
+        return self._filter_of(self.batch_key(effects_of(effects)))
 
     def _filter_of(self, stages: frozenset[str]) -> RunFilter:
         if stages not in self._filters:
@@ -128,7 +123,7 @@ class SeriesProblem(Problem):
         """The same problem on other runs."""
         return self._but(runs=tuple(runs), _filters={})
 
-    def neutral(self, names: Iterable[str]) -> dict[str, float]:
+    def neutral(self, names: Iterable[str]) -> dict[EffectParameterId, float]:
         """Values of effects as the fish's file has them, neutral where it says nothing."""
         return neutral_values(self.model, self.known, names)
 
@@ -251,9 +246,10 @@ class SeriesProblem(Problem):
         """The same problem, told how the tail beats."""
         return self._but(drive=drive)
 
-    def batch_key(self, effects: Iterable[str]) -> frozenset[str]:
-        """Stages of the quickest kernel."""
-        return self.stages_for(effects)
+    def batch_key(self, names: Iterable[str]) -> frozenset[str]:
+        """Stages of the quickest kernel that computes with these effects."""
+        every = {*names, *self.model.effects}
+        return quickest({stage for name in every for stage in self.known[name].needs})
 
     @property
     def variation(self) -> FloatArray:
@@ -291,7 +287,7 @@ class SeriesProblem(Problem):
     def innovations(
         self,
         z: FloatArray,
-        effects: Mapping[str, FloatArray],
+        effects: Mapping[EffectParameterId, FloatArray],
         noise: NoiseModel,
         filtered: Sequence[Filtered],
         pushes: Pushes | None = None,
@@ -311,7 +307,7 @@ class SeriesProblem(Problem):
     def changes(
         self,
         z: FloatArray,
-        effects: Mapping[str, FloatArray],
+        effects: Mapping[EffectParameterId, FloatArray],
         noise: NoiseModel,
         filtered: Sequence[Filtered],
         pushes: Pushes | None = None,
@@ -349,7 +345,7 @@ class SeriesProblem(Problem):
             return self
         return self.with_runs([run.in_usual_steps() for run in self.runs])._but(unrefined=False)
 
-    def is_coarse(self, effects: Iterable[str]) -> bool:
+    def is_coarse(self, effects: Iterable[EffectParameterId]) -> bool:
         """Whether steps are longer than these effect parameters need (see the protocol)."""
         finer = self.unrefined and self.is_nonsmooth({*effects_of(effects), *self.model.effects})
         return finer or any(run.usual_substeps is not None for run in self.runs)
@@ -367,7 +363,7 @@ class SeriesProblem(Problem):
         """The same problem in finer steps, to tell what those of motion with corners get wrong."""
         return self.with_runs([run.in_finer_steps() for run in self.runs]), FINER
 
-    def refines_steps(self, effects: Iterable[str]) -> bool:
+    def refines_steps(self, effects: Iterable[EffectParameterId]) -> bool:
         """Whether one of these effect parameters makes the tail's rate jump."""
         return not self.unrefined and self.is_nonsmooth({*effects_of(effects), *self.model.effects})
 
@@ -380,7 +376,7 @@ class SeriesProblem(Problem):
         return self.lanes(point.z[:, None], {k: np.array([v]) for k, v in point.effects.items()})
 
     def lanes(
-        self, z: FloatArray, effects: Mapping[str, FloatArray]
+        self, z: FloatArray, effects: Mapping[EffectParameterId, FloatArray]
     ) -> tuple[FloatArray, Measurement]:
         """Parameter records (parameters, N) and what the sensors do, for N points."""
         own = self.model, self.known, self.baseline

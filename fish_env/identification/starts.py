@@ -8,6 +8,7 @@ import numpy as np
 
 from fish_env.identification.series import SeriesProblem
 from fish_env.inference.estimate.fit import objective_at
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
 from fish_env.model.effect import Effect
 
@@ -43,5 +44,5 @@ def _moved(point: Point, effect: Effect, share: float) -> Point:
                 value = p.neutral - share * (low - p.neutral)
         else:
             value = low + (high - low) * (1.0 - abs(share))
-        values[f"effects.{effect.name}.{p.name}"] = float(np.clip(value, p.lower, p.upper))
+        values[EffectParameterId(effect.name, p.name)] = float(np.clip(value, p.lower, p.upper))
     return Point(point.z, values)

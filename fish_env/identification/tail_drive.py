@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from fish_env.inference.hypotheses import EffectParameterId, effect_names
 from fish_env.inference.vehicle import Drive
 from fish_env.model.effect import Effect
 
-SCALE = "effects.frequency_scale.scale"
-RATE = "effects.battery_sag.rate"
-LATE = ("servo_lag", "servo_delay", "servo_rate_limit", "tail_flexibility", "wake_memory")
+SCALE = EffectParameterId("frequency_scale", "scale")
+RATE = EffectParameterId("battery_sag", "rate")
+LATE = effect_names(
+    "servo_lag", "servo_delay", "servo_rate_limit", "tail_flexibility", "wake_memory"
+)
 """Effects that make the tail or its force late."""
 ORDINARY = 4e-3
 """Share of the beat that a servo is off by, usually."""
@@ -24,10 +27,10 @@ class TailDrive(Drive):
     """How the tail departs from its commands in all runs.
 
     Attributes:
-        measured: ``effects.<name>.<parameter>`` -> about its value; empty where no beat is clear.
+        measured: effect parameter -> about its value; empty where no beat is clear.
     """
 
-    measured: Mapping[str, float] = field(default_factory=dict)
+    measured: Mapping[EffectParameterId, float] = field(default_factory=dict)
 
     @property
     def scale(self) -> float:
@@ -45,7 +48,7 @@ class TailDrive(Drive):
             scale: beat over the commanded frequency at the start; 1 for what is ordinary.
             rate: share of it lost each second (1/s); 0 likewise.
         """
-        others = {path: value for path, value in self.measured.items() if path != RATE}
+        others = {id: value for id, value in self.measured.items() if id != RATE}
         sag = {RATE: rate} if rate else {}
         return tail_drive({**others, SCALE: scale, **sag}, self.certain, uneven=True)
 
@@ -64,7 +67,7 @@ class TailDrive(Drive):
 
 
 def tail_drive(
-    measured: Mapping[str, float], certain: bool = False, uneven: bool = False
+    measured: Mapping[EffectParameterId, float], certain: bool = False, uneven: bool = False
 ) -> TailDrive:
     """What is known of the beat, and which effects put a model in step with it.
 
@@ -73,7 +76,7 @@ def tail_drive(
     step, so that the ratio itself is where a fit begins.
 
     Args:
-        measured: ``effects.<name>.<parameter>`` -> about its value.
+        measured: effect parameter -> about its value.
         certain: whether chance is ruled out for what was measured.
         uneven: whether single runs differ; what is ordinary is then in the runs' own beats.
     """

@@ -14,7 +14,7 @@ from fish_env.identification.runs import RunData
 from fish_env.identification.tail_drive import RATE, SCALE, TailDrive
 from fish_env.identification.variation import BEAT, SAG, unseen
 from fish_env.inference.estimate.free import LARGEST_SLOPE
-from fish_env.inference.hypotheses import effects_of
+from fish_env.inference.hypotheses import EffectParameterId, effects_of
 from fish_env.inference.problem import Point
 
 
@@ -25,17 +25,17 @@ class Swimming(Protocol):
     channels: tuple[str, ...]
     drive: TailDrive
 
-    def neutral(self, names: Iterable[str]) -> dict[str, float]:
+    def neutral(self, names: Iterable[str]) -> dict[EffectParameterId, float]:
         """Values of effects as the fish's file has them, neutral where it says nothing."""
         ...
 
     def lanes(
-        self, z: FloatArray, effects: Mapping[str, FloatArray]
+        self, z: FloatArray, effects: Mapping[EffectParameterId, FloatArray]
     ) -> tuple[FloatArray, Measurement]:
         """Parameter records (parameters, N) and what the sensors do, for N points."""
         ...
 
-    def filter_for(self, effects: Iterable[str]) -> RunFilter:
+    def filter_for(self, effects: Iterable[EffectParameterId]) -> RunFilter:
         """The quickest filter that computes with these effect parameters."""
         ...
 
@@ -62,7 +62,7 @@ def swum_slopes(
     count = 1 + len(steps)
     beats = effects_of((SCALE, RATE)) if problem.drive.uneven else ()
     told = {**problem.neutral(beats), **point.effects}
-    effects = {path: np.full(count, value) for path, value in told.items()}
+    effects = {id: np.full(count, value) for id, value in told.items()}
     if problem.drive.uneven:
         effects[SCALE][1 + BEAT] *= 1.0 + steps[BEAT]
         effects[RATE][1 + SAG] += steps[SAG]

@@ -18,9 +18,10 @@ from fish_env.identification.filtering import Filtered, Measurement, RunFilter
 from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.runs import RunData
 from fish_env.identification.variation import COUNT, WAVE
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
 
-AMPLITUDE = "effects.wave.amplitude"
+AMPLITUDE = EffectParameterId("wave", "amplitude")
 TURNS = np.arange(12, dtype=np.float64) * (np.pi / 6.0)
 """Tried beside a run's own phase (rad): a fit comes from half of such a step to any phase."""
 
@@ -31,12 +32,12 @@ class Waving(Protocol):
     runs: tuple[RunData, ...]
 
     def lanes(
-        self, z: FloatArray, effects: Mapping[str, FloatArray]
+        self, z: FloatArray, effects: Mapping[EffectParameterId, FloatArray]
     ) -> tuple[FloatArray, Measurement]:
         """Parameter records (parameters, N) and what the sensors do, for N points."""
         ...
 
-    def filter_for(self, effects: Iterable[str]) -> RunFilter:
+    def filter_for(self, effects: Iterable[EffectParameterId]) -> RunFilter:
         """The quickest filter that computes with these effect parameters."""
         ...
 
@@ -68,7 +69,7 @@ def settle_wave_phases(problem: W, point: Point, noise: NoiseModel) -> W:
     count = len(TURNS)
     more = np.zeros((COUNT, count))
     more[WAVE] = TURNS
-    effects = {path: np.full(count, value) for path, value in point.effects.items()}
+    effects = {id: np.full(count, value) for id, value in point.effects.items()}
     lanes = problem.lanes(np.repeat(point.z[:, None], count, axis=1), effects)
     filtered = problem.filtered(point, noise)
     judge = problem.filter_for(effects)

@@ -10,11 +10,11 @@ import numpy as np
 
 from fish_env.arrays import FloatArray
 from fish_env.data.vocabulary import COMMANDS
-from fish_env.effects.extended import PREFIX
 from fish_env.identification.series import SeriesProblem
 from fish_env.identification.tables.problem import TableProblem
 from fish_env.identification.whole_runs.problem import WholeRunProblem
 from fish_env.inference.estimate.fit import Fit
+from fish_env.inference.hypotheses import Coefficient, ParameterId
 from fish_env.params.provenance import Posterior
 from fish_env.params.schema import FishParams
 
@@ -36,20 +36,22 @@ def identified_fish(fit: Fit, name: str | None = None) -> FishParams:
     source = f"identified from {problem.run_count} {kind} of {valid['dataset']}{whole}"
     symmetric = 0.5 * (fit.covariance + fit.covariance.T)
     rows = tuple(tuple(row) for row in symmetric.tolist())
-    posterior = Posterior(fit.names, tuple(fit.estimates.tolist()), rows, valid)
-    return _with_posterior(problem.fish, posterior, name or f"{problem.fish.name}-extended", source)
+    names = tuple(map(str, fit.ids))
+    posterior = Posterior(names, tuple(fit.estimates.tolist()), rows, valid)
+    moved = _moved(problem.fish, dict(zip(fit.ids, posterior.mean, strict=True)), source)
+    name = name or f"{problem.fish.name}-extended"
+    return replace(moved, name=name, posterior=posterior, source_file=None)
 
 
-def _with_posterior(fish: FishParams, posterior: Posterior, name: str, source: str) -> FishParams:
-    """The fish at the posterior's estimates, under a new name, with status ``identified``."""
-    values = dict(zip(posterior.names, posterior.mean, strict=True))
-    coefficients = {p: v for p, v in values.items() if not p.startswith(PREFIX)}
+def _moved(fish: FishParams, values: Mapping[ParameterId, float], source: str) -> FishParams:
+    """The fish with other values, with status ``identified``."""
+    coefficients = {id.path: v for id, v in values.items() if isinstance(id, Coefficient)}
     moved = fish.replace(coefficients, "identified", source)
     effects = {effect: dict(known) for effect, known in moved.effects.items()}
-    for path in [p for p in values if p.startswith(PREFIX)]:
-        effect, parameter = path.removeprefix(PREFIX).split(".")
-        effects.setdefault(effect, {})[parameter] = values[path]
-    return replace(moved, name=name, effects=effects, posterior=posterior, source_file=None)
+    for id, value in values.items():
+        if not isinstance(id, Coefficient):
+            effects.setdefault(id.effect, {})[id.name] = value
+    return replace(moved, effects=effects)
 
 
 def validity_of(problem: SeriesProblem | WholeRunProblem | TableProblem) -> dict[str, Any]:

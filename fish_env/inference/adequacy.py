@@ -15,14 +15,15 @@ import numpy as np
 from fish_env.inference.effects import EffectParameter
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.evaluation import GenericTerms, LackOfFit
-from fish_env.inference.hypotheses import PREFIX
+from fish_env.inference.hypotheses import CauseId, Coefficient, EffectName, EffectParameterId
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause
 from fish_env.inference.projection import Projector, Signal
 from fish_env.inference.screening import SETTINGS_AT_ONCE, null_threshold
 from fish_env.inference.tails import chi2_log_tail
 
-NOTHING = Cause("generic")
+FAR = "prior standard deviations from where it is known to be"
+NOTHING = Cause(EffectName("generic"))
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,19 @@ class Misfit:
     def size(self) -> float:
         """The amount without its sign."""
         return abs(self.amount)
+
+
+@dataclass(frozen=True)
+class Implausible:
+    """An implausible estimate.
+
+    Attributes:
+        cause: what it is of.
+        words: how it is implausible.
+    """
+
+    cause: CauseId
+    words: str
 
 
 @dataclass(frozen=True)
@@ -100,7 +114,7 @@ def disturbance_at_limit(fit: Fit) -> tuple[str, ...]:
     return fit.problem.disturbance_at_limit(fit.noise)
 
 
-def implausible_estimates(fit: Fit) -> tuple[str, ...]:
+def implausible_estimates(fit: Fit) -> tuple[Implausible, ...]:
     """Implausible estimates of causes: something similar acts instead.
 
     A coefficient is implausible more than :data:`FAR_OFF` prior deviations off, or at its physical
@@ -111,25 +125,26 @@ def implausible_estimates(fit: Fit) -> tuple[str, ...]:
     An effect is implausible with a sign that it cannot have, :data:`FAR_OFF` times as strong as the
     strongest plausible one, or with a shape far from the plausible ones.
     """
-    paths = fit.problem.baseline.paths
-    effects_too = {path for effect in fit.problem.known.values() for path in effect.equals}
+    effects_too = {Coefficient(p) for effect in fit.problem.known.values() for p in effect.equals}
     farthest = POLICY.extreme_prior_sd if fit.effects else POLICY.implausible_prior_sd
+    judged = set(fit.released) - effects_too
     found = [
-        f"{path} {abs(z):.0f} prior standard deviations from where it is known to be"
-        for path, z in zip(paths, fit.point.z, strict=True)
-        if path in set(fit.released) - effects_too and (abs(z) > farthest or path in fit.at_bounds)
+        Implausible(one, f"{one.path} {abs(z):.0f} {FAR}")
+        for one, z in zip(fit.problem.baseline.ids, fit.point.z, strict=True)
+        if one in judged and (abs(z) > farthest or one in fit.at_bounds)
     ]
     for name in fit.effects:
         for parameter in fit.problem.known[name].parameters:
-            path = f"{PREFIX}{name}.{parameter.name}"
-            value, unit = fit.point.effects[path], parameter.unit
+            id = EffectParameterId(name, parameter.name)
+            value, unit = fit.point.effects[id], parameter.unit
             beyond = (
                 _out_of_place(parameter, value)
                 if parameter.shapes
-                else _beyond(parameter, fit.interval(path))
+                else _beyond(parameter, fit.interval(id))
             )
             if beyond:
-                found.append(f"{name} with a {parameter.name} of {value:.2g} {unit}")
+                words = f"{name} with a {parameter.name} of {value:.2g} {unit}"
+                found.append(Implausible(EffectName(name), words))
     return tuple(found)
 
 
@@ -140,8 +155,7 @@ def contradicts_priors(fit: Fit) -> bool:
     is another one. The sum of squares of n coefficients in prior standard deviations is that of
     normal numbers, chi-squared with n degrees of freedom, or less where data hold little.
     """
-    paths = fit.problem.baseline.paths
-    kept = np.array([path not in fit.released for path in paths])
+    kept = np.array([one not in fit.released for one in fit.problem.baseline.ids])
     squares = float(np.sum(fit.point.z[kept] ** 2))
     return bool(chi2_log_tail(squares, int(kept.sum())) < np.log(POLICY.strange_coefficients))
 
@@ -149,7 +163,7 @@ def contradicts_priors(fit: Fit) -> bool:
 def beyond_plausible(fit: Fit, name: str) -> bool:
     """Whether an interval of an effect's strength lies wholly outside its plausible range."""
     switching = fit.problem.known[name].switching
-    return any(_beyond(p, fit.interval(f"{PREFIX}{name}.{p.name}"), 1.0) for p in switching)
+    return any(_beyond(p, fit.interval(EffectParameterId(name, p.name)), 1.0) for p in switching)
 
 
 def _out_of_place(parameter: EffectParameter, value: float) -> bool:
@@ -195,7 +209,8 @@ def adequacy(fit: Fit, rng: np.random.Generator, tolerated: float = 0.0) -> Adeq
     found.sort(key=lambda m: m.log_p)
     strongest = max((signal.statistic for _, signal in signals), default=0.0)
     reached = not found or found[0].log_p >= threshold or strongest < tolerated
-    implausible = (*disturbance_at_limit(fit), *implausible_estimates(fit))
+    estimates = (one.words for one in implausible_estimates(fit))
+    implausible = (*disturbance_at_limit(fit), *estimates)
     lack = fit.problem.lack_of_fit(fit)
     left = Adequacy(False, threshold, tuple(found[:8]), implausible, lack=lack)
     return replace(left, reached=reached and not implausible and not left.short)

@@ -17,6 +17,7 @@ from fish_env.inference.elimination import backward_elimination
 from fish_env.inference.estimate.again import to_publish
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.explanation import Explanation, reached
+from fish_env.inference.hypotheses import CauseId, Coefficient
 from fish_env.inference.left_out import left_out_scores
 from fish_env.inference.many_causes import challenged, pursue
 from fish_env.inference.parallel import both
@@ -36,13 +37,13 @@ class Ranked:
     """How much better one cause predicts runs than the baseline does.
 
     Attributes:
-        name: the cause.
+        cause: which.
         score: log score of all runs, each left out in turn, above that of the baseline under the
             same noise.
         interval: 95 % interval of the score over runs like these.
     """
 
-    name: str
+    cause: CauseId
     score: float
     interval: tuple[float, float]
 
@@ -69,7 +70,7 @@ class Attribution:
     rivals: tuple[Explanation, ...]
     ranking: tuple[Ranked, ...]
     gain: float
-    failed: frozenset[str] = frozenset()
+    failed: frozenset[CauseId] = frozenset()
 
     @property
     def tolerated(self) -> float:
@@ -272,7 +273,7 @@ class Search:
         )
         if current.causes and self.effort.retries:
             chosen = [signal for signal in chosen if not signal.cause.is_effect]
-        chosen = [signal for signal in chosen if signal.cause.name not in found.failed]
+        chosen = [signal for signal in chosen if signal.cause.id not in found.failed]
         tried, base = self._tried(current, chosen, shown, effort)
         in_step = None
         if not current.causes:
@@ -284,10 +285,10 @@ class Search:
             tried = [e for e in tried if not implausible_estimates(e.fit)]
         gain = base.score - tried[0].score if tried else 0.0
         # What else is missing pulls at a coefficient too, but not in all runs alike.
-        alone = not current.causes or not tried or tried[0].causes[-1] in problem.known
+        alone = not current.causes or not tried or not isinstance(tried[0].causes[-1], Coefficient)
         doubtful = not alone and not agreed(tried[0], base)
         if doubtful or gain < max(POLICY.evidence_doubt, least):
-            failed = found.failed | {signal.cause.name for signal in chosen}
+            failed = found.failed | {signal.cause.id for signal in chosen}
             return replace(found, ranking=ranking, failed=failed)
         best, others, after = self._questioned(current, tried, chosen, shown, found.gain + gain)
         others = [e for e in others if explained_away(e.causes[-1], shown, after)]
@@ -347,11 +348,11 @@ def ranking_of(tried: Sequence[Explanation], base: Explanation) -> tuple[Ranked,
     return tuple(sorted(found, key=lambda r: -r.score))
 
 
-def _ranked(name: str, gains: FloatArray) -> Ranked:
+def _ranked(cause: CauseId, gains: FloatArray) -> Ranked:
     """A cause by what it gains in each run (runs,)."""
     count, total = len(gains), float(gains.sum())
     half = float(stdtrit(count - 1, 0.975) * gains.std(ddof=1) * np.sqrt(count))
-    return Ranked(name, total, (total - half, total + half))
+    return Ranked(cause, total, (total - half, total + half))
 
 
 def roughness(explanation: Explanation) -> float:

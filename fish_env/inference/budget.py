@@ -14,7 +14,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from enum import Enum
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -22,13 +23,21 @@ from fish_env.arrays import BoolArray, FloatArray, IntArray
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.free import spread_of
 from fish_env.inference.estimate.settle import evaluated, usual_runs
-from fish_env.inference.hypotheses import PARAMETER, effect_of
+from fish_env.inference.hypotheses import CauseId, EffectParameterId, name_of
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Problem
 
-COEFFICIENTS = "coefficients"
-RUN_VARIATION = "run_variation"
 RESAMPLES = 2000
+
+
+class Other(Enum):
+    """What an explanation changes beside its causes."""
+
+    COEFFICIENTS = "coefficients"
+    RUN_VARIATION = "run_variation"
+
+
+Component: TypeAlias = CauseId | Other
 
 
 @dataclass(frozen=True)
@@ -36,7 +45,7 @@ class Share:
     """Part of the misfit that goes with one component.
 
     Attributes:
-        name: a cause, :data:`COEFFICIENTS` or :data:`RUN_VARIATION`.
+        component: a cause, or what else an explanation changes.
         share: of the nominal model's misfit.
         ci95: interval over runs; None with fewer than three.
         alone: what the component closes when it comes first.
@@ -44,12 +53,18 @@ class Share:
         channels: channel -> share of that channel's misfit.
     """
 
-    name: str
+    component: Component
     share: float
     ci95: tuple[float, float] | None
     alone: float
     last: float
     channels: dict[str, float]
+
+    @property
+    def name(self) -> str:
+        """The component as files and reports write it."""
+        one = self.component
+        return one.value if isinstance(one, Other) else name_of(one)
 
 
 @dataclass(frozen=True)
@@ -76,7 +91,7 @@ class Budget:
 def error_budget(
     problem: Problem,
     accepted: Fit,
-    causes: Sequence[str],
+    causes: Sequence[CauseId],
     runs: Sequence[str],
     held_out: bool,
     adequate: bool,
@@ -87,7 +102,7 @@ def error_budget(
     Args:
         problem: the runs to judge on.
         accepted: the explanation, from these or other runs.
-        causes: names of its causes.
+        causes: its causes.
         runs: ids of the runs, in the problem's order.
         held_out: whether these runs chose nothing.
         adequate: whether the explanation leaves nothing but noise.
@@ -99,11 +114,11 @@ def error_budget(
     noise = problem.noise_of(accepted)
     settled, filtered = evaluated(problem, accepted.point, noise)
     windows, still, run_of_window = settled.without_feedback(filtered, noise)
-    components = [COEFFICIENTS, *causes]
+    components: list[Component] = [Other.COEFFICIENTS, *causes]
     if spread_of(accepted.problem, noise).any():
-        components.append(RUN_VARIATION)
+        components.append(Other.RUN_VARIATION)
     everything = frozenset(components)
-    sets = [frozenset[str](), everything]
+    sets = [frozenset[Component](), everything]
     sets += [frozenset([c]) for c in components] + [everything - {c} for c in components]
     squares = _residuals(windows, accepted, noise, still, sets) ** 2
     names, channel_of = windows.residual_channels()
@@ -122,38 +137,37 @@ def _residuals(
     accepted: Fit,
     noise: Any,
     filtered: Sequence[object],
-    sets: Sequence[frozenset[str]],
+    sets: Sequence[frozenset[Component]],
 ) -> FloatArray:
     """Whitened residuals (sets, D) of the model with some components in place."""
     rows: list[FloatArray] = [np.zeros(0)] * len(sets)
     plain = usual_runs(problem, accepted.point, noise)
     varied = spread_of(accepted.problem, noise).any()
     for chosen, of_set in ((problem, True), (plain, False)):
-        own = [i for i, s in enumerate(sets) if not varied or (RUN_VARIATION in s) == of_set]
+        own = [i for i, s in enumerate(sets) if not varied or (Other.RUN_VARIATION in s) == of_set]
         if not own or (not varied and not of_set):
             continue
         points = [_point(accepted, sets[i]) for i in own]
         z = np.column_stack([p[0] for p in points])
-        effects = {path: np.array([p[1][path] for p in points]) for path in points[0][1]}
+        effects = {id: np.array([p[1][id] for p in points]) for id in points[0][1]}
         found = chosen.innovations(z, effects, noise, filtered)
         for i, row in zip(own, found, strict=True):
             rows[i] = row
     return np.array(rows)
 
 
-def _point(accepted: Fit, chosen: frozenset[str]) -> tuple[FloatArray, dict[str, float]]:
+def _point(
+    accepted: Fit, chosen: frozenset[Component]
+) -> tuple[FloatArray, dict[EffectParameterId, float]]:
     """Coefficients and effects with some components at their estimates, the others nominal."""
     problem, point = accepted.problem, accepted.point
     baseline = problem.baseline
     values = baseline.values(point.z[:, None])[:, 0]
-    kept = [
-        (f"{PARAMETER}{path}" in chosen) if path in accepted.released else COEFFICIENTS in chosen
-        for path in baseline.paths
-    ]
+    kept = [(c if c in accepted.released else Other.COEFFICIENTS) in chosen for c in baseline.ids]
     moved = np.where(kept, values, baseline.mean)
     z = np.linalg.solve(baseline.factor, moved - baseline.mean)
     neutral = problem.neutral(accepted.effects)
-    effects = {p: v if effect_of(p) in chosen else neutral[p] for p, v in point.effects.items()}
+    effects = {p: v if p.effect in chosen else neutral[p] for p, v in point.effects.items()}
     return np.asarray(z, float), effects
 
 
@@ -216,7 +230,7 @@ def shares_of(energy: FloatArray, count: int) -> tuple[FloatArray, FloatArray, F
 
 def _shared(
     energy: _Energy,
-    components: Sequence[str],
+    components: Sequence[Component],
     names: Sequence[str],
     runs: Sequence[str],
     held_out: bool,
@@ -234,14 +248,14 @@ def _shared(
     intervals, left_interval = _intervals(energy, count, rng)
     found = [
         Share(
-            name,
+            component,
             float(shares[i]),
             intervals[i] if intervals else None,
             float(first[i]),
             float(last[i]),
             {n: float(channels[k][i] / reference[k]) for k, n in enumerate(names)},
         )
-        for i, name in enumerate(components)
+        for i, component in enumerate(components)
     ]
     found.sort(key=lambda share: -share.share)
     left = 1.0 - float(shares.sum())

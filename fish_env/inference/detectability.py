@@ -62,7 +62,7 @@ class Setting:
     @property
     def effect(self) -> str:
         """Name of the effect."""
-        return self.signal.cause.name
+        return self.signal.cause.effect
 
     def probe(self, multiple: float) -> Probe:
         """The setting with so many times its signal, if that were in proportion."""
@@ -218,7 +218,7 @@ def noncentrality(screen: Screen, setting: Setting, change: FloatArray) -> float
     needed = partial(tails.noncentrality, screen.threshold, power=POLICY.power)
     own, found = needed(setting.signal.freedom), 0.0
     for signal in screen.signals:
-        if signal.cause.name == setting.effect:
+        if signal.cause.id == setting.effect:
             score = signal.left.T @ change
             energy = (
                 float(score @ np.linalg.solve(signal.projected, score)) / signal.variance_inflation

@@ -19,7 +19,7 @@ from fish_env.inference.effort import Effort
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.estimate.settle import usual_runs
 from fish_env.inference.explanation import FEW_RUNS, Explanation, fitted_again, reached
-from fish_env.inference.hypotheses import effect_of
+from fish_env.inference.hypotheses import EffectName
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause
 from fish_env.inference.problem import Point
@@ -60,7 +60,7 @@ def measured(nothing: Explanation, report: Callable[[str], None]) -> Explanation
     values = own.problem.drive.in_step
     if not values:
         return None
-    effects = tuple(dict.fromkeys(effect_of(path) for path in values))
+    effects = tuple(dict.fromkeys(EffectName(id.effect) for id in values))
     report(f"putting the drive in step by {' and '.join(effects)}")
     noise = own.problem.default_noise()
     begin = [Point(z, values) for z in baselines(own)]
@@ -145,7 +145,7 @@ def _with_drive(
     if problem.drive.known:
         return []
     known = problem.known
-    drives = [c for c in causes if c.is_effect and known[c.name].drifts_in_phase]
+    drives = [c for c in causes if c.is_effect and known[c.effect].drifts_in_phase]
     shown = list(screen(followed, drives, rng).best())
     few = fitted_again(problem.subset(FEW_RUNS), followed, followed.noise, rounds=1)
     if few is None or not shown:
@@ -169,7 +169,7 @@ def under_relaxed_noise(
     effects = sorted((s for s in shown.best() if s.cause.is_effect), key=lambda s: -s.uncorrected)
     first = [s for s in effects[: POLICY.most_relaxed] if s.uncorrected > POLICY.worth_coarse_fit]
     tried_anyway = current.fit.problem.out_of_step
-    return relaxed, first + [s for s in effects if s.cause.name in tried_anyway and s not in first]
+    return relaxed, first + [s for s in effects if s.cause.id in tried_anyway and s not in first]
 
 
 def drifting(current: Explanation, shown: Screen, chosen: Sequence[Signal]) -> list[Signal]:
@@ -181,7 +181,7 @@ def drifting(current: Explanation, shown: Screen, chosen: Sequence[Signal]) -> l
         return []
     known = current.fit.problem.known
     effects = [s for s in shown.best() if s.cause.is_effect and s not in chosen]
-    return [s for s in effects if known[s.cause.name].drifts_in_phase]
+    return [s for s in effects if known[s.cause.effect].drifts_in_phase]
 
 
 def _may_be_out_of_step(current: Explanation, chosen: Sequence[Signal]) -> bool:

@@ -10,7 +10,7 @@ from scipy.special import chdtri
 from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.explanation import Explanation
-from fish_env.inference.hypotheses import PARAMETER, PREFIX
+from fish_env.inference.hypotheses import CauseId, Coefficient, EffectParameterId, ParameterId
 from fish_env.inference.policy import POLICY
 from fish_env.inference.substitution import without
 from fish_env.inference.tails import chi2_log_tail
@@ -36,26 +36,26 @@ def backward_elimination(current: Explanation) -> Explanation:
     return current
 
 
-def surely_acts(fit: Fit, name: str) -> bool:
+def surely_acts(fit: Fit, cause: CauseId) -> bool:
     """Whether a cause is so many standard errors from doing nothing that no fit need tell.
 
     Of what is off at infinity no linear model tells that.
     """
-    if name in fit.effects and not _is_off_at_finite(fit, name):
+    if not isinstance(cause, Coefficient) and not _is_off_at_finite(fit, cause):
         return False
-    return _from_off(fit, off_values(fit, name)) > POLICY.sure_sd**2
+    return _from_off(fit, off_values(fit, cause)) > POLICY.sure_sd**2
 
 
-def may_not_act(fit: Fit, name: str) -> bool:
+def may_not_act(fit: Fit, cause: CauseId) -> bool:
     """Whether the 95 % region of what switches a cause on holds the values at which it is off.
 
     The region is corrected for coloured residuals.
     """
-    off = off_values(fit, name)
+    off = off_values(fit, cause)
     return bool(_from_off(fit, off) < chdtri(len(off), 0.05))
 
 
-def insignificant(fit: Fit, causes: Sequence[str], threshold: float) -> tuple[str, ...]:
+def insignificant(fit: Fit, causes: Sequence[CauseId], threshold: float) -> tuple[CauseId, ...]:
     """Causes that are not significant beside the others, the weakest dropped before the next.
 
     Told by the covariance, which is corrected for coloured residuals: estimates of the others move
@@ -63,16 +63,16 @@ def insignificant(fit: Fit, causes: Sequence[str], threshold: float) -> tuple[st
 
     Args:
         fit: with all causes.
-        causes: their names.
+        causes: those to judge.
         threshold: log p-value that each has to pass.
     """
     judged = {name: off_values(fit, name) for name in causes}
     estimates, covariance = fit.estimates.copy(), fit.covariance.copy()
-    dropped: list[str] = []
+    dropped: list[CauseId] = []
     while judged:
         log_p = {}
         for name, off in judged.items():
-            own = [fit.names.index(path) for path in off]
+            own = [fit.ids.index(id) for id in off]
             gap = estimates[own] - np.array(list(off.values()))
             distance = _distance(gap, covariance[np.ix_(own, own)])
             log_p[name] = float(chi2_log_tail(distance, len(own)))
@@ -80,7 +80,7 @@ def insignificant(fit: Fit, causes: Sequence[str], threshold: float) -> tuple[st
         if log_p[weakest] < threshold:
             break
         off = judged.pop(weakest)
-        own = [fit.names.index(path) for path in off]
+        own = [fit.ids.index(id) for id in off]
         pull = covariance[:, own] @ np.linalg.inv(covariance[np.ix_(own, own)])
         estimates -= pull @ (estimates[own] - np.array(list(off.values())))
         covariance -= pull @ covariance[own]
@@ -88,9 +88,9 @@ def insignificant(fit: Fit, causes: Sequence[str], threshold: float) -> tuple[st
     return tuple(dropped)
 
 
-def _from_off(fit: Fit, off: Mapping[str, float]) -> float:
+def _from_off(fit: Fit, off: Mapping[ParameterId, float]) -> float:
     """Squared distance of estimates from where a cause is off, in standard errors."""
-    at = [fit.names.index(path) for path in off]
+    at = [fit.ids.index(id) for id in off]
     gap = fit.estimates[at] - np.array(list(off.values()))
     return _distance(gap, fit.covariance[np.ix_(at, at)])
 
@@ -99,21 +99,21 @@ def _distance(gap: FloatArray, covariance: FloatArray) -> float:
     return float(gap @ np.linalg.solve(covariance, gap))
 
 
-def off_values(fit: Fit, name: str) -> dict[str, float]:
-    """Path -> value, of what switches a cause on, at which it is off in the linear model.
+def off_values(fit: Fit, cause: CauseId) -> dict[ParameterId, float]:
+    """Values of what switches a cause on, at which it is off in the linear model.
 
     What is off at infinity acts by its inverse, such as the time of a lag: that of a value v is
     zero, to first order, at 2 v.
     """
-    if name in fit.effects:
-        switching = fit.problem.known[name].switching
-        paths = {f"{PREFIX}{name}.{p.name}": p.neutral for p in switching}
-        return {
-            path: off if np.isfinite(off) else 2.0 * float(fit.estimates[fit.names.index(path)])
-            for path, off in paths.items()
-        }
-    path = name.removeprefix(PARAMETER)
-    return {path: float(fit.problem.baseline.mean[fit.problem.baseline.paths.index(path)])}
+    if isinstance(cause, Coefficient):
+        baseline = fit.problem.baseline
+        return {cause: float(baseline.mean[baseline.ids.index(cause)])}
+    switching = fit.problem.known[cause].switching
+    neutral = {EffectParameterId(cause, p.name): p.neutral for p in switching}
+    return {
+        id: off if np.isfinite(off) else 2.0 * float(fit.estimates[fit.ids.index(id)])
+        for id, off in neutral.items()
+    }
 
 
 def _is_off_at_finite(fit: Fit, name: str) -> bool:

@@ -14,6 +14,7 @@ from fish_env.inference.adequacy import disturbance_at_limit
 from fish_env.inference.estimate.again import with_run_variation
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.estimate.information import information, prior_precision
+from fish_env.inference.hypotheses import CauseId
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Problem
 
@@ -28,11 +29,11 @@ class Explanation:
     """A fit with some causes in it.
 
     Attributes:
-        causes: names, in the order they were added.
+        causes: in the order they were added.
         fit: the fit.
     """
 
-    causes: tuple[str, ...]
+    causes: tuple[CauseId, ...]
     fit: Fit
 
     @cached_property
@@ -50,7 +51,7 @@ class Explanation:
             return None
         return fitted_again(own.problem.subset(FEW_RUNS), own, noise)
 
-    def varied(self, beside_misfit: bool = False, dropped: Collection[str] = ()) -> Explanation:
+    def varied(self, beside_misfit: bool = False, dropped: Collection[CauseId] = ()) -> Explanation:
         """The same causes with what the runs differ in, as it shows now that more is explained.
 
         Where the disturbance stays at its limit nevertheless, what the runs seem to differ in may
@@ -110,7 +111,7 @@ class Explanation:
         Raftery (1995), "Bayes factors", JASA 90, eq. 3; differences of 6 they call strong.
         """
         own, known = self.fit, known_before(self)
-        lifted = [own.problem.baseline.paths.index(path) for path in own.released]
+        lifted = [own.problem.baseline.ids.index(one) for one in own.released]
         narrowed = np.linalg.slogdet(information(own.linearised.slopes, known))[1]
         penalty = known[lifted] @ own.point.z[lifted] ** 2
         return float(own.objective + penalty + narrowed - np.log(known).sum())
@@ -126,7 +127,7 @@ def known_before(explanation: Explanation) -> FloatArray:
     problem = own.problem
     ranges = [p.plausible for name in own.effects for p in problem.known[name].parameters]
     known = prior_precision(problem.baseline, len(ranges), ())
-    known[[problem.baseline.paths.index(path) for path in own.released]] = POLICY.prior_reach_sd**-2
+    known[[problem.baseline.ids.index(one) for one in own.released]] = POLICY.prior_reach_sd**-2
     known[len(problem.baseline) :] = [12.0 / (high - low) ** 2 for low, high in ranges]
     return known
 

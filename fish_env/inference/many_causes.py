@@ -9,6 +9,7 @@ import numpy as np
 
 from fish_env.inference.adequacy import disturbance_at_limit
 from fish_env.inference.explanation import Explanation
+from fish_env.inference.hypotheses import CauseId, Coefficient, EffectName
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause
 from fish_env.inference.pursuit import pursued, substitutes
@@ -36,7 +37,7 @@ def pursue(
     report: Callable[[str], None],
     least: float,
     relaxed_log_p: float,
-) -> tuple[Explanation, Screen, list[tuple[str, str]]]:
+) -> tuple[Explanation, Screen, list[tuple[CauseId, CauseId]]]:
     """The explanation with all further causes that are needed together, and its screen.
 
     Beside a misfit too with what the runs differ in: else a cause stands in for that.
@@ -97,8 +98,9 @@ def _against_likes(
     settled beside each effect.
     """
     *_, last = current.causes
+    assert not isinstance(last, Coefficient)
     known = current.fit.problem.known[last].confusable_with
-    signals = {s.cause.name: s for s in shown.best() if s.cause.is_effect}
+    signals = {s.cause.id: s for s in shown.best() if s.cause.is_effect}
     alike = [s for s in substitutes(current, shown) if s.cause == last and s.name in known]
     pairs = [(last, signals[s.name]) for s in alike[:LIKES]]
     return substituted(current, pairs, 1, report, beside_misfit=True)[0]
@@ -112,11 +114,11 @@ def _beside_drive(current: Explanation, shown: Screen) -> Screen:
     problem = current.fit.problem
     if not problem.drive.effects or not problem.drive.effects <= {*current.causes}:
         return shown
-    kept = tuple(s for s in shown.signals if s.cause.name not in problem.out_of_step)
+    kept = tuple(s for s in shown.signals if s.cause.id not in problem.out_of_step)
     return replace(shown, signals=kept)
 
 
-def _told_apart(current: Explanation, first: Sequence[str], shown: Screen) -> Explanation:
+def _told_apart(current: Explanation, first: Sequence[CauseId], shown: Screen) -> Explanation:
     """The explanation without further causes that another effect explains as well.
 
     Args:
@@ -134,7 +136,7 @@ def challenged(
     shown: Screen,
     rivals: Sequence[Explanation],
     report: Callable[[str], None],
-    replaced: Sequence[tuple[str, str]] = (),
+    replaced: Sequence[tuple[CauseId, CauseId]] = (),
 ) -> tuple[Explanation, tuple[Explanation, ...]]:
     """The explanation after the effects closest to its causes were tried in their place.
 
@@ -152,7 +154,7 @@ def challenged(
     if disturbance_at_limit(current.fit):
         return current, ()
     known = current.fit.problem.known  # a coefficient takes no effect's place
-    signals = {s.cause.name: s for s in shown.best() if s.cause.is_effect}
+    signals = {s.cause.id: s for s in shown.best() if s.cause.is_effect}
     close = _close(current, shown)
     pairs_of = (zip(current.causes, e.causes, strict=False) for e in rivals)
     earlier = [(a, b) for pairs in pairs_of for a, b in pairs if a != b]
@@ -165,7 +167,7 @@ def challenged(
     return best, rivals_of(best, others)
 
 
-def _close(current: Explanation, shown: Screen) -> list[tuple[str, str]]:
+def _close(current: Explanation, shown: Screen) -> list[tuple[EffectName, EffectName]]:
     """Causes, each with an effect that may be in its place; first those known to look like it.
 
     Of motion with corners the linear model tells little: there such an effect counts
@@ -176,8 +178,8 @@ def _close(current: Explanation, shown: Screen) -> list[tuple[str, str]]:
         shown: all other causes against it.
     """
     problem = current.fit.problem
-    alike: list[tuple[str, str]] = []
-    others: list[tuple[str, str]] = []
+    alike: list[tuple[EffectName, EffectName]] = []
+    others: list[tuple[EffectName, EffectName]] = []
     for s in substitutes(current, shown):
         is_alike = s.name in problem.known[s.cause].confusable_with
         if s.cost < LINEAR_DOUBT or (is_alike and problem.is_nonsmooth((s.cause, s.name))):
@@ -185,19 +187,19 @@ def _close(current: Explanation, shown: Screen) -> list[tuple[str, str]]:
     return [*alike, *others]
 
 
-def _of_drive(current: Explanation) -> list[tuple[str, str]]:
+def _of_drive(current: Explanation) -> list[tuple[EffectName, EffectName]]:
     """What was measured of a drive, with what else in the clocks or the drive may have shown it."""
     problem = current.fit.problem
     return [
         (cause, name)
-        for cause in current.causes
+        for cause in _effects(current)
         if cause in problem.drive.effects
         for name in problem.out_of_step
         if name in problem.known[cause].confusable_with and name not in current.causes
     ]
 
 
-def _of_lags(current: Explanation) -> list[tuple[str, str]]:
+def _of_lags(current: Explanation) -> list[tuple[EffectName, EffectName]]:
     """What makes a drive late, each with what else may: short lags differ little but in name.
 
     The linear model is of no help. It begins from sizes at which the one follows another course
@@ -205,13 +207,20 @@ def _of_lags(current: Explanation) -> list[tuple[str, str]]:
     """
     problem = current.fit.problem
     others = [name for name in problem.hidden_by_drive if name not in current.causes]
-    lags = [cause for cause in current.causes if cause in problem.hidden_by_drive]
+    lags = [cause for cause in _effects(current) if cause in problem.hidden_by_drive]
     return [(c, n) for c in lags for n in others if n in problem.known[c].confusable_with]
 
 
-def each_in_turn(close: Sequence[tuple[str, str]]) -> list[tuple[str, str]]:
+def _effects(current: Explanation) -> list[EffectName]:
+    """Those of the causes that are effects."""
+    return [cause for cause in current.causes if not isinstance(cause, Coefficient)]
+
+
+def each_in_turn(
+    close: Sequence[tuple[EffectName, EffectName]],
+) -> list[tuple[EffectName, EffectName]]:
     """Pairs of a cause and a substitute: the first of each cause, then the second, and so on."""
-    ranks: dict[str, int] = {}
+    ranks: dict[EffectName, int] = {}
     ranked = []
     for cause, name in close:
         ranks[cause] = ranks.get(cause, -1) + 1

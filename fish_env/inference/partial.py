@@ -14,7 +14,12 @@ from functools import cached_property
 import numpy as np
 
 from fish_env.arrays import FloatArray
-from fish_env.inference.adequacy import contradicts_priors, generic_signals, implausible_estimates
+from fish_env.inference.adequacy import (
+    Implausible,
+    contradicts_priors,
+    generic_signals,
+    implausible_estimates,
+)
 from fish_env.inference.budget import RESAMPLES
 from fish_env.inference.elimination import off_values
 from fish_env.inference.estimate.fit import Fit
@@ -22,7 +27,14 @@ from fish_env.inference.estimate.free import Free
 from fish_env.inference.estimate.products import inner
 from fish_env.inference.estimate.settle import evaluated
 from fish_env.inference.explanation import Explanation
-from fish_env.inference.hypotheses import PARAMETER
+from fish_env.inference.hypotheses import (
+    CauseId,
+    Coefficient,
+    EffectName,
+    ParameterId,
+    listed,
+    name_of,
+)
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
 from fish_env.inference.projection import Projector, Signal
@@ -63,23 +75,25 @@ def confirmed(
     """
     measured = _measured(accepted)
     if doubtful := _dependent(accepted) - measured:
-        report(f"leaving out {', '.join(sorted(doubtful))}: coefficients contradict their priors")
+        left_out = listed(sorted(doubtful, key=name_of))
+        report(f"leaving out {left_out}: coefficients contradict their priors")
         smaller = without(accepted, doubtful) if doubtful < {*accepted.causes} else None
         if smaller is None:
             return None
         accepted = smaller
     while others := [name for name in accepted.causes if name not in measured]:
-        words = implausible_estimates(accepted.fit)
-        weakest = _blamed(others, words)
+        found = implausible_estimates(accepted.fit)
+        weakest = _blamed(others, found)
         if weakest is not None:
-            report(f"leaving out {weakest}: its estimate is implausible ({'; '.join(words)})")
+            words = "; ".join(one.words for one in found)
+            report(f"leaving out {name_of(weakest)}: its estimate is implausible ({words})")
         else:
             log_p = StandIns(accepted, threshold).log_p()
             log_p = {name: value for name, value in log_p.items() if name not in measured}
             weakest = max(log_p, key=lambda name: log_p[name])
             if log_p[weakest] < threshold:
                 return accepted
-            report(f"leaving out {weakest}: forces without a name explain as much")
+            report(f"leaving out {name_of(weakest)}: forces without a name explain as much")
         smaller = without(accepted, (weakest,))
         if smaller is None:
             return None
@@ -87,40 +101,40 @@ def confirmed(
     return accepted if accepted.causes else None
 
 
-def _dependent(found: Explanation) -> frozenset[str]:
+def _dependent(found: Explanation) -> frozenset[CauseId]:
     """Causes that depend on coefficients which contradict their priors; none where these do not."""
     if not contradicts_priors(found.fit):
         return frozenset()
     return frozenset(found.causes) - independent(found.fit)
 
 
-def owed_to_coefficients(fit: Fit) -> dict[str, float]:
-    """How much further each effect parameter is, path -> value, than with nominal coefficients.
+def owed_to_coefficients(fit: Fit) -> dict[ParameterId, float]:
+    """How much further each effect parameter is than with nominal coefficients.
 
     In the linear model, all effects following.
     """
     count = len(fit.problem.baseline)
     hessian = Projector(fit).hessian
     moved = np.linalg.solve(hessian[count:, count:], hessian[count:, :count] @ fit.point.z)
-    return dict(zip(fit.names[count:], (-moved).tolist(), strict=True))
+    return dict(zip(fit.ids[count:], (-moved).tolist(), strict=True))
 
 
-def independent(fit: Fit) -> frozenset[str]:
+def independent(fit: Fit) -> frozenset[EffectName]:
     """Effects that owe nothing to how far the coefficients are from their priors.
 
     No parameter that switches the effect on owes them more than its standard error.
     """
     own = fit.extrapolated
     owed = owed_to_coefficients(own)
-    error = dict(zip(own.names, np.sqrt(np.diag(own.covariance)).tolist(), strict=True))
+    error = dict(zip(own.ids, np.sqrt(np.diag(own.covariance)).tolist(), strict=True))
     return frozenset(
         name
-        for name in own.effects
-        if all(abs(owed[path]) < error[path] for path in off_values(own, name))
+        for name in map(EffectName, own.effects)
+        if all(abs(owed[id]) < error[id] for id in off_values(own, name))
     )
 
 
-def _measured(found: Explanation) -> frozenset[str]:
+def _measured(found: Explanation) -> frozenset[EffectName]:
     """Causes that were measured without a model, and not by chance."""
     drive = found.fit.problem.drive
     return drive.effects & {*found.causes} if drive.certain else frozenset()
@@ -155,7 +169,8 @@ def sustained(
         worst = min(others, key=lambda name: least[name])
         if least[worst] > 0.0:
             return found
-        report(f"leaving out {worst}: simulated without feedback it does not help in most runs")
+        left_out = name_of(worst)
+        report(f"leaving out {left_out}: simulated without feedback it does not help in most runs")
         smaller = without(found, (worst,))
         if smaller is None:
             return None
@@ -163,7 +178,7 @@ def sustained(
     return found if found.causes else None
 
 
-def _losses(found: Explanation, names: Sequence[str]) -> FloatArray:
+def _losses(found: Explanation, names: Sequence[CauseId]) -> FloatArray:
     """What simulation without feedback loses by the absence of each cause (causes, R).
 
     Squared errors in units of the noise, summed over a run; relative to those with all causes.
@@ -178,7 +193,7 @@ def _losses(found: Explanation, names: Sequence[str]) -> FloatArray:
     model = StandIns(found, 0.0)
     points = [own.point, *(model.left_out(name) for name in names)]
     z = np.column_stack([point.z for point in points])
-    effects = {path: np.array([p.effects[path] for p in points]) for path in own.point.effects}
+    effects = {id: np.array([p.effects[id] for p in points]) for id in own.point.effects}
     squares = windows.innovations(z, effects, own.noise, still) ** 2
     run_of = run_of_window[windows.groups()[0]]
     energy = np.array([np.bincount(run_of, row, own.problem.run_count) for row in squares])
@@ -193,13 +208,10 @@ def _least(losses: FloatArray, rng: np.random.Generator) -> float:
     return float(np.quantile(drawn, 0.025))
 
 
-def _blamed(causes: Sequence[str], words: Sequence[str]) -> str | None:
-    """The first cause that words on implausible estimates are about; None if none is."""
-    return next((name for name in causes if any(_is_of(name, word) for word in words)), None)
-
-
-def _is_of(cause: str, word: str) -> bool:
-    return word.split(" ")[0] in (cause, cause.removeprefix(PARAMETER))
+def _blamed(causes: Sequence[CauseId], found: Sequence[Implausible]) -> CauseId | None:
+    """The first cause with an implausible estimate; None if none has."""
+    blamed = {one.cause for one in found}
+    return next((cause for cause in causes if cause in blamed), None)
 
 
 @dataclass(frozen=True, eq=False)
@@ -241,7 +253,7 @@ class StandIns:
         self.fit, self.causes, self.threshold = found.fit.extrapolated, found.causes, threshold
         self.projector = Projector(self.fit)
 
-    def log_p(self) -> dict[str, float]:
+    def log_p(self) -> dict[CauseId, float]:
         """Log p-value of what each cause explains that no sum of forces makes good.
 
         A sum of more forces than the cause has parameters pays for each of them what a force has to
@@ -257,7 +269,7 @@ class StandIns:
         gap = removed.loss + beside - instead - 2.0 * self.threshold * longer
         return float(chi2_log_tail(max(gap, 0.0) / removed.inflation, len(removed.own)))
 
-    def left_out(self, name: str) -> Point:
+    def left_out(self, name: CauseId) -> Point:
         """Where a cause does nothing, and all other parameters follow in the linear model."""
         own, removed = self.fit, self.removed(name)
         free = Free(own.problem, own.effects, own.released)
@@ -265,16 +277,16 @@ class StandIns:
         vector[removed.own] += removed.shift
         vector[removed.rest] -= removed.along @ removed.shift
         point = free.unpack(free.bounds.clip(vector))
-        off = own.problem.neutral([name]) if name in own.effects else {}
+        off = {} if isinstance(name, Coefficient) else own.problem.neutral([name])
         return Point(point.z, {**point.effects, **off})
 
-    def removed(self, name: str) -> Removed:
+    def removed(self, name: CauseId) -> Removed:
         """A cause taken out.
 
         A coefficient gets its prior back, and may move as far as that lets it.
         """
         off = off_values(self.fit, name)
-        own = np.array([self.fit.names.index(path) for path in off])
+        own = np.array([self.fit.ids.index(id) for id in off])
         shift = np.array(list(off.values())) - self.fit.estimates[own]
         hessian = self.projector.hessian
         rest = np.setdiff1d(np.arange(len(hessian)), own)
@@ -283,7 +295,7 @@ class StandIns:
         left = hessian[np.ix_(own, own)] - across.T @ along
         freed = np.linalg.inv(left)
         loss = float(shift @ left @ shift)
-        if name not in self.fit.effects:
+        if isinstance(name, Coefficient):
             z, held = float(self.fit.point.z[own[0]]), float(left[0, 0])
             shift = np.array([-z / (1.0 + held)])
             loss = z * z * held / (1.0 + held)
@@ -292,7 +304,7 @@ class StandIns:
 
     def _inflation(self, own: FloatArray) -> float:
         """Of the variance of some parameters, by coloured residuals."""
-        scale = np.eye(len(self.fit.names))
+        scale = np.eye(len(self.fit.ids))
         count = len(self.fit.problem.baseline)
         scale[:count, :count] = self.fit.problem.baseline.factor
         white = np.diag(scale @ np.linalg.inv(self.projector.hessian) @ scale.T)

@@ -53,14 +53,14 @@ def preconditions(
     for cause in causes:
         if not cause.is_effect:
             continue
-        signal = strongest.get(cause.name)
+        signal = strongest.get(cause.effect)
         if signal is None:
-            result.append(unseen(cause.name))
+            result.append(unseen(cause.effect))
             continue
-        own = sizes[cause.name]
+        own = sizes[cause.effect]
         nearest = _nearest(signal, strongest)
-        excited = _excited(problem.known[cause.name], own)
-        result.append(Precondition(cause.name, signal.absorbed_share, own, nearest, excited))
+        excited = _excited(problem.known[cause.effect], own)
+        result.append(Precondition(cause.effect, signal.absorbed_share, own, nearest, excited))
     return tuple(result)
 
 
@@ -103,7 +103,7 @@ def _alternatives(screen: Screen) -> dict[str, list[Signal]]:
     alternatives: dict[str, list[Signal]] = {}
     for signal in screen.signals:
         if signal.probe >= 0:
-            alternatives.setdefault(signal.cause.name, []).append(signal)
+            alternatives.setdefault(signal.cause.effect, []).append(signal)
     return alternatives
 
 
@@ -133,7 +133,7 @@ def _settings(problem: Problem, screen: Screen, signal: Signal) -> list[Setting]
 
     From the test of that probe alone where there is one.
     """
-    effect = problem.known[signal.cause.name]
+    effect = problem.known[signal.cause.effect]
     alternatives = _alternatives(screen)[effect.name]
     shapes = [p.name for p in effect.parameters if p.shapes]
     mildest = next(
@@ -160,6 +160,6 @@ def _nearest(signal: Signal, others: dict[str, Signal]) -> tuple[str, float] | N
     pairs = [
         (name, confusability(signal, other))
         for name, other in others.items()
-        if name != signal.cause.name
+        if name != signal.cause.effect
     ]
     return max(pairs, key=lambda pair: pair[1]) if pairs else None

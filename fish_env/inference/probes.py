@@ -11,7 +11,7 @@ import numpy as np
 
 from fish_env.arrays import FloatArray
 from fish_env.inference.effects import EffectParameter
-from fish_env.inference.hypotheses import PARAMETER, PREFIX
+from fish_env.inference.hypotheses import CauseId, Coefficient, EffectName, EffectParameterId
 from fish_env.inference.problem import Problem
 from fish_env.inference.vehicle import Effect
 
@@ -33,20 +33,24 @@ class Cause:
     """Something that may be wrong with the simulation.
 
     Attributes:
-        name: effect name, or ``parameter:<path>``.
+        id: which.
         probes: alternatives; each is a set of small settings whose signals span what the cause
             can do at that alternative (for a wave: sine and cosine at one frequency).
-        path: baseline coefficient, for a parameter.
     """
 
-    name: str
+    id: CauseId
     probes: tuple[tuple[Probe, ...], ...] = ()
-    path: str | None = None
 
     @property
     def is_effect(self) -> bool:
         """Whether it is an effect (else a baseline coefficient)."""
-        return self.path is None
+        return not isinstance(self.id, Coefficient)
+
+    @property
+    def effect(self) -> EffectName:
+        """The effect, of a cause that is one."""
+        assert not isinstance(self.id, Coefficient)
+        return self.id
 
 
 class Knowing(Protocol):
@@ -55,15 +59,6 @@ class Knowing(Protocol):
     @property
     def known(self) -> Mapping[str, Effect]:
         """Effects by name."""
-        ...
-
-
-class Likening(Knowing, Protocol):
-    """A problem that also knows which coefficients act alike."""
-
-    @property
-    def interchangeable(self) -> tuple[frozenset[str], ...]:
-        """Sets of coefficients that act alike."""
         ...
 
 
@@ -80,19 +75,22 @@ T = TypeVar("T", bound=Tested)
 S = TypeVar("S")
 
 
-def coefficient_sizes(tests: Iterable[T], smallest: Callable[[T], float]) -> dict[str, float]:
+def coefficient_sizes(
+    tests: Iterable[T], smallest: Callable[[T], float]
+) -> dict[Coefficient, float]:
     """How far off each coefficient is found with power 0.8, in prior standard deviations.
 
     One that the data know little of would have to be further off than any prior allows.
     """
-    return {test.cause.path: smallest(test) for test in tests if test.cause.path is not None}
+    pairs = ((test, test.cause.id) for test in tests)
+    return {id: smallest(test) for test, id in pairs if isinstance(id, Coefficient)}
 
 
 def best_of_each(tests: Iterable[T], log_p: Callable[[T], float]) -> list[T]:
     """The most significant test of each cause, the most significant cause first."""
-    chosen: dict[str, T] = {}
+    chosen: dict[CauseId, T] = {}
     for test in sorted(tests, key=log_p):
-        chosen.setdefault(test.cause.name, test)
+        chosen.setdefault(test.cause.id, test)
     return list(chosen.values())
 
 
@@ -134,13 +132,12 @@ def causes_of(problem: Problem) -> tuple[Cause, ...]:
     step = problem.longest_step
     length = problem.longest_run
     effects = [
-        Cause(effect.name, each_alone(probes_of(effect, step, length)))
+        Cause(EffectName(effect.name), each_alone(probes_of(effect, step, length)))
         for effect in problem.known.values()
         if effect.diagnosed
     ]
     named = {path for effect in problem.known.values() for path in effect.equals}
-    paths = [path for path in problem.baseline.paths if path not in named]
-    coefficients = [Cause(f"{PARAMETER}{p}", path=p) for p in paths]
+    coefficients = [Cause(id) for id in problem.baseline.ids if id.path not in named]
     return (*effects, *coefficients)
 
 
@@ -369,27 +366,7 @@ def _small(p: EffectParameter) -> float:
     return low if abs(low - p.neutral) < abs(high - p.neutral) else high
 
 
-def effect_values(problem: Knowing, name: str, probe: Probe) -> dict[str, float]:
-    """A probe as paths of the problem."""
+def effect_values(problem: Knowing, name: str, probe: Probe) -> dict[EffectParameterId, float]:
+    """A probe as values of the effect's parameters, those that it leaves out neutral."""
     neutral = problem.known[name].neutral
-    return {f"{PREFIX}{name}.{key}": probe.get(key, value) for key, value in neutral.items()}
-
-
-def same_causes(problem: Likening, causes: Sequence[str], others: Sequence[str]) -> bool:
-    """Whether two explanations of as many causes say the same, one cause after the other."""
-    return all(a == b or same(problem, a, b) for a, b in zip(causes, others, strict=True))
-
-
-def same(problem: Likening, cause: str, other: str) -> bool:
-    """Whether two causes say the same in other words.
-
-    Args:
-        problem: knows effects, and coefficients that act alike.
-        cause: name of an effect, or ``parameter:<path>``.
-        other: likewise.
-    """
-    if {cause.removeprefix(PARAMETER), other.removeprefix(PARAMETER)} in problem.interchangeable:
-        return True
-    known = problem.known
-    pairs = ((cause, other), (other, cause))
-    return any(a in known and b.removeprefix(PARAMETER) in known[a].equals for a, b in pairs)
+    return {EffectParameterId(name, k): probe.get(k, value) for k, value in neutral.items()}

@@ -17,7 +17,7 @@ from fish_env.arrays import BoolArray, FloatArray, IntArray
 from fish_env.inference.estimate.information import block_index
 from fish_env.inference.estimate.run_variation import RunVariation
 from fish_env.inference.evaluation import Evaluation, GenericTerms, LackOfFit
-from fish_env.inference.hypotheses import parameter_path
+from fish_env.inference.hypotheses import Coefficient, EffectName, EffectParameterId
 from fish_env.inference.vehicle import (
     Coefficients,
     Drive,
@@ -34,11 +34,11 @@ class Point:
 
     Attributes:
         z: (n,) baseline coefficients in units of their prior.
-        effects: ``effects.<name>.<parameter>`` -> value, of the effects in play.
+        effects: values of the effects in play.
     """
 
     z: FloatArray
-    effects: Mapping[str, float]
+    effects: Mapping[EffectParameterId, float]
 
 
 class Problem(Protocol):
@@ -66,9 +66,9 @@ class Problem(Protocol):
     known: Mapping[str, Effect]
     baseline: Coefficients
     effects: tuple[str, ...] = ()
-    hidden_by_drive: tuple[str, ...] = ()
-    out_of_step: tuple[str, ...] = ()
-    interchangeable: tuple[frozenset[str], ...] = ()
+    hidden_by_drive: tuple[EffectName, ...] = ()
+    out_of_step: tuple[EffectName, ...] = ()
+    interchangeable: tuple[frozenset[Coefficient], ...] = ()
     variations: tuple[RunVariation, ...] = ()
     drive: Drive = Drive()
     coefficient_step: float = 0.05
@@ -117,7 +117,7 @@ class Problem(Protocol):
     def innovations(
         self,
         z: FloatArray,
-        effects: Mapping[str, FloatArray],
+        effects: Mapping[EffectParameterId, FloatArray],
         noise: Any,
         filtered: Sequence[Any],
     ) -> FloatArray:
@@ -199,7 +199,7 @@ class Problem(Protocol):
     def changes(
         self,
         z: FloatArray,
-        effects: Mapping[str, FloatArray],
+        effects: Mapping[EffectParameterId, FloatArray],
         noise: Any,
         filtered: Sequence[Any],
     ) -> FloatArray:
@@ -213,14 +213,14 @@ class Problem(Protocol):
         """Nominal coefficients, effects where their estimates begin."""
         return Point(np.zeros(len(self.baseline)), self.beginning(self.effects))
 
-    def beginning(self, names: Iterable[str]) -> dict[str, float]:
+    def beginning(self, names: Iterable[str]) -> dict[EffectParameterId, float]:
         """Values of effects that estimates can begin from."""
         return finite_values(self.known, self.neutral(names))
 
-    def neutral(self, names: Iterable[str]) -> dict[str, float]:
+    def neutral(self, names: Iterable[str]) -> dict[EffectParameterId, float]:
         """Values of effects where they do nothing beyond the nominal model."""
         return {
-            parameter_path(name, parameter): value
+            EffectParameterId(name, parameter): value
             for name in names
             for parameter, value in self.known[name].neutral.items()
         }
@@ -333,7 +333,7 @@ class Problem(Protocol):
         """Sizes of an effect so close that from one of them a slope leads to the right one."""
         return ()
 
-    def batch_key(self, effects: Iterable[str]) -> object:
+    def batch_key(self, names: Iterable[str]) -> object:
         """Settings of effects with the same key are simulated together."""
         return None
 
@@ -349,7 +349,7 @@ class Problem(Protocol):
         """The same problem in usual steps, finer for effects that are not smooth."""
         return self
 
-    def is_coarse(self, effects: Iterable[str]) -> bool:
+    def is_coarse(self, effects: Iterable[EffectParameterId]) -> bool:
         """Whether steps are longer than published estimates of effect parameters ask for."""
         return False
 
@@ -357,7 +357,7 @@ class Problem(Protocol):
         """The same problem in finer steps, and how many times finer."""
         return self, 1
 
-    def refines_steps(self, effects: Iterable[str]) -> bool:
+    def refines_steps(self, effects: Iterable[EffectParameterId]) -> bool:
         """Whether one of these effect parameters has finer steps, since it makes a rate jump."""
         return False
 

@@ -22,6 +22,7 @@ from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.estimate.products import inner
 from fish_env.inference.explanation import Explanation, reached
+from fish_env.inference.hypotheses import CauseId, Coefficient, EffectName, listed
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point
 from fish_env.inference.projection import Projector, Signal
@@ -99,11 +100,11 @@ def picked(
     chosen: list[tuple[int, float]] = []
     directions: list[Rows] = []
     while len(chosen) < most:
-        taken = {candidates[i].cause.name for i, _ in chosen}
+        taken = {candidates[i].cause.id for i, _ in chosen}
         tests = [
             (_log_p(score[i], info[i], s, least), i)
             for i, s in enumerate(candidates)
-            if s.cause.name not in taken and _independent(info[i], s.projected)
+            if s.cause.id not in taken and _independent(info[i], s.projected)
         ]
         log_p, best = min(tests, default=(np.inf, -1))
         if log_p >= shown.threshold + relaxed_log_p:
@@ -164,7 +165,7 @@ def pursued(
     picks = picked(Projector(current.fit.extrapolated), shown, room, least, relaxed_log_p)
     if not picks:
         return current
-    for causes in _led([pick.signal.cause.name for pick in picks], current, shown, report):
+    for causes in _led([pick.signal.cause.effect for pick in picks], current, shown, report):
         found = _needed(current, causes, picks, shown, report)
         if found is not current:
             return found
@@ -173,7 +174,7 @@ def pursued(
 
 def _needed(
     current: Explanation,
-    causes: Sequence[str],
+    causes: Sequence[EffectName],
     picks: Sequence[Pick],
     shown: Screen,
     report: Report,
@@ -188,20 +189,20 @@ def _needed(
         return current
     found = Explanation((*current.causes, *causes), fitted)
     # Beside so many others an effect of implausible size stands in for something else.
-    wild = [name for name in causes if beyond_plausible(fitted, name)]
+    wild: list[CauseId] = [name for name in causes if beyond_plausible(fitted, name)]
     sober = [name for name in found.causes if name not in wild]
     idle = (*wild, *insignificant(fitted, sober, shown.threshold))
     if not set(causes) - set(idle):
         return current
-    report(f"fitting without {', '.join(idle)}" if idle else "fitting what the runs differ in")
+    report(f"fitting without {listed(idle)}" if idle else "fitting what the runs differ in")
     found = found.varied(beside_misfit=True, dropped=idle)
     better = found.score < current.score - POLICY.evidence_doubt
     return found if better and not implausible_estimates(found.fit) else current
 
 
-def _confusable(current: Explanation, name: str) -> tuple[str, ...]:
+def _confusable(current: Explanation, cause: CauseId) -> tuple[str, ...]:
     known = current.fit.problem.known
-    return known[name].confusable_with if name in known else ()
+    return () if isinstance(cause, Coefficient) else known[cause].confusable_with
 
 
 def _fitted(current: Explanation, coarse: CoarseFit) -> Fit | None:
@@ -215,7 +216,9 @@ def _fitted(current: Explanation, coarse: CoarseFit) -> Fit | None:
     return reached(lambda: fit(problem, *start, rounds=2, iterations=3))
 
 
-def _led(names: list[str], current: Explanation, shown: Screen, report: Report) -> list[list[str]]:
+def _led(
+    names: list[EffectName], current: Explanation, shown: Screen, report: Report
+) -> list[list[EffectName]]:
     """Names of effects, before the first of them what may show as it does if that is better.
 
     Two delays in a row are nearly one: the second shows no more, and what shows is its echo. An
@@ -223,15 +226,15 @@ def _led(names: list[str], current: Explanation, shown: Screen, report: Report) 
     coarse fits hardly tell the two best apart, the second follows in case the first is of no use.
     """
     alike = {n for c in (*current.causes, names[0]) for n in _confusable(current, c)} - {*names}
-    echoes = [s for s in shown.best() if s.cause.name in alike][:ECHOES]
+    echoes = [s for s in shown.best() if s.cause.id in alike][:ECHOES]
     if not echoes:
         return [names]
     base = current.fit
     fitter = CoarseFitter(base)
-    tried: list[tuple[float, str]] = []
-    for signal in (*echoes, *(s for s in shown.best() if s.cause.name == names[0])):
-        name = signal.cause.name
-        report(f"trying {name} beside {', '.join(current.causes)}")
+    tried: list[tuple[float, EffectName]] = []
+    for signal in (*echoes, *(s for s in shown.best() if s.cause.id == names[0])):
+        name = signal.cause.effect
+        report(f"trying {name} beside {listed(current.causes)}")
         effects, begin = (*base.effects, name), starts(base, signal, base.point.z)
         found = reached(partial(fitter.coarse_fit, effects, base.released, begin))
         if found:
@@ -241,22 +244,24 @@ def _led(names: list[str], current: Explanation, shown: Screen, report: Report) 
     return [_in_place(name, names, current) for name in close or names[:1]]
 
 
-def _in_place(best: str, names: Sequence[str], current: Explanation) -> list[str]:
+def _in_place(
+    best: EffectName, names: Sequence[EffectName], current: Explanation
+) -> list[EffectName]:
     """The names behind the best, without the first of them if that is its echo."""
     echo = names[0] if best in _confusable(current, names[0]) else best
     return [best, *(name for name in names if name not in (best, echo))]
 
 
 def _together(
-    current: Explanation, causes: Sequence[str], picks: Sequence[Pick], shown: Screen
+    current: Explanation, causes: Sequence[EffectName], picks: Sequence[Pick], shown: Screen
 ) -> CoarseFit | None:
     """The coarse fit with all effects at once; None where the simulation diverges.
 
     It begins from their sizes in the linear model, and from their mildest settings.
     """
     base = current.fit
-    sizes = {pick.signal.cause.name: pick for pick in picks}
-    signals = {s.cause.name: s for s in shown.best()}
+    sizes = {pick.signal.cause.effect: pick for pick in picks}
+    signals = {s.cause.id: s for s in shown.best()}
     linear = dict(base.point.effects)
     for name in causes:
         pick = sizes.get(name)
@@ -279,8 +284,8 @@ class Substitute:
         cost: by how much -2 log likelihood grows, in the linear model.
     """
 
-    cause: str
-    name: str
+    cause: EffectName
+    name: EffectName
     cost: float
 
 
@@ -294,14 +299,14 @@ def substitutes(found: Explanation, shown: Screen) -> list[Substitute]:
     fit = found.fit.extrapolated
     projector = Projector(fit)
     others = [s for s in shown.signals if s.cause.is_effect and s.followed is not None]
-    best: dict[tuple[str, str], float] = {}
+    best: dict[tuple[EffectName, EffectName], float] = {}
     for cause in found.causes:
-        if cause not in fit.effects:
+        if isinstance(cause, Coefficient):
             continue
         off = off_values(fit, cause)
-        own = np.array([fit.names.index(path) for path in off])
+        own = np.array([fit.ids.index(id) for id in off])
         shift = np.array(list(off.values())) - fit.estimates[own]
-        rest = np.setdiff1d(np.arange(len(fit.names)), own)
+        rest = np.setdiff1d(np.arange(len(fit.ids)), own)
         hessian = projector.hessian
         inside = hessian[np.ix_(rest, rest)]
         across = hessian[np.ix_(rest, own)]
@@ -315,7 +320,7 @@ def substitutes(found: Explanation, shown: Screen) -> list[Substitute]:
             slope = pull[own].T @ shift - pull[rest].T @ along @ shift - s.score
             own_info = energy - pull[rest].T @ np.linalg.solve(inside, pull[rest])
             gain = float(slope @ np.linalg.solve(own_info, slope))
-            key = (cause, s.cause.name)
+            key = (cause, s.cause.effect)
             cost = (loss - gain) / s.variance_inflation
             best[key] = min(best.get(key, np.inf), cost)
     found_all = [Substitute(c, n, cost) for (c, n), cost in best.items()]

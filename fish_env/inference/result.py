@@ -10,7 +10,7 @@ from fish_env.inference.attribution import Attribution
 from fish_env.inference.budget import Budget
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.gain import ClosedGap
-from fish_env.inference.hypotheses import PARAMETER, effect_of
+from fish_env.inference.hypotheses import ParameterId
 from fish_env.inference.preconditions import Precondition
 from fish_env.inference.verdict import Verdict
 
@@ -76,10 +76,10 @@ class Result:
         """The accepted fit: with causes, or the refitted baseline."""
         return self.attribution.accepted.fit
 
-    def estimates(self) -> dict[str, Estimate]:
-        """Parameters of the verdict's causes by their paths."""
+    def estimates(self) -> dict[ParameterId, Estimate]:
+        """Parameters of the verdict's causes."""
         fit, causes = self.accepted, set(self.verdict.causes)
-        paths = [p for p in fit.point.effects if effect_of(p) in causes]
-        paths += [p for p in fit.problem.baseline.paths if f"{PARAMETER}{p}" in causes]
-        values = dict(zip(fit.names, fit.estimates.tolist(), strict=True))
-        return {path: Estimate(values[path], fit.interval(path)) for path in paths}
+        ids: list[ParameterId] = [p for p in fit.point.effects if p.effect in causes]
+        ids += [c for c in fit.problem.baseline.ids if c in causes]
+        values = dict(zip(fit.ids, fit.estimates.tolist(), strict=True))
+        return {id: Estimate(values[id], fit.interval(id)) for id in ids}

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from scipy.special import stdtrit
 
 from fish_env.inference.adequacy import implausible_estimates
 from fish_env.inference.explanation import Explanation
+from fish_env.inference.hypotheses import CauseId, Coefficient
 from fish_env.inference.left_out import left_out_scores
 from fish_env.inference.policy import POLICY
-from fish_env.inference.probes import same_causes
+from fish_env.inference.problem import Problem
 from fish_env.inference.projection import Projector
 from fish_env.inference.screening import Screen
 
@@ -35,13 +36,13 @@ def tied(best: Explanation, other: Explanation) -> bool:
     return other.score - best.score < POLICY.evidence_doubt
 
 
-def explained_away(cause: str, before: Screen, after: Screen) -> bool:
+def explained_away(cause: CauseId, before: Screen, after: Screen) -> bool:
     """Whether a cause lost most of its evidence when another was accepted.
 
     If it did not, the two explain different parts of the data: it is a further cause, no rival.
     """
-    evidence = {s.cause.name: s.statistic for s in before.best()}
-    left = {s.cause.name: s.statistic for s in after.best()}
+    evidence = {s.cause.id: s.statistic for s in before.best()}
+    left = {s.cause.id: s.statistic for s in after.best()}
     return left.get(cause, 0.0) < 0.5 * evidence.get(cause, np.inf)
 
 
@@ -73,3 +74,26 @@ def agreed(best: Explanation, other: Explanation) -> bool:
     gains = left_out_scores(best) - left_out_scores(other)
     error = float(gains.std(ddof=1) / np.sqrt(len(gains)))
     return bool(gains.mean() > stdtrit(len(gains) - 1, 1.0 - POLICY.disagreement) * error)
+
+
+def same_causes(problem: Problem, causes: Sequence[CauseId], others: Sequence[CauseId]) -> bool:
+    """Whether two explanations of as many causes say the same, one cause after the other."""
+    return all(a == b or same(problem, a, b) for a, b in zip(causes, others, strict=True))
+
+
+def same(problem: Problem, cause: CauseId, other: CauseId) -> bool:
+    """Whether two causes say the same in other words.
+
+    Args:
+        problem: knows effects, and coefficients that act alike.
+        cause: one of them.
+        other: the other.
+    """
+    if {cause, other} in problem.interchangeable:
+        return True
+    pairs = ((cause, other), (other, cause))
+    return any(
+        not isinstance(a, Coefficient) and isinstance(b, Coefficient)
+        and b.path in problem.known[a].equals
+        for a, b in pairs
+    )  # fmt: skip

@@ -11,7 +11,7 @@ import numpy as np
 from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.products import inner
-from fish_env.inference.hypotheses import PREFIX
+from fish_env.inference.hypotheses import Coefficient, effects_of
 from fish_env.inference.parallel import side_by_side
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause, Probe, best_of_each, effect_values, finer, of_visible
@@ -57,8 +57,8 @@ def screen(
     """
     fit = fit.extrapolated
     projector = Projector(fit)
-    taken = {*fit.effects, *fit.released}
-    tested = [c for c in causes if c.name not in taken and c.path not in taken]
+    taken: set[str | Coefficient] = {*fit.effects, *fit.released}
+    tested = [c for c in causes if c.id not in taken]
     signals = [
         *_effect_signals(fit, projector, tested),
         *_coefficient_signals(projector, tested, fit),
@@ -71,10 +71,10 @@ def zoomed(fit: Fit, signal: Signal) -> Signal:
     """The best signal around one of an oscillation; any other signal as it is."""
     problem, cause = fit.problem, signal.cause
     length = problem.longest_run
-    around = finer(problem.known[cause.name], cause.probes[signal.probe][0], length)
+    around = finer(problem.known[cause.effect], cause.probes[signal.probe][0], length)
     if not around:
         return signal
-    close = Cause(cause.name, around)
+    close = Cause(cause.id, around)
     return min((signal, *_effect_signals(fit, Projector(fit), [close])), key=lambda s: s.log_p)
 
 
@@ -87,10 +87,10 @@ def _effect_signals(fit: Fit, projector: Projector, causes: Sequence[Cause]) -> 
         for probe in alternative
     ]
     start = np.repeat(fit.point.z[:, None], len(jobs), axis=1)
-    columns = residual_changes(fit, [(cause.name, probe) for cause, _, probe in jobs], start)
+    columns = residual_changes(fit, [(cause.effect, probe) for cause, _, probe in jobs], start)
     alternatives: dict[tuple[str, int], list[int]] = {}
     for i, (cause, index, _) in enumerate(jobs):
-        alternatives.setdefault((cause.name, index), []).append(i)
+        alternatives.setdefault((cause.effect, index), []).append(i)
 
     tests = [(jobs[own[0]][0], jobs[own[0]][1], own) for own in alternatives.values()]
     found = projector.signals(tests, columns.T)
@@ -136,7 +136,7 @@ def _kinds(fit: Fit, jobs: Sequence[tuple[str, Probe]]) -> list[list[int]]:
         return [list(range(len(jobs)))]
     kinds: dict[object, list[int]] = {}
     for i, (name, _) in enumerate(jobs):
-        key = fit.problem.batch_key([*fit.point.effects, f"{PREFIX}{name}"])
+        key = fit.problem.batch_key([*effects_of(fit.point.effects), name])
         kinds.setdefault(key, []).append(i)
     return list(kinds.values())
 
@@ -146,7 +146,7 @@ def _changes_at_once(
 ) -> FloatArray:
     base = {**problem.neutral(dict.fromkeys(name for name, _ in jobs)), **fit.point.effects}
     values = [base, *(effect_values(problem, name, probe) for name, probe in jobs)]
-    lanes = {path: np.array([own.get(path, base[path]) for own in values]) for path in base}
+    lanes = {id: np.array([own.get(id, base[id]) for own in values]) for id in base}
     start = np.column_stack([fit.point.z, z])
     return problem.changes(start, lanes, fit.noise, fit.filtered)
 
@@ -160,9 +160,9 @@ def _coefficient_signals(projector: Projector, causes: Sequence[Cause], fit: Fit
     """
     signals = []
     for cause in causes:
-        if cause.is_effect:
+        if not isinstance(cause.id, Coefficient):
             continue
-        i = fit.problem.baseline.paths.index(cause.path or "")
+        i = fit.problem.baseline.ids.index(cause.id)
         at, variance = projector.without_own_bound(i)
         left = 1.0 - variance
         if left < 0.05:

@@ -14,7 +14,7 @@ from fish_env.inference.effort import FULL, Effort
 from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.explanation import FEW_RUNS, Explanation, fitted_again, reached
-from fish_env.inference.hypotheses import PREFIX
+from fish_env.inference.hypotheses import CauseId, Coefficient, EffectParameterId, name_of
 from fish_env.inference.parallel import side_by_side
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
@@ -22,8 +22,8 @@ from fish_env.inference.projection import Signal
 from fish_env.inference.starts import starts
 
 Report = Callable[[str], None]
-NamedCoarseFit = tuple[str, CoarseFit]
-"""With the name of the cause that it has added."""
+NamedCoarseFit = tuple[CauseId, CoarseFit]
+"""With the cause that it has added."""
 Way = Callable[[float, Signal], list[NamedCoarseFit]]
 """Coarse fits of a cause, given up where they will not get below an objective."""
 
@@ -34,7 +34,7 @@ def refits(
     report: Report,
     relaxed: tuple[Fit, Sequence[Signal]] | None = None,
     effort: Effort = FULL,
-    like: Callable[[str], Sequence[Signal]] = lambda name: (),
+    like: Callable[[CauseId], Sequence[Signal]] = lambda cause: (),
     unseen: Sequence[Signal] = (),
 ) -> tuple[list[Explanation], Explanation | None]:
     """Fits with one more cause each, best first, and the present one under the best one's noise.
@@ -59,12 +59,12 @@ def refits(
     follower = CoarseFitter(under_relaxed)
 
     def followed(enough: float, signal: Signal) -> list[NamedCoarseFit]:
-        report(f"trying {signal.cause.name} under relaxed noise")
+        report(f"trying {name_of(signal.cause.id)} under relaxed noise")
         first = _coarse_fits(follower, base, signal, starts(under_relaxed, signal))
         return [s for _, f in first for s in _coarse_fits(fitter, base, signal, [f.point], enough)]
 
     def alone(enough: float, signal: Signal) -> list[NamedCoarseFit]:
-        report(f"trying {signal.cause.name}")
+        report(f"trying {name_of(signal.cause.id)}")
         return _coarse_fits(fitter, base, signal, starts(base, signal), enough)
 
     def also(way: Way, signals: Sequence[Signal]) -> list[NamedCoarseFit]:
@@ -79,7 +79,7 @@ def refits(
         coarse += also(alone, like(ahead)[: effort.shortlist])
     settled = bool(current.causes) and not disturbance_at_limit(base)
     if settled:
-        coarse = _improving(fitter, coarse, {signal.cause.name for signal in chosen})
+        coarse = _improving(fitter, coarse, {signal.cause.id for signal in chosen})
     finalists = _finalists(coarse, fitter.base, POLICY.coarse_fit_behind, effort.finalists)
     found = (_gaining if settled else _led)(current, finalists, report)
     if not found:
@@ -113,11 +113,11 @@ def restart_from_winner(
     done = {e.causes[-1] for e in tried}
 
     def again(signal: Signal) -> list[NamedCoarseFit]:
-        report(f"trying {signal.cause.name} again")
+        report(f"trying {name_of(signal.cause.id)} again")
         begin = starts(current.fit, signal, best.point.z)
         return _coarse_fits(fitter, current.fit, signal, begin, enough)
 
-    others = [s for s in chosen if s.cause.is_effect and s.cause.name not in done]
+    others = [s for s in chosen if s.cause.is_effect and s.cause.id not in done]
     coarse = _all(partial(again, s) for s in others)
     finalists = _finalists(coarse, fitter.base, 0.0, FULL.finalists)
     finalists = [f for f in finalists if f[1].objective < enough]
@@ -138,20 +138,23 @@ def _coarse_fits(
     estimate from all runs, the first start, is then the better start of a full fit.
     """
     cause = signal.cause
-    effects = (*base.effects, cause.name) if cause.is_effect else base.effects
-    released = base.released if cause.is_effect else (*base.released, cause.path or "")
+    effects, released = base.effects, base.released
+    if isinstance(cause.id, Coefficient):
+        released = (*released, cause.id)
+    else:
+        effects = (*effects, cause.id)
     found = reached(lambda: fitter.coarse_fit(effects, released, begin, give_up_above))
     if found is None:
         return []
-    if cause.is_effect and is_off(base.problem, found.point, cause.name):
+    if cause.is_effect and is_off(base.problem, found.point, cause.effect):
         found = replace(found, point=begin[0])
-    return [(cause.name, found)]
+    return [(cause.id, found)]
 
 
 def is_off(problem: Problem, point: Point, name: str) -> bool:
     """Whether an effect does nothing at a point."""
     switching = problem.known[name].switching
-    return all(point.effects[f"{PREFIX}{name}.{p.name}"] == p.neutral for p in switching)
+    return all(point.effects[EffectParameterId(name, p.name)] == p.neutral for p in switching)
 
 
 def _finalists(
@@ -174,7 +177,7 @@ def _enough(coarse: list[NamedCoarseFit], base: float, behind: float, most: int)
 
 
 def _improving(
-    fitter: CoarseFitter, coarse: list[NamedCoarseFit], seen: Collection[str]
+    fitter: CoarseFitter, coarse: list[NamedCoarseFit], seen: Collection[CauseId]
 ) -> list[NamedCoarseFit]:
     """Coarse fits of significant causes, and of others that gain more than the AIC penalty."""
     if all(name in seen for name, _ in coarse):
@@ -192,7 +195,7 @@ def _led(
     base, left = current.fit, [*finalists]
     while left:
         name, coarse = left.pop(0)
-        report(f"fitting {name}")
+        report(f"fitting {name_of(name)}")
         leader = in_full(base.problem, coarse, base.noise)
         if leader is not None:
             first = Explanation((*current.causes, name), leader)
@@ -218,8 +221,8 @@ def _rest(
     """Full fits under the leader's noise, as far as they may come near the leader's."""
     give_up_above = leader.objective + POLICY.out_of_reach
 
-    def fitted(name: str, coarse: CoarseFit) -> Explanation | None:
-        report(f"fitting {name}")
+    def fitted(name: CauseId, coarse: CoarseFit) -> Explanation | None:
+        report(f"fitting {name_of(name)}")
         found = at_noise(leader.problem, coarse, leader.noise, 4, give_up_above)
         return None if found is None else Explanation((*current.causes, name), found)
 

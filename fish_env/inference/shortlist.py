@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fish_env.inference.hypotheses import CauseId, Coefficient
 from fish_env.inference.problem import Problem
 from fish_env.inference.projection import Signal
 from fish_env.inference.screening import Screen
@@ -40,9 +41,9 @@ def shortlisted(
     lifted = [s for s in strong if not s.cause.is_effect]
     enough = _threshold_of_coefficients(screen, found) + relaxed_log_p
     coefficients = [s for s in lifted if s.log_p < enough]
-    first = problem.known.get(effects[0].cause.name) if effects else None
+    first = problem.known[effects[0].cause.effect] if effects else None
     alike = set(first.confusable_with) if first else set()
-    like_first = [s for s in effects[count:] if s.cause.name in alike]
+    like_first = [s for s in effects[count:] if s.cause.id in alike]
     return [*effects[:count], *like_first, *coefficients[: max(1, count // 2)]]
 
 
@@ -61,13 +62,17 @@ def _threshold_of_coefficients(screen: Screen, found: int) -> float:
 
 def newly_shown(after: Screen, chosen: Sequence[Signal]) -> list[Signal]:
     """Effects that the first screen had not shown: the misfit then hid them."""
-    known = {s.cause.name for s in chosen}
+    known = {s.cause.id for s in chosen}
     leading = [s for s in after.best() if s.log_p < after.threshold and s.cause.is_effect]
-    return [s for s in leading if s.cause.name not in known][:3]
+    return [s for s in leading if s.cause.id not in known][:3]
 
 
-def like(winner: str, before: Screen, chosen: Sequence[Signal], problem: Problem) -> list[Signal]:
+def like(
+    winner: CauseId, before: Screen, chosen: Sequence[Signal], problem: Problem
+) -> list[Signal]:
     """Effects known to look like the winner, whatever the screen made of them."""
-    alike = set(problem.known[winner].confusable_with) if winner in problem.known else set()
-    known = {winner, *(s.cause.name for s in chosen)}
-    return [s for s in before.best() if s.cause.name in alike - known]
+    if isinstance(winner, Coefficient):
+        return []
+    alike = set(problem.known[winner].confusable_with)
+    known = {winner, *(s.cause.id for s in chosen)}
+    return [s for s in before.best() if s.cause.id in alike - known]

@@ -8,6 +8,7 @@ import numpy as np
 
 from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.fit import Fit
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import combined, effect_values, mirrored
 from fish_env.inference.problem import Point, Problem
@@ -26,28 +27,30 @@ def starts(base: Fit, signal: Signal, z: FloatArray | None = None) -> list[Point
     signal = zoomed(base, signal)
     linear = linear_estimate(base, signal, signal.size)
     others = [*probed(problem, signal), *_on_starting_grid(base, signal)]
-    clipped = [linear, *(_clipped(base, cause.name, values) for values in others)]
+    clipped = [linear, *(_clipped(base, cause.effect, values) for values in others)]
     begin = baselines(base) if z is None else (z,)
     return [Point(z, {**base.point.effects, **values}) for z in begin for values in clipped]
 
 
-def linear_estimate(base: Fit, signal: Signal, size: FloatArray) -> dict[str, float]:
+def linear_estimate(base: Fit, signal: Signal, size: FloatArray) -> dict[EffectParameterId, float]:
     """Parameters of an effect by the multiple (m,) of each setting, within what it may be."""
-    problem, cause = base.problem, signal.cause
-    start = {p.rsplit(".", 1)[1]: v for p, v in problem.neutral([cause.name]).items()}
-    settings = cause.probes[signal.probe]
-    estimate = combined(problem.known[cause.name], settings, size.tolist(), start)
-    return _clipped(base, cause.name, effect_values(problem, cause.name, estimate))
+    problem, name = base.problem, signal.cause.effect
+    start = {p.name: v for p, v in problem.neutral([name]).items()}
+    settings = signal.cause.probes[signal.probe]
+    estimate = combined(problem.known[name], settings, size.tolist(), start)
+    return _clipped(base, name, effect_values(problem, name, estimate))
 
 
-def _clipped(base: Fit, name: str, values: Mapping[str, float]) -> dict[str, float]:
-    bounds = {f.path: (f.lower, f.upper) for f in base.problem.freedoms([name])}
-    return {path: float(np.clip(value, *bounds[path])) for path, value in values.items()}
+def _clipped(
+    base: Fit, name: str, values: Mapping[EffectParameterId, float]
+) -> dict[EffectParameterId, float]:
+    bounds = {f.id: (f.lower, f.upper) for f in base.problem.freedoms([name])}
+    return {id: float(np.clip(value, *bounds[id])) for id, value in values.items()}
 
 
-def _on_starting_grid(base: Fit, signal: Signal) -> list[dict[str, float]]:
+def _on_starting_grid(base: Fit, signal: Signal) -> list[dict[EffectParameterId, float]]:
     """Sizes of the starting grid, unless the filter follows the drive's phase anyway."""
-    problem, name = base.problem, signal.cause.name
+    problem, name = base.problem, signal.cause.effect
     if problem.follows_drive(base.noise):
         return []
     return [effect_values(problem, name, size) for size in problem.starting_grid(name)]
@@ -63,17 +66,19 @@ def baselines(base: Fit) -> tuple[FloatArray, ...]:
     return (base.point.z, np.zeros_like(base.point.z)) if far else (base.point.z,)
 
 
-def probed(problem: Problem, signal: Signal, every: bool = False) -> list[dict[str, float]]:
+def probed(
+    problem: Problem, signal: Signal, every: bool = False
+) -> list[dict[EffectParameterId, float]]:
     """Settings to begin from: of the best shape at every size, or of every alternative.
 
     On either side of neutral where there are two: of a strong effect no linear estimate tells the
     sign. Never from neutral itself, where many an effect begins too flat to be left again.
     """
-    cause, effect = signal.cause, problem.known[signal.cause.name]
+    cause, effect = signal.cause, problem.known[signal.cause.effect]
     shaped = len(effect.switching) < len(effect.parameters)
     alternatives = (cause.probes[signal.probe],) if shaped and not every else cause.probes
     every_one = [p for probes in alternatives for p in probes]
     settings = [p for i, p in enumerate(every_one) if p not in every_one[:i]]
     opposite = [o for o in (mirrored(effect, p) for p in settings) if o not in settings]
     settings += [o for o in opposite if any(o[p.name] != p.neutral for p in effect.switching)]
-    return [effect_values(problem, cause.name, p) for p in settings]
+    return [effect_values(problem, cause.effect, p) for p in settings]

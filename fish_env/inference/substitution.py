@@ -10,7 +10,15 @@ import numpy as np
 from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.explanation import Explanation, reached
-from fish_env.inference.hypotheses import of_effects, parameter_path
+from fish_env.inference.hypotheses import (
+    CauseId,
+    Coefficient,
+    EffectName,
+    EffectParameterId,
+    listed,
+    name_of,
+    of_effects,
+)
 from fish_env.inference.parallel import side_by_side
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point
@@ -24,7 +32,7 @@ MOST_TURNS = 6
 
 def substituted(
     current: Explanation,
-    pairs: Sequence[tuple[str, Signal]],
+    pairs: Sequence[tuple[CauseId, Signal]],
     most: int,
     report: Report,
     beside_misfit: bool = False,
@@ -47,10 +55,10 @@ def substituted(
     leeway = dict.fromkeys((name for name, _ in pairs), POLICY.coarse_fit_leeway)
     if beside_misfit:
         leeway = {name: max(least, _part(fitter, own, name)) for name, least in leeway.items()}
-    found: list[tuple[float, tuple[str, ...], CoarseFit]] = []
+    found: list[tuple[float, tuple[CauseId, ...], CoarseFit]] = []
     for name, signal in pairs:
-        report(f"trying {signal.cause.name} instead of {name}")
-        causes = tuple(signal.cause.name if c == name else c for c in current.causes)
+        report(f"trying {signal.cause.effect} instead of {name_of(name)}")
+        causes = tuple(signal.cause.id if c == name else c for c in current.causes)
         enough = fitter.base + leeway[name]
         coarse = _swapped(fitter, own, name, signal, enough)
         if coarse is not None and coarse.objective < enough:
@@ -59,7 +67,7 @@ def substituted(
     # Beside a misfit the numbers of the runs have not settled yet, and no fit is hopeless.
     give_up_above = np.inf if beside_misfit else own.objective + POLICY.out_of_reach
     for _, causes, coarse in sorted(found, key=lambda f: f[0])[:most]:
-        report(f"fitting {' and '.join(causes)}")
+        report(f"fitting {listed(causes, ' and ')}")
         fitted = at_noise(own.problem, coarse, own.noise, 4, give_up_above)
         if fitted is not None:
             others.append(Explanation(causes, fitted))
@@ -70,7 +78,7 @@ def substituted(
     return sorted(found_all, key=lambda e: e.score)
 
 
-def _part(fitter: CoarseFitter, own: Fit, name: str) -> float:
+def _part(fitter: CoarseFitter, own: Fit, name: CauseId) -> float:
     """The part of what a cause explains in a coarse fit that a finalist may lack."""
     effects = tuple(e for e in own.effects if e != name)
     begin = [Point(own.point.z, of_effects(own.point.effects, effects))]
@@ -79,7 +87,7 @@ def _part(fitter: CoarseFitter, own: Fit, name: str) -> float:
 
 
 def _swapped(
-    fitter: CoarseFitter, own: Fit, name: str, signal: Signal, enough: float
+    fitter: CoarseFitter, own: Fit, name: CauseId, signal: Signal, enough: float
 ) -> CoarseFit | None:
     """The coarse fit with one effect in place of another, from all its sizes.
 
@@ -87,18 +95,18 @@ def _swapped(
     far away, and is tried from each size in turn.
     """
     kept = of_effects(own.point.effects, {*own.effects} - {name})
-    effects = tuple(signal.cause.name if e == name else e for e in own.effects)
+    effects = tuple(signal.cause.effect if e == name else e for e in own.effects)
     sizes = probed(own.problem, signal, every=True)
     begin = [Point(z, {**kept, **values}) for z in baselines(own) for values in sizes]
     trying = partial(fitter.coarse_fit, effects, own.released, give_up_above=enough)
     coarse = [reached(partial(trying, begin))]
-    if coarse[0] is None or is_off(own.problem, coarse[0].point, signal.cause.name):
+    if coarse[0] is None or is_off(own.problem, coarse[0].point, signal.cause.effect):
         turns = fitter.promising(effects, own.released, begin, MOST_TURNS)
         coarse += [reached(partial(trying, [b])) for b in turns]
     return min((s for s in coarse if s), key=lambda s: s.objective, default=None)
 
 
-def in_parts(current: Explanation, cause: str, report: Report) -> Explanation | None:
+def in_parts(current: Explanation, cause: CauseId, report: Report) -> Explanation | None:
     """The explanation with effects that together do nearly what one of its causes does.
 
     In the place of two effects, one that is neither may fit best alone.
@@ -113,30 +121,31 @@ def in_parts(current: Explanation, cause: str, report: Report) -> Explanation | 
     """
     own = current.fit
     known = own.problem.known
-    if cause not in own.effects:
+    if isinstance(cause, Coefficient) or cause not in own.effects:
         return None
-    at = {p.name: own.point.effects[parameter_path(cause, p.name)] for p in known[cause].parameters}
-    parts = known[cause].in_parts(at)
+    ids = (EffectParameterId(cause, p.name) for p in known[cause].parameters)
+    parts = known[cause].in_parts({id.name: own.point.effects[id] for id in ids})
     if not parts or not {*parts} <= {*known}:
         return None
     report(f"fitting {' and '.join(parts)} instead of {cause}")
-    causes = tuple(dict.fromkeys(n for c in current.causes for n in (parts if c == cause else [c])))
-    effects = tuple(dict.fromkeys(n for e in own.effects for n in (parts if e == cause else [e])))
+    names = [EffectName(name) for name in parts]
+    causes = tuple(dict.fromkeys(n for c in current.causes for n in (names if c == cause else [c])))
+    effects = tuple(dict.fromkeys(n for e in own.effects for n in (names if e == cause else [e])))
     values = of_effects(own.point.effects, {*own.effects} - {cause})
-    values |= {parameter_path(e, p): v for e, of in parts.items() for p, v in of.items()}
+    values |= {EffectParameterId(e, p): v for e, of in parts.items() for p, v in of.items()}
     start = (effects, Point(own.point.z, values), own.noise, own.released)
     fitted = reached(partial(fit, own.problem, *start, refit_noise=False, iterations=4))
     return None if fitted is None else Explanation(causes, fitted)
 
 
-def without(current: Explanation, dropped: Collection[str]) -> Explanation | None:
+def without(current: Explanation, dropped: Collection[CauseId]) -> Explanation | None:
     """The fit when some of its causes are dropped, under the same noise model.
 
     None where the simulation diverges without them.
     """
     own = current.fit
     effects = tuple(e for e in own.effects if e not in dropped)
-    released = tuple(p for p in own.released if f"parameter:{p}" not in dropped)
+    released = tuple(c for c in own.released if c not in dropped)
     begin = Point(own.point.z, of_effects(own.point.effects, effects))
     smaller = reached(
         lambda: fit(

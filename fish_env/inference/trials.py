@@ -14,6 +14,7 @@ from fish_env.inference.adequacy import beyond_plausible
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.estimate.settle import usual_runs
 from fish_env.inference.explanation import FEW_RUNS, Explanation, fitted_again, reached
+from fish_env.inference.hypotheses import EffectName, EffectParameterId, listed
 from fish_env.inference.parallel import side_by_side
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point
@@ -35,20 +36,21 @@ def tried_out(
         report: told what is being done.
     """
     problem = current.fit.problem
-    hidden = [s for s in shown.best() if s.cause.name in problem.hidden_by_drive]
+    hidden = [s for s in shown.best() if s.cause.id in problem.hidden_by_drive]
     swamped = problem.drive.uneven and problem.swamped(current.fit.noise)
     if not hidden or not swamped:
         return None
-    report(f"trying {', '.join(s.cause.name for s in hidden)} in fits of their own")
+    report(f"trying {listed(s.cause.id for s in hidden)} in fits of their own")
     tasks = [partial(_trial, current, "", {})]
-    tasks += [partial(_trial, current, s.cause.name, v) for s in hidden for v in probed(problem, s)]
+    begun = [(s.cause.effect, values) for s in hidden for values in probed(problem, s)]
+    tasks += [partial(_trial, current, *begin) for begin in begun]
     without, *found = side_by_side(tasks)
     best = min((f for f in found if f), key=lambda f: f.objective, default=None)
     if best is None:
         return None
     if without and best.objective > without.objective - POLICY.evidence_doubt:
         return None
-    (name,) = {*best.effects} - {*current.fit.effects}
+    (name,) = map(EffectName, {*best.effects} - {*current.fit.effects})
     report(f"fitting {name}")
     fresh = usual_runs(problem, best.point, best.noise)
     whole = fitted_again(fresh, best, best.noise)
@@ -58,7 +60,7 @@ def tried_out(
     return more if more.score < current.score - POLICY.evidence_doubt else None
 
 
-def _trial(current: Explanation, name: str, values: dict[str, float]) -> Fit | None:
+def _trial(current: Explanation, name: str, values: dict[EffectParameterId, float]) -> Fit | None:
     """A few steps on a few runs, from a nominal vehicle and a small disturbance.
 
     Coefficients and runs' own numbers of the present fit have gone far to make up for what is

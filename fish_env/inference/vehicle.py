@@ -11,7 +11,12 @@ from scipy.optimize import bisect
 
 from fish_env.arrays import BoolArray, FloatArray
 from fish_env.inference.effects import EffectParameter, Parts
-from fish_env.inference.hypotheses import effects_of, parameter_path
+from fish_env.inference.hypotheses import (
+    Coefficient,
+    EffectName,
+    EffectParameterId,
+    effects_of,
+)
 
 
 class Effect(Protocol):
@@ -76,7 +81,7 @@ class EffectFreedom:
     """A free parameter of an effect.
 
     Attributes:
-        path: ``effects.<effect>.<parameter>``.
+        id: the parameter.
         lower: smallest value allowed.
         upper: largest value allowed.
         step: size for finite differences, about a hundredth of what matters.
@@ -84,7 +89,7 @@ class EffectFreedom:
             where none is.
     """
 
-    path: str
+    id: EffectParameterId
     lower: float
     upper: float
     step: float
@@ -95,7 +100,7 @@ def freedoms(effect: Effect, step: float) -> tuple[EffectFreedom, ...]:
     """All parameters of an effect, free within their physical bounds, for RK4 steps (s)."""
     return tuple(
         EffectFreedom(
-            parameter_path(effect.name, p.name),
+            EffectParameterId(effect.name, p.name),
             p.lower,
             p.upper,
             0.02 * (p.plausible[1] - p.plausible[0]),
@@ -122,24 +127,26 @@ def least_followed(effect: Effect, parameter: EffectParameter, step: float) -> f
     return float(bisect(lambda value: is_followed(value) - 0.5, near, far))
 
 
-def finite_values(known: Mapping[str, Effect], values: Mapping[str, float]) -> dict[str, float]:
+def finite_values(
+    known: Mapping[str, Effect], values: Mapping[EffectParameterId, float]
+) -> dict[EffectParameterId, float]:
     """Values of effects, with the mildest plausible one where they are infinite.
 
     No derivative leads away from an infinite rate limit.
     """
     mildest = {
-        parameter_path(name, p.name): p.plausible[1 if p.neutral > 0.0 else 0]
+        EffectParameterId(name, p.name): p.plausible[1 if p.neutral > 0.0 else 0]
         for name in effects_of(values)
         for p in known[name].parameters
     }
-    return {path: v if np.isfinite(v) else mildest[path] for path, v in values.items()}
+    return {id: v if np.isfinite(v) else mildest[id] for id, v in values.items()}
 
 
 class Coefficients:
     """Baseline coefficients with a normal prior, in units where the prior is a standard normal.
 
     Args:
-        paths: names of the coefficients, n of them.
+        paths: of the coefficients in the vehicle's parameter file, n of them.
         mean: (n,) centre of the prior.
         covariance: (n, n) of the prior.
         bounds: (n,) and (n,) physical bounds.
@@ -157,7 +164,8 @@ class Coefficients:
         able: Callable[[Mapping[str, float]], bool] = lambda values: True,
     ) -> None:
         self.paths = tuple(paths)
-        self._units = dict(zip(self.paths, units, strict=False))
+        self.ids = tuple(Coefficient(path) for path in self.paths)
+        self._units = dict(zip(self.ids, units, strict=False))
         self.mean = np.asarray(mean, float)
         self.sd = np.sqrt(np.diag(covariance))
         correlation = covariance / np.outer(self.sd, self.sd)
@@ -169,9 +177,9 @@ class Coefficients:
         """Number of coefficients."""
         return len(self.paths)
 
-    def unit(self, path: str) -> str:
+    def unit(self, coefficient: Coefficient) -> str:
         """Unit of a coefficient, ``-`` when it has none."""
-        return self._units.get(path, "-")
+        return self._units.get(coefficient, "-")
 
     def values(self, z: FloatArray) -> FloatArray:
         """Coefficients (n, N) of normalised ones (n, N)."""
@@ -193,18 +201,18 @@ class Drive:
     """What was measured of a periodic drive, without a model of what it moves.
 
     Attributes:
-        in_step: effect parameters that put the model's drive in step with it, by path.
+        in_step: values of effect parameters that put the model's drive in step with it.
         known: whether it is in step but for these.
         certain: whether chance does not make such measurements.
         uneven: whether single runs differ in it, as they then do in other ways too.
     """
 
-    in_step: Mapping[str, float] = field(default_factory=dict)
+    in_step: Mapping[EffectParameterId, float] = field(default_factory=dict)
     known: bool = False
     certain: bool = False
     uneven: bool = False
 
     @property
-    def effects(self) -> frozenset[str]:
+    def effects(self) -> frozenset[EffectName]:
         """Names of the effects that put the model's drive in step."""
-        return frozenset(effects_of(self.in_step))
+        return frozenset(map(EffectName, effects_of(self.in_step)))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from fish_env.inference.adequacy import Adequacy
 from fish_env.inference.attribution import Attribution
-from fish_env.inference.hypotheses import PARAMETER
+from fish_env.inference.hypotheses import CauseId, Coefficient
 from fish_env.inference.preconditions import Precondition
 
 VERDICTS = (
@@ -34,8 +34,8 @@ class Verdict:
     """
 
     name: str
-    causes: tuple[str, ...] = ()
-    alternatives: tuple[tuple[str, ...], ...] = ()
+    causes: tuple[CauseId, ...] = ()
+    alternatives: tuple[tuple[CauseId, ...], ...] = ()
 
 
 def decide(
@@ -55,7 +55,10 @@ def decide(
 
 
 def verdict_of(
-    reached: bool, causes: tuple[str, ...], rivals: tuple[tuple[str, ...], ...], blind: bool
+    reached: bool,
+    causes: tuple[CauseId, ...],
+    rivals: tuple[tuple[CauseId, ...], ...],
+    blind: bool,
 ) -> Verdict:
     """The verdict, given whether the floor is reached, what explains, and whether data are blind.
 
@@ -70,6 +73,6 @@ def verdict_of(
     if causes and rivals:
         return Verdict("ambiguous", causes, rivals)
     if causes:
-        effects = [name for name in causes if not name.startswith(PARAMETER)]
+        effects = [cause for cause in causes if not isinstance(cause, Coefficient)]
         return Verdict("cause" if effects else "parameters", causes)
     return Verdict("not_excited" if blind else "no_misfit")

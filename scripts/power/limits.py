@@ -19,6 +19,7 @@ from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.series import SeriesProblem
 from fish_env.inference.detectability import changes
 from fish_env.inference.estimate.fit import Fit, fit
+from fish_env.inference.hypotheses import EffectName
 from fish_env.inference.probes import Cause, probes_of
 from fish_env.inference.problem import Point
 from fish_env.inference.projection import Projector
@@ -79,7 +80,7 @@ def limits(
     projector, result = Projector(found), {}
     for name, change in zip(jobs, small - smaller, strict=True):
         slope = change / (NEAR_NOTHING[0] - NEAR_NOTHING[1])
-        signal = projector.signal(Cause(name), 0, slope[:, None])
+        signal = projector.signal(Cause(EffectName(name)), 0, slope[:, None])
         if signal is not None:
             result[name] = _sizes(published[name], signal, threshold)
     return result

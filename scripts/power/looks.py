@@ -17,6 +17,7 @@ from fish_env.data import Dataset, load_dataset
 from fish_env.diagnosis.pipeline import diagnose_runs, fitted_and_final
 from fish_env.identification.series import SeriesProblem
 from fish_env.inference.estimate.fit import Fit, fit
+from fish_env.inference.hypotheses import name_of
 from fish_env.inference.preconditions import preconditions
 from fish_env.inference.probes import causes_of
 from fish_env.inference.screening import Screen, screen
@@ -115,7 +116,7 @@ def with_effect(
         effects = target.values(multiple * published)
         screens = screened(measured(design, repeat, noise, effects)[0], design)[1]
     best = screens.best()
-    own = next(s for s in best if s.cause.name == target.effect)
+    own = next(s for s in best if s.cause.id == target.effect)
     return {
         "target": target.name,
         "multiple": multiple,
@@ -124,7 +125,7 @@ def with_effect(
         "noise": noise,
         "found": bool(own.log_p < screens.threshold),
         "misfit": bool(best[0].log_p < screens.threshold),
-        "first": best[0].cause.name,
+        "first": name_of(best[0].cause.id),
         "statistic": own.statistic,
         "freedom": own.freedom,
         "bound": float(chi2.isf(np.exp(screens.threshold), own.freedom)),
@@ -146,6 +147,6 @@ def diagnosed(
         "repeat": repeat,
         "noise": noise,
         "verdict": verdict.name,
-        "named": list(verdict.causes),
+        "named": [name_of(cause) for cause in verdict.causes],
         "cpu_s": time.process_time() - begin,
     }

@@ -8,7 +8,6 @@ the filter predicts. What a refit follows is taken off both.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -17,6 +16,7 @@ from fish_env.data import Dataset
 from fish_env.diagnosis.pipeline import fitted_and_final
 from fish_env.identification.series import SeriesProblem
 from fish_env.inference.estimate.fit import Fit, fit
+from fish_env.inference.hypotheses import EffectName, EffectParameterId
 from fish_env.inference.probes import Cause, effect_values
 from fish_env.inference.projection import Projector
 from scripts.power.looks import Target, Values, measured
@@ -58,7 +58,7 @@ def compared(base: Fit, design: int, target: Target, size: float) -> dict[str, f
     before = innovations(base, base.problem, {})
     there = innovations(base, problem_of(design, {target.effect: values}), {}) - before
     expected = innovations(base, base.problem, effect_values(base.problem, target.effect, values))
-    projector, cause = Projector(base), Cause(target.effect)
+    projector, cause = Projector(base), Cause(EffectName(target.effect))
     mine = projector.signal(cause, 0, (expected - before)[:, None])
     theirs = projector.signal(cause, 0, -there[:, None])
     if mine is None or theirs is None:
@@ -71,7 +71,9 @@ def compared(base: Fit, design: int, target: Target, size: float) -> dict[str, f
     }
 
 
-def innovations(base: Fit, problem: SeriesProblem, effects: Mapping[str, Any]) -> np.ndarray:
+def innovations(
+    base: Fit, problem: SeriesProblem, effects: Mapping[EffectParameterId, float]
+) -> np.ndarray:
     """Whitened residuals of some runs at a fit, with its gains."""
-    lanes = {path: np.array([value]) for path, value in effects.items()}
+    lanes = {id: np.array([value]) for id, value in effects.items()}
     return problem.innovations(base.point.z[:, None], lanes, base.noise, base.filtered)[0]

@@ -13,6 +13,7 @@ from fish_env.identification.open_loop import without_feedback
 from fish_env.identification.runs import RunData
 from fish_env.inference.adequacy import Adequacy, Misfit, adequacy, implausible_estimates
 from fish_env.inference.estimate.free import Linearised
+from fish_env.inference.hypotheses import Coefficient, EffectParameterId
 from fish_env.inference.problem import Point, Problem
 from fish_env.params import load_fish
 from tests.inference.stated import Stated, coefficients, fit_of
@@ -155,13 +156,14 @@ def named(
     problem = Stated(lambda z, effects: np.zeros((1, 1)), catalogue().values(), paths)
     values = dict.fromkeys(problem.neutral(effects), sum(interval) / 2)
     point, intervals = Point(np.array([z, 0.0]), values), dict.fromkeys(values, interval)
+    released, at_bounds = (tuple(map(Coefficient, paths)) for paths in (released, at_bounds))
     return fit_of(problem, effects, released, point, at_bounds=at_bounds, profiles=intervals)
 
 
 def test_a_coefficient_far_outside_its_prior_is_no_explanation():
     assert implausible_estimates(named(released=("tail.area",), z=6.0)) == ()
     (said,) = implausible_estimates(named(released=("tail.area",), z=-57.0))
-    assert "tail.area" in said
+    assert "tail.area" in said.words
     assert implausible_estimates(named(released=("mass.total",), z=-57.0)) == ()
     trimmed = named(released=("mass.buoyancy",), z=19.0, paths=("mass.buoyancy", "mass.total"))
     assert implausible_estimates(trimmed) == ()  # a buoyancy_offset may be as large
@@ -172,7 +174,7 @@ def test_beside_an_effect_a_coefficient_has_to_be_nearer():
     wave = {"effects": ("wave",), "interval": (0.1, 0.2)}
     assert implausible_estimates(named(released=("tail.area",), z=7.1)) == ()
     (said,) = implausible_estimates(named(released=("tail.area",), z=7.1, **wave))
-    assert "tail.area 7" in said
+    assert "tail.area 7" in said.words
     assert implausible_estimates(named(released=("tail.area",), z=4.5, **wave)) == ()
 
 
@@ -180,7 +182,7 @@ def test_a_coefficient_at_the_end_of_what_physics_allows_is_no_explanation():
     """A hull without lift makes up for something else."""
     stuck = named(released=("tail.area",), z=-6.0, at_bounds=("tail.area",))
     (said,) = implausible_estimates(stuck)
-    assert "tail.area" in said
+    assert "tail.area" in said.words
     assert implausible_estimates(named(z=-4.9, at_bounds=("tail.area",))) == ()  # nothing claims it
 
 
@@ -206,12 +208,12 @@ def test_an_effect_needs_a_sign_and_size_that_it_can_have(effect, interval, beli
 def test_a_shape_that_does_nothing_where_it_is_infinite_is_never_too_large(depth):
     """Data may hardly tell a deep tank from the sea."""
     found = named(effects=("wave",))
-    values = {**found.point.effects, "effects.wave.tank_depth": depth}
+    values = {**found.point.effects, EffectParameterId("wave", "tank_depth"): depth}
     assert implausible_estimates(replace(found, point=Point(found.point.z, values))) == ()
 
 
 def test_a_shape_that_is_finite_may_be_too_large():
     found = named(effects=("wave",))
-    values = {**found.point.effects, "effects.wave.frequency": 9.0}
+    values = {**found.point.effects, EffectParameterId("wave", "frequency"): 9.0}
     (said,) = implausible_estimates(replace(found, point=Point(found.point.z, values)))
-    assert "frequency" in said
+    assert "frequency" in said.words

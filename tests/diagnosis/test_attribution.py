@@ -7,6 +7,7 @@ from scipy.special import chdtri
 from fish_env.effects import catalogue
 from fish_env.inference.attribution import attribute
 from fish_env.inference.estimate.fit import fit
+from fish_env.inference.hypotheses import Coefficient
 from fish_env.inference.probes import Cause, causes_of
 from fish_env.inference.rivals import explained_away
 from fish_env.inference.screening import Screen
@@ -38,16 +39,16 @@ def nothing_missing(*known):
 def test_coefficients_after_the_first_are_judged_among_themselves():
     paths = [str(i) for i in range(40)]
     statistics = chdtri(1, np.exp([-7.0, -5.5, -5.0, *[-1.0] * 37]))
-    causes = [Cause(f"parameter:{path}", path=path) for path in paths]
+    causes = [Cause(Coefficient(path)) for path in paths]
     signals = tuple(signal_of(c, s) for c, s in zip(causes, statistics.tolist(), strict=True))
     screen = Screen(signals, -7.6, 0.05)
     names = [
-        [s.cause.name for s in shortlisted(nothing_missing(), screen, 4, found=found)]
+        [s.cause.id for s in shortlisted(nothing_missing(), screen, 4, found=found)]
         for found in (0, 1, 5)
     ]
     assert names[0] == []
-    assert names[1] == ["parameter:0"]  # 2 / 41 of the level: -6.0
-    assert names[2] == ["parameter:0", "parameter:1"]  # 6 / 45 of it: -5.0
+    assert names[1] == [Coefficient("0")]  # 2 / 41 of the level: -6.0
+    assert names[2] == [Coefficient("0"), Coefficient("1")]  # 6 / 45 of it: -5.0
 
 
 def test_what_looks_like_the_first_is_always_tried():
@@ -55,7 +56,7 @@ def test_what_looks_like_the_first_is_always_tried():
     problem = nothing_missing(catalogue()["servo_lag"])
     statistics = {name: 90.0 - i for i, name in enumerate(names)}
     screen = screen_of(statistics, threshold=-20.0)
-    tried = [s.cause.name for s in shortlisted(problem, screen, 2)]
+    tried = [s.cause.id for s in shortlisted(problem, screen, 2)]
     assert tried == ["servo_lag", "tether", "tail_flexibility"]
     assert shortlisted(problem, screen_of(statistics, threshold=-200.0), 2) == []
     assert shortlisted(problem, screen, 2, least=100.0) == []  # within the simulation's own error

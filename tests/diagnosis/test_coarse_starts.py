@@ -7,6 +7,7 @@ from fish_env.effects import catalogue
 from fish_env.identification import SeriesProblem
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.explanation import Explanation
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.probes import causes_of
 from fish_env.inference.search import refits
 from fish_env.inference.starts import probed
@@ -14,7 +15,7 @@ from tests.identification.synthetic import Setup, simulate
 from tests.inference.stated import SIZE, Stated, cause_of, effect, signal_of, size_of
 
 PROBLEM = SeriesProblem(simulate(Setup(runs=1, duration=2.0)))
-CAUSES = {cause.name: cause for cause in causes_of(PROBLEM) if cause.is_effect}
+CAUSES = {cause.id: cause for cause in causes_of(PROBLEM) if cause.is_effect}
 
 
 @pytest.mark.parametrize("name", sorted(CAUSES))
@@ -22,15 +23,15 @@ def test_no_sketch_begins_where_the_effect_is_off(name):
     switches = [p for p in catalogue()[name].parameters if not p.shapes]
     begun = probed(PROBLEM, signal_of(CAUSES[name], 1.0))
     for values in begun:
-        assert any(values[f"effects.{name}.{p.name}"] != p.neutral for p in switches)
+        assert any(values[EffectParameterId(name, p.name)] != p.neutral for p in switches)
 
 
 def test_a_clock_that_may_be_fast_or_slow_is_tried_both_ways():
     begun = probed(PROBLEM, signal_of(CAUSES["clock_scale"], 1.0))
-    scales = [values["effects.clock_scale.scale"] for values in begun]
+    scales = [values[EffectParameterId("clock_scale", "scale")] for values in begun]
     assert min(scales) < 1.0 < max(scales)
     late = probed(PROBLEM, signal_of(CAUSES["servo_lag"], 1.0))
-    assert all(values["effects.servo_lag.time_constant"] > 0.0 for values in late)
+    assert all(values[EffectParameterId("servo_lag", "time_constant")] > 0.0 for values in late)
 
 
 def late(size):

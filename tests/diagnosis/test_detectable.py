@@ -13,6 +13,7 @@ from fish_env.inference.detectability import (
     simulated,
 )
 from fish_env.inference.estimate.free import Linearised
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.probes import Cause, effect_values
 from fish_env.inference.projection import Projector
 from fish_env.inference.screening import Screen
@@ -23,7 +24,7 @@ SIZE, THRESHOLD, STEP = 600, -7.5, 0.01
 RNG = np.random.default_rng(4)
 SLOPES = RNG.standard_normal((SIZE, 2))
 ALONG, ACROSS = 3.0 * RNG.standard_normal((2, SIZE))
-PATH = "effects.extra.size"
+PATH = EffectParameterId("extra", "size")
 
 
 def stated(change: Callable, fastest: Callable | None = None) -> Stated:

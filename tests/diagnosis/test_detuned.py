@@ -9,12 +9,13 @@ from fish_env.effects import catalogue
 from fish_env.identification import SeriesProblem, fit
 from fish_env.identification.runs import FREQUENCY
 from fish_env.inference.estimate.coarse_fit import CoarseFitter
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.probes import causes_of, phase_grid
 from fish_env.inference.screening import screen
 from fish_env.inference.starts import starts
 from tests.identification.synthetic import Setup, simulate
 
-SCALE = "effects.frequency_scale.scale"
+SCALE = EffectParameterId("frequency_scale", "scale")
 DETUNING = sorted(
     name for name, effect in catalogue().items() if effect.diagnosed and phase_grid(effect, 60.0)
 )
@@ -40,7 +41,7 @@ def case(request):
 
 
 def sketched(base):
-    (cause,) = (c for c in causes_of(base.problem) if c.name == "frequency_scale")
+    (cause,) = (c for c in causes_of(base.problem) if c.id == "frequency_scale")
     signal = screen(base, [cause], np.random.default_rng(0)).best()[0]
     return CoarseFitter(base).coarse_fit(("frequency_scale",), (), starts(base, signal))
 

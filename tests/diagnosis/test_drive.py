@@ -12,6 +12,7 @@ from fish_env.identification import SeriesProblem
 from fish_env.inference.drive import beside_drive
 from fish_env.inference.effort import FULL
 from fish_env.inference.explanation import Explanation
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.pipeline import refit_baseline
 from fish_env.inference.probes import causes_of
 from tests.diagnosis.small_cases import small_case
@@ -40,7 +41,7 @@ def test_a_wake_is_found_beside_a_slow_beat(tmp_path):
     point = found.explanation.fit.point.effects
     for name, values in truth.effects.items():
         for parameter, value in values.items():
-            assert point[f"effects.{name}.{parameter}"] == pytest.approx(value, rel=0.2)
+            assert point[EffectParameterId(name, parameter)] == pytest.approx(value, rel=0.2)
     noise = found.explanation.fit.noise
     assert not nothing.fit.problem.follows_drive(noise), "no phase is left to wander"
 

@@ -9,6 +9,7 @@ from fish_env.data import CommandSteps, Dataset, Run
 from fish_env.diagnosis.inputs.check import CERTAIN, check_inputs
 from fish_env.diagnosis.inputs.drive_law import DriveLaw, drive_law
 from fish_env.identification.tail_drive import SCALE, tail_drive
+from fish_env.inference.hypotheses import EffectParameterId
 
 RATE, LENGTH, HELD, RUNS = 25.0, 30.0, 2.5, 6
 FREQUENCY = 2
@@ -64,7 +65,7 @@ LAWS = (
 @pytest.mark.parametrize("law", LAWS, ids=lambda law: "-".join(law))
 def test_a_law_is_found_with_its_size(law):
     found = drive_law(swaying(1, common=0.98, own=0.002, **law))
-    sizes = {name.split(".")[1]: size for name, size in found.sizes.items()}
+    sizes = {id.name: size for id, size in found.sizes.items()}
     assert sizes.keys() == law.keys()
     for name, size in law.items():
         assert sizes[name] == pytest.approx(size, rel=0.2)
@@ -126,7 +127,7 @@ def test_the_input_step_tells_the_law_and_leaves_it_to_effects():
     assert "beat_load" in told.said
     assert "Write" not in told.said, "no line of dataset.yaml puts it right"
     assert not inputs.binding
-    assert inputs.drive["effects.beat_load.offset"] == pytest.approx(0.25, rel=0.2)
+    assert inputs.drive[EffectParameterId("beat_load", "offset")] == pytest.approx(0.25, rel=0.2)
     assert inputs.drive[SCALE] == pytest.approx(0.97, abs=0.01)
     for run, logged in zip(inputs.dataset.runs, data.runs, strict=True):
         assert np.array_equal(run.commands.values, logged.commands.values)
@@ -142,14 +143,14 @@ def test_runs_that_differ_beside_a_law_are_put_right():
     assert np.median(ratios) == pytest.approx(1.0, abs=0.01)
     assert np.std(ratios) > 0.01
     law = drive_law(inputs.dataset)
-    assert law.sizes["beat_load.offset"] == pytest.approx(0.25, rel=0.2)
+    assert law.sizes[EffectParameterId("beat_load", "offset")] == pytest.approx(0.25, rel=0.2)
 
 
 def test_a_fit_begins_in_step_only_beside_a_law():
     off = tail_drive({SCALE: 0.9})
     assert (off.in_step, off.known) == ({}, False)
-    law = {SCALE: 1.001, "effects.battery_sag.rate": 0.002}
-    assert tail_drive(law).in_step == {"effects.battery_sag.rate": 0.002}
+    law = {SCALE: 1.001, EffectParameterId("battery_sag", "rate"): 0.002}
+    assert tail_drive(law).in_step == {EffectParameterId("battery_sag", "rate"): 0.002}
     assert tail_drive({**law, SCALE: 0.95}).in_step == {**law, SCALE: 0.95}
     assert tail_drive({SCALE: 1.001}).known
     assert not tail_drive({}).known, "nothing was measured"

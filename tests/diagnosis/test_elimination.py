@@ -9,6 +9,7 @@ from fish_env.effects import catalogue
 from fish_env.inference.elimination import backward_elimination, may_not_act
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.explanation import Explanation
+from fish_env.inference.hypotheses import Coefficient
 from tests.inference.stated import Stated, apart, effect, fit_of
 
 
@@ -47,7 +48,7 @@ def test_a_coefficient_is_off_at_its_nominal_value(sd, idle):
     problem = Stated(lambda z, effects: np.zeros((1, 1)), paths=("tail.area", "mass.total"))
     problem.baseline.mean[1] = 2.0
     own = fit_of(problem, estimates=np.array([0.0, 2.1]), covariance=np.diag([1.0, sd**2]))
-    assert may_not_act(own, "parameter:mass.total") is idle
+    assert may_not_act(own, Coefficient("mass.total")) is idle
 
 
 @pytest.mark.parametrize(("wider", "kept"), [(3.0, ("current",)), (1.0, ("current", "scale"))])

@@ -6,6 +6,7 @@ import pytest
 from fish_env.inference.attribution import ranking_of
 from fish_env.inference.estimate.free import Linearised
 from fish_env.inference.explanation import Explanation
+from fish_env.inference.hypotheses import Coefficient
 from fish_env.inference.left_out import left_out_scores
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point
@@ -34,12 +35,13 @@ def explanation(data, effects=(), released=(), problem=PROBLEM):
     times = np.repeat(3.0 * np.arange(60) + 1.0, 20)
     lines = Linearised(residuals, slopes, np.repeat(np.arange(RUNS), 20 * 60 // RUNS), times)
     sizes = dict(zip(map(size_of, effects), best[COEFFICIENTS:].tolist(), strict=True))
+    lifted = tuple(map(Coefficient, released))
     fit = fit_of(
-        problem, effects, released, Point(best[:COEFFICIENTS], sizes), linearised=lines,
+        problem, effects, lifted, Point(best[:COEFFICIENTS], sizes), linearised=lines,
         objective=residuals @ residuals + prior @ best**2,
         filtered=[Evaluated(-0.5 * r @ r, r) for r in np.split(residuals, RUNS)],
     )  # fmt: skip
-    return Explanation((*effects, *released), fit)
+    return Explanation((*effects, *lifted), fit)
 
 
 def exact(data, effects=(), released=()):
@@ -111,7 +113,7 @@ def test_the_ranking_is_by_runs_left_out_with_intervals_over_them():
     y = data(strength=1.5)
     causes = ("second", "first")
     first, second = ranking_of([explanation(y, (c,)) for c in causes], explanation(y))
-    assert (first.name, second.name) == ("first", "second")
+    assert (first.cause, second.cause) == ("first", "second")
     gains = [foretold(y, run, ("first",)) - foretold(y, run) for run in range(RUNS)]
     half = 2.571 * np.std(gains, ddof=1) * RUNS**0.5  # Student's quantile of six runs
     assert first.score == pytest.approx(sum(gains), abs=0.2)

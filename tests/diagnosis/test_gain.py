@@ -12,6 +12,7 @@ from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.runs import RunData
 from fish_env.identification.variation import CURRENT, SENSOR_ERRORS
 from fish_env.inference.gain import WORST, by_window, gap_closed, reachable_share, squared_errors
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
 from fish_env.params import load_fish
 from fish_env.simulator import Simulator
@@ -106,7 +107,9 @@ def test_a_window_does_not_begin_with_a_soft_tail_unbent():
     problem = SeriesProblem(
         Dataset("soft", FISH, (run,), sd), paths=(), effects=["tail_flexibility"]
     )
-    truth = Point(np.zeros(0), {f"effects.tail_flexibility.{n}": v for n, v in soft.items()})
+    truth = Point(
+        np.zeros(0), {EffectParameterId("tail_flexibility", n): v for n, v in soft.items()}
+    )
     noise = NoiseModel(np.full(len(problem.channels), 1e-3), 1e-4, 1e-6, 1.0)
 
     pieces = open_loop.windows(

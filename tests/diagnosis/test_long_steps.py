@@ -8,6 +8,7 @@ import pytest
 from fish_env.identification import SeriesProblem, fit
 from fish_env.identification.generic_forces import BoundForces, generic_forces
 from fish_env.inference.estimate.coarse_fit import CoarseFitter
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
 from fish_env.inference.screening import residual_changes
 from tests.identification.synthetic import PATHS, Setup, simulate
@@ -119,7 +120,9 @@ def limited():
     """A fit with a rate limit in it, and forces along it."""
     setup = Setup(**SHORT)
     problem = SeriesProblem(simulate(setup), paths=PATHS)
-    limit = Point(np.zeros(len(problem.baseline)), {"effects.servo_rate_limit.rate": 2.5})
+    limit = Point(
+        np.zeros(len(problem.baseline)), {EffectParameterId("servo_rate_limit", "rate"): 2.5}
+    )
     held = {"refit_noise": False, "noise": setup.noise}
     own = fit(problem, ("servo_rate_limit",), limit, iterations=1, **held)
     return own, generic_forces(problem.runs, own.filtered)

@@ -9,12 +9,13 @@ from fish_env.identification.tables.problem import TableProblem
 from fish_env.identification.tables.table import table_of
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.estimate.profile import Held, Profile, profiled
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
 from fish_env.params import load_fish
 from tests.diagnosis.test_steady import table
 from tests.hidden.cases import make_case
 
-PATH = "effects.tail_reactive.scale"
+PATH = EffectParameterId("tail_reactive", "scale")
 WORSE = 3.841
 
 

@@ -14,6 +14,7 @@ from fish_env.identification.series import SeriesProblem
 from fish_env.inference.effort import QUICK
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.gain import ClosedGap
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
 from fish_env.inference.verdict import VERDICTS
 from fish_env.simulator import schedule
@@ -202,7 +203,9 @@ def test_series_are_predictions_of_the_two_models(tmp_path):
     truth = small_case(tmp_path / "data", {"servo_lag": 1.0}, runs=3, duration=7.0)
     dataset = load_dataset(tmp_path / "data")
     baseline = fit(SeriesProblem(dataset, None, ("r01", "r02")), rounds=1, iterations=2)
-    lag = {"effects.servo_lag.time_constant": truth.effects["servo_lag"]["time_constant"]}
+    lag = {
+        EffectParameterId("servo_lag", "time_constant"): truth.effects["servo_lag"]["time_constant"]
+    }
     start = Point(np.zeros_like(baseline.point.z), lag)
     extended = fit(baseline.problem, ("servo_lag",), start, rounds=1, iterations=2)
     rng = np.random.default_rng(0)

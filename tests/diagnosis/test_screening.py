@@ -7,6 +7,7 @@ import pytest
 from scipy.stats import kstest
 
 from fish_env.identification import SeriesProblem, fit
+from fish_env.inference.hypotheses import Coefficient
 from fish_env.inference.probes import Cause, best_of_each, causes_of, coefficient_sizes
 from fish_env.inference.projection import Projector, Signal
 from fish_env.inference.screening import confusability, null_threshold, screen, smallest_detectable
@@ -162,16 +163,16 @@ def test_the_smallest_detectable_size_is_found_four_times_in_five():
 @pytest.mark.parametrize("left", [0.3, 0.99])
 def test_a_coefficient_that_far_off_is_found_four_times_in_five(left):
     """The posterior mean of what is off by z has mean z * left and variance left."""
-    path, rng = "tail.lift.c1", np.random.default_rng(0)
+    coefficient, rng = Coefficient("tail.lift.c1"), np.random.default_rng(0)
 
     def found(score):
-        cause = Cause(f"parameter:{path}", path=path)
+        cause = Cause(coefficient)
         column = np.zeros((1, 1))
         return Signal(cause, -1, column, 1.0, np.array([[left]]), np.array([score]), 1.0)
 
     threshold = np.log(1e-3)
     sizes = coefficient_sizes([found(0.0)], lambda s: smallest_detectable(s, 0, threshold))
-    size = sizes[path]
+    size = sizes[coefficient]
     means = size * left + np.sqrt(left) * rng.standard_normal(2000)
     power = np.mean([found(mean).log_p < threshold for mean in means])
     assert power == pytest.approx(0.8, abs=0.03)
@@ -208,8 +209,8 @@ def test_a_cause_like_a_coefficient_is_found_where_that_has_gone_as_far_as_it_ma
     data = simulate(Setup(seed=4, runs=3, duration=10.0, changes={path: far}))
     problem = SeriesProblem(data, paths=PATHS)
     refitted = fit(problem, rounds=1)
-    assert path in refitted.at_bounds
-    causes = [cause for cause in causes_of(problem) if cause.name == "added_mass"]
+    assert Coefficient(path) in refitted.at_bounds
+    causes = [cause for cause in causes_of(problem) if cause.id == "added_mass"]
     found, hidden = (
         screen(baseline, causes, np.random.default_rng(0)).best()[0]
         for baseline in (refitted, replace(refitted, active=refitted.active[:0]))

@@ -16,6 +16,7 @@ from fish_env.identification.tables.problem import TableProblem
 from fish_env.identification.tables.table import table_of
 from fish_env.inference.adequacy import adequacy
 from fish_env.inference.estimate.fit import fit
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
 from fish_env.inference.projection import Signal
 from fish_env.inference.screening import null_threshold
@@ -77,7 +78,9 @@ def test_orbits_are_the_motion_that_waiting_leads_to():
 
 def test_an_effect_that_slows_the_tail_is_the_slower_command():
     problem = honest()
-    slowed = problem.orbits(Point(problem.start.z, {"effects.frequency_scale.scale": 0.9}))
+    slowed = problem.orbits(
+        Point(problem.start.z, {EffectParameterId("frequency_scale", "scale"): 0.9})
+    )
     commands = problem.table.commands.copy()
     commands[:, 2] *= 0.9
     told = problem.with_table(replace(problem.table, commands=commands))
@@ -90,8 +93,11 @@ def test_measurement_effects_are_those_of_the_simulator():
     effects = {"position_scale": {"scale": 1.1}, "attitude_misalignment": {"yaw": 0.05}}
     point = Point(
         problem.start.z,
-        {f"effects.{e}.{p}": v for e, own in effects.items() for p, v in own.items()}
-        | {"effects.attitude_misalignment.roll": 0.0, "effects.attitude_misalignment.pitch": 0.0},
+        {EffectParameterId(e, p): v for e, own in effects.items() for p, v in own.items()}
+        | {
+            EffectParameterId("attitude_misalignment", "roll"): 0.0,
+            EffectParameterId("attitude_misalignment", "pitch"): 0.0,
+        },
     )
     found = problem.means(problem.orbits(point))[0]
     waited = steady_motion(build_model(problem.fish, effects), problem.table.commands)
@@ -102,7 +108,7 @@ def test_measurement_effects_are_those_of_the_simulator():
 def test_a_batch_is_what_each_point_is_alone():
     problem, noise = honest(), honest().default_noise()
     z = np.column_stack([problem.start.z, 0.1 * np.eye(len(problem.baseline))[:, :6]])
-    effects = {"effects.tail_gain.gain": np.r_[np.ones(6), 0.9]}
+    effects = {EffectParameterId("tail_gain", "gain"): np.r_[np.ones(6), 0.9]}
     together = problem.innovations(z, effects, noise, problem.filtered(problem.start, noise))
     for i, row in enumerate(together):
         point = Point(z[:, i], {path: float(own[i]) for path, own in effects.items()})
@@ -114,7 +120,7 @@ def test_a_batch_is_what_each_point_is_alone():
 def test_what_is_not_steady_is_told_and_has_no_likelihood():
     problem = honest()
     noise = problem.default_noise()
-    lost = Point(problem.start.z, {"effects.frequency_scale.scale": 0.05})
+    lost = Point(problem.start.z, {EffectParameterId("frequency_scale", "scale"): 0.05})
     near = problem.filtered(problem.start, noise)
     found = problem.filtered(lost, noise, near)
     assert not np.isfinite(sum(s.log_likelihood for s in found))
@@ -165,7 +171,7 @@ def test_a_held_wrench_is_what_an_added_force_does():
     words = [terms.words(column) for column in terms.columns.tolist()]
     column = words.index(("constant", "yaw"))
     size = terms.unit(column)
-    point = Point(own.point.z, {"effects.applied_wrench.mz": size})
+    point = Point(own.point.z, {EffectParameterId("applied_wrench", "mz"): size})
     pushed = own.problem.filtered(point, own.noise, own.filtered)
     change = np.concatenate([s.residuals for s in pushed]) - own.linearised.residuals
     found = terms.changes(np.array([column]))[:, 0]

@@ -5,6 +5,7 @@ import pytest
 from fish_env.inference.adequacy import Adequacy
 from fish_env.inference.attribution import Attribution
 from fish_env.inference.explanation import Explanation
+from fish_env.inference.hypotheses import Coefficient
 from fish_env.inference.preconditions import Precondition
 from fish_env.inference.screening import Screen
 from fish_env.inference.verdict import VERDICTS, decide
@@ -26,7 +27,7 @@ def shown(*excited):
 
 SEEN = shown(True, True, False)
 BLIND = shown(False, False, True)
-PARAMETER = "parameter:mass.total"
+PARAMETER = Coefficient("mass.total")
 CASES = {
     "no_misfit": ((), (), True, SEEN),
     "not_excited": ((), (), True, BLIND),

@@ -10,6 +10,7 @@ import pytest
 from fish_env import InitialState, Simulator, load_fish
 from fish_env.effects import load_effect_file
 from fish_env.errors import EffectError
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.pipeline import infer
 from tests.docs.pages import ROOT
 
@@ -56,7 +57,14 @@ def test_the_effect_is_refused_beyond_its_bounds():
         Simulator("zheng-2021-a", effects={cable.name: {"coefficient": -1}}, user_effects=[cable])
 
 
-@pytest.mark.parametrize("effects", [{}, {"headwind.force": 0.5}, {"air_drag.k": 0.5}])
+@pytest.mark.parametrize(
+    "effects",
+    [
+        {},
+        {EffectParameterId("headwind", "force"): 0.5},
+        {EffectParameterId("air_drag", "k"): 0.5},
+    ],
+)
 def test_the_rover_says_what_it_lacks(effects):
     sys.path.insert(0, str(EXAMPLES))
     try:
@@ -67,12 +75,12 @@ def test_the_rover_says_what_it_lacks(effects):
     clock = np.arange(0.0, 60.0, 0.1)
     throttle = np.repeat(rng.uniform(-1.0, 1.0, (3, 12)), 50, axis=1)
     still = rover.Rover(clock, throttle, np.zeros(throttle.shape))
-    truth = {f"effects.{path}": np.array([value]) for path, value in effects.items()}
+    truth = {id: np.array([value]) for id, value in effects.items()}
     driven = -still.innovations(np.array([[0.5], [-1.0]]), truth, rover.White(1.0), ())
     speed = driven.reshape(throttle.shape) + 0.05 * rng.standard_normal(throttle.shape)
     result = infer(rover.Rover(clock, throttle, speed))
-    assert result.verdict.causes == tuple(path.split(".")[0] for path in effects)
+    assert result.verdict.causes == tuple(id.effect for id in effects)
     assert result.verdict.name == ("cause" if effects else "no_misfit")
-    for path, value in effects.items():
-        found = result.accepted.interval(f"effects.{path}", level=0.999)
+    for id, value in effects.items():
+        found = result.accepted.interval(id, level=0.999)
         assert found[0] < value < found[1]

@@ -17,6 +17,7 @@ from fish_env.inference.estimate.bounds import (
 )
 from fish_env.inference.estimate.fit import fit, gauss_newton
 from fish_env.inference.estimate.free import Free, objective
+from fish_env.inference.hypotheses import Coefficient
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point
 from fish_env.params import load_fish
@@ -75,7 +76,7 @@ def test_a_correlated_prior_bounds_the_coefficients_themselves():
         values = baseline.values(found[:, None])[:, 0]
         ends = np.where(goal > 0.0, high, low)
         np.testing.assert_allclose(values, ends, atol=2e-3 * baseline.sd.max())
-        assert coefficients_at_bounds(baseline, values) == list(PAIR)
+        assert coefficients_at_bounds(baseline, values) == [*map(Coefficient, PAIR)]
         step = bounds.step(np.eye(2), -wanted, np.zeros(2))
         stepped = baseline.values(step[:, None])[:, 0]
         assert np.all((stepped >= low) & (stepped <= high))
@@ -88,7 +89,7 @@ def test_a_lifted_prior_leaves_the_physical_bounds():
     baseline = Baseline(load_fish(FISH), PAIR)
     low, high = coefficient_range(baseline)
     assert high[0] == pytest.approx(baseline.mean[0] + POLICY.prior_reach_sd * baseline.sd[0])
-    low, high = coefficient_range(baseline, PAIR[:1])
+    low, high = coefficient_range(baseline, baseline.ids[:1])
     assert (low[0], high[0]) == (baseline.bounds[0][0], baseline.bounds[1][0])
     assert high[1] == pytest.approx(baseline.mean[1] + POLICY.prior_reach_sd * baseline.sd[1])
 

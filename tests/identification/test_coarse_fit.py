@@ -9,10 +9,11 @@ from fish_env.data import load_dataset
 from fish_env.identification import SeriesProblem, fit
 from fish_env.inference.estimate.coarse_fit import CoarseFitter
 from fish_env.inference.estimate.free import Free, objective, objectives_with_gains
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
 from tests.diagnosis.small_cases import small_case
 
-LAG = "effects.servo_lag.time_constant"
+LAG = EffectParameterId("servo_lag", "time_constant")
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +64,7 @@ def test_a_sketch_comes_near_what_a_fit_finds(baseline):
     sketch = fitter.coarse_fit(["servo_lag"], (), begin)
     found = fit(baseline.problem, ["servo_lag"], sketch.point, baseline.noise, refit_noise=False)
     assert sketch.objective < fitter.base - 100.0
-    i = found.names.index(LAG)
+    i = found.ids.index(LAG)
     error = sketch.point.effects[LAG] - found.estimates[i]
     assert abs(error) < 2.0 * np.sqrt(found.covariance[i, i])
 

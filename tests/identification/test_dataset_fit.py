@@ -15,6 +15,7 @@ from fish_env.identification.greedy import add_effects, held_out_gain
 from fish_env.identification.left_out import RunErrors, groups_of, left_out_errors
 from fish_env.identification.objectives import OBJECTIVES, refit
 from fish_env.inference.estimate.fit import fit
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.params import load_fish
 from tests.identification.swum_runs import CONDITIONS, FISH, PATHS, swum
 
@@ -96,7 +97,9 @@ def test_an_effect_is_added_that_lowers_the_held_out_error():
     groups = groups_of(data, problem, "run")
     best, errors, steps = add_effects(WHOLE, base, groups, candidates=["tail_bias", "tail_gain"])
     assert best.effects == ("frequency_scale", "tail_gain")
-    assert best.point.effects["effects.tail_gain.gain"] == pytest.approx(0.8, abs=0.05)
+    assert best.point.effects[EffectParameterId("tail_gain", "gain")] == pytest.approx(
+        0.8, abs=0.05
+    )
     assert steps[0].added
     assert steps[0].effect == "tail_gain"
     assert not any(step.added for step in steps[1:])
@@ -160,7 +163,7 @@ def test_one_step_errors_are_in_si_units():
     assert result.objective == "one-step"
     assert set(result.mean_held_out) == {"x", "y", "yaw"}
     assert 3e-4 < result.mean_held_out["x"] < 3e-3
-    low, high = result.fit.interval(PATHS[0])
+    low, high = result.fit.interval(result.fit.ids[0])
     assert result.estimates[0].low == pytest.approx(low)
     assert result.estimates[0].before == load_fish(FISH).get(PATHS[0])
     assert low < result.estimates[0].value < high

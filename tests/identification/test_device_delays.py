@@ -14,6 +14,7 @@ from fish_env.identification.runs import SMEARED_S
 from fish_env.identification.series import SeriesProblem
 from fish_env.identification.variation_slopes import leave_diverged
 from fish_env.inference.estimate.fit import fit
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
 from fish_env.sensing.devices import Device, devices_of
 from tests.identification.synthetic import PATHS, Setup, simulate
@@ -143,7 +144,7 @@ def test_what_makes_devices_late_in_all_runs_is_as_numbers_of_each_run(problem):
     own = movable.with_variation(values, problem.start, noise)
     shared = Point(
         np.zeros(len(PATHS)),
-        {f"effects.sensor_delay.{name}": value
+        {EffectParameterId("sensor_delay", name): value
          for name, value in {"delay": 0.0, "camera_later": 0.056, "depth_later": 0.013}.items()},
     )  # fmt: skip
     common = movable.with_variation(none, shared, noise)
@@ -180,8 +181,8 @@ def test_a_fit_finds_how_late_camera_and_depth_sensor_are():
     series = series.with_runs([run.movable(series.channels) for run in series.runs])
     found = fit(series)
     for name, truth, width in (("delay", 0.02, 0.003), ("camera_later", 0.065, 0.04)):
-        low, high = found.interval(f"effects.sensor_delay.{name}")
+        low, high = found.interval(EffectParameterId("sensor_delay", name))
         assert low < truth < high
         assert high - low < width
-    low, high = found.interval("effects.sensor_delay.depth_later")  # it hardly dives
+    low, high = found.interval(EffectParameterId("sensor_delay", "depth_later"))  # it hardly dives
     assert low < 0.035 < high

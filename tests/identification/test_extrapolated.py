@@ -5,6 +5,7 @@ import pytest
 
 from fish_env.data import load_dataset
 from fish_env.identification import SeriesProblem, fit
+from fish_env.inference.hypotheses import EffectParameterId
 from tests.hidden.cases import make_case
 
 LIMIT = "servo_rate_limit"
@@ -60,7 +61,7 @@ def test_one_step_leads_to_where_fits_in_ever_finer_steps_end(fitted):
 @pytest.mark.long
 def test_it_leads_towards_the_truth(case, fitted):
     def off(found):
-        at = found.names.index(f"effects.{LIMIT}.rate")
+        at = found.ids.index(EffectParameterId(LIMIT, "rate"))
         return (found.estimates[at] - case[1]) / np.sqrt(found.covariance[at, at])
 
     assert abs(off(fitted)) > abs(off(fitted.extrapolated)) + 1.0
@@ -74,7 +75,7 @@ def test_everything_else_stays(fitted):
     assert moved.extrapolated is moved
     np.testing.assert_array_equal(moved.covariance, fitted.covariance)
     index = len(moved.problem.baseline)
-    assert moved.point.effects[f"effects.{LIMIT}.rate"] == moved.estimates[index]
+    assert moved.point.effects[EffectParameterId(LIMIT, "rate")] == moved.estimates[index]
 
 
 def test_a_tail_without_jumps_needs_no_finer_steps(case):

@@ -14,6 +14,7 @@ from fish_env.identification.open_loop import errors
 from fish_env.identification.phases import settle_phases
 from fish_env.inference.estimate import products
 from fish_env.inference.estimate.free import Free, linearise
+from fish_env.inference.hypotheses import EffectParameterId, effects_of
 from fish_env.inference.problem import Point
 from fish_env.params import load_fish
 from fish_env.sensing import measured_channels
@@ -171,14 +172,18 @@ def test_lanes_repeat_the_filter_and_slope_with_its_likelihood():
 
 
 @pytest.mark.parametrize(
-    ("name", "value"), [("servo_lag.time_constant", 0.05), ("current.north", 0.1)]
+    ("parameter", "value"),
+    [
+        (EffectParameterId("servo_lag", "time_constant"), 0.05),
+        (EffectParameterId("current", "north"), 0.1),
+    ],
 )
-def test_effects_left_out_of_a_kernel_would_change_no_bit(name, value):
+def test_effects_left_out_of_a_kernel_would_change_no_bit(parameter, value):
     setup = Setup()
     problem = problem_of(setup)
-    own = {**problem.neutral([name.split(".")[0]]), f"effects.{name}": value}
+    own = {**problem.neutral([parameter.effect]), parameter: value}
     all_of_them = {**own, **problem.neutral(["added_mass"])}
-    assert problem.stages_for(own) < problem.stages_for(all_of_them)
+    assert problem.batch_key(effects_of(own)) < problem.batch_key(effects_of(all_of_them))
     alone, among = (
         problem.filtered(Point(problem.start.z, effects), setup.noise)
         for effects in (own, all_of_them)
@@ -260,30 +265,30 @@ def test_one_thread_or_two_give_the_same_bits(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    ("path", "value"),
+    ("parameter", "value"),
     [
-        ("effects.gyro_bias.r", 0.03),
-        ("effects.position_scale.scale", 1.4),
-        ("effects.sensor_delay.delay", 0.06),
-        ("effects.clock_scale.scale", 1.01),
-        ("effects.clock_skew.scale", 1.01),
-        ("effects.attitude_misalignment.pitch", 0.08),
-        ("effects.marker_offset.x", 0.06),
-        ("effects.camera_tilt.roll", 0.4),
-        ("effects.soft_iron.amplitude", 0.1),
-        ("effects.gyro_scale.r", 0.8),
+        (EffectParameterId("gyro_bias", "r"), 0.03),
+        (EffectParameterId("position_scale", "scale"), 1.4),
+        (EffectParameterId("sensor_delay", "delay"), 0.06),
+        (EffectParameterId("clock_scale", "scale"), 1.01),
+        (EffectParameterId("clock_skew", "scale"), 1.01),
+        (EffectParameterId("attitude_misalignment", "pitch"), 0.08),
+        (EffectParameterId("marker_offset", "x"), 0.06),
+        (EffectParameterId("camera_tilt", "roll"), 0.4),
+        (EffectParameterId("soft_iron", "amplitude"), 0.1),
+        (EffectParameterId("gyro_scale", "r"), 0.8),
     ],
 )
-def test_measurement_effects_reach_the_lanes(path, value):
+def test_measurement_effects_reach_the_lanes(parameter, value):
     """A lane with the effect says the same as the filter with it, so their difference is real."""
     setup = Setup(runs=1, duration=4.0)
     problem = problem_of(setup)
     filtered = problem.filtered(problem.start, setup.noise)
     zero = np.zeros((len(PATHS), 1))
-    (lane,) = problem.innovations(zero, {path: np.array([value])}, setup.noise, filtered)
+    (lane,) = problem.innovations(zero, {parameter: np.array([value])}, setup.noise, filtered)
     own = filtered[0].innovations.ravel()
     assert lane @ lane > own @ own + 20.0
-    (distorted,) = problem.filtered(Point(zero[:, 0], {path: value}), setup.noise)
+    (distorted,) = problem.filtered(Point(zero[:, 0], {parameter: value}), setup.noise)
     assert distorted.log_likelihood < filtered[0].log_likelihood - 10.0
 
 
@@ -310,7 +315,7 @@ def test_the_filter_sees_through_the_sensors_geometry(name):
     setup = Setup(runs=1, duration=4.0)
     data = simulate(setup)
     zero = np.zeros(len(PATHS))
-    values = {f"effects.{name}.{key}": value for key, value in ASKEW[name].items()}
+    values = {EffectParameterId(name, key): value for key, value in ASKEW[name].items()}
     plain, distorted = (
         SeriesProblem(d, paths=PATHS) for d in (data, seen_by(data, {name: ASKEW[name]}))
     )
@@ -344,7 +349,7 @@ def test_lanes_show_what_the_sensors_geometry_says(name, values):
 
     geometry = catalogue()[name].geometry({**catalogue()[name].neutral, **values})
     expected = through_geometry(shown({}), geometry)
-    found = shown({f"effects.{name}.{key}": value for key, value in values.items()})
+    found = shown({EffectParameterId(name, key): value for key, value in values.items()})
     scale = {"x": 1.0, "y": 1.0}
     for channel in problem.channels:
         offset = (found[channel] - expected[channel])[np.isfinite(found[channel])]
@@ -381,7 +386,7 @@ def test_the_filter_sees_through_a_clock(name, moves_commands, scale):
     true_problem = SeriesProblem(data, paths=PATHS)
     other = SeriesProblem(replace(data, runs=(stamped,)), paths=PATHS)
     (true,) = true_problem.filtered(Point(zero, {}), setup.noise)
-    point = Point(zero, {f"effects.{name}.scale": scale})
+    point = Point(zero, {EffectParameterId(name, "scale"): scale})
     noise = replace(setup.noise, correlation_s=setup.noise.correlation_s / scale)
     (undone,) = other.filtered(point, noise)
     (blind,) = other.filtered(Point(zero, {}), noise)

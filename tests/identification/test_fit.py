@@ -14,6 +14,7 @@ from fish_env.inference.estimate.again import finished
 from fish_env.inference.estimate.covariance import sandwich
 from fish_env.inference.estimate.free import Linearised
 from fish_env.inference.estimate.products import inner
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
 from fish_env.params import load_fish, save_fish
 from fish_env.simulator import Simulator
@@ -101,10 +102,10 @@ def test_an_effect_that_is_off_at_infinity_begins_at_a_mild_size():
     problem = SeriesProblem(
         simulate(Setup(runs=1, duration=4.0)), paths=PATHS, effects=["servo_rate_limit"]
     )
-    assert problem.start.effects == {"effects.servo_rate_limit.rate": 8.0}
+    assert problem.start.effects == {EffectParameterId("servo_rate_limit", "rate"): 8.0}
     found = fit(problem, rounds=1, iterations=2)
     assert np.isfinite(found.objective)
-    assert found.point.effects["effects.servo_rate_limit.rate"] > 3.0
+    assert found.point.effects[EffectParameterId("servo_rate_limit", "rate")] > 3.0
 
 
 def test_default_noise_keeps_what_the_dataset_says():

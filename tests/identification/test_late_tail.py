@@ -12,6 +12,7 @@ import pytest
 from fish_env.data import CommandSteps, Dataset
 from fish_env.identification import SeriesProblem
 from fish_env.identification.state_blocks import PHASE_COLUMN
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
 from tests.identification.synthetic import PATHS, Setup, simulate
 
@@ -45,7 +46,7 @@ def test_a_late_tail_is_put_in_phase_as_one_that_is_not_late(delay):
     problem = SeriesProblem(beating(setup), paths=PATHS)
     zero, turn = np.zeros(len(PATHS)), 2.0 * np.pi * FREQUENCY_HZ * delay
     (prompt,) = starting(problem, off).filtered(Point(zero, {}), noise)
-    point = Point(zero, {"effects.servo_delay.delay": delay})
+    point = Point(zero, {EffectParameterId("servo_delay", "delay"): delay})
     (late,) = starting(problem, off + turn).filtered(point, noise)
     np.testing.assert_allclose(late.innovations, prompt.innovations, atol=2e-3)
     told = prompt.states[:, PHASE_ROW] + turn
@@ -57,7 +58,7 @@ def test_lanes_of_a_late_tail_repeat_its_filter():
     setup = Setup(runs=1, duration=4.0)
     noise = replace(setup.noise, phase_sd=0.1)
     problem = starting(SeriesProblem(beating(setup), paths=PATHS), 0.7)
-    zero, effects = np.zeros(len(PATHS)), {"effects.servo_delay.delay": 0.08}
+    zero, effects = np.zeros(len(PATHS)), {EffectParameterId("servo_delay", "delay"): 0.08}
     filtered = problem.filtered(Point(zero, effects), noise)
     lanes = {path: np.full(2, value) for path, value in effects.items()}
     rows = problem.innovations(np.zeros((len(PATHS), 2)), lanes, noise, filtered)

@@ -7,6 +7,7 @@ import pytest
 
 from fish_env.data import CommandSteps
 from fish_env.identification import SeriesProblem
+from fish_env.inference.hypotheses import Coefficient
 from fish_env.inference.probes import causes_of
 from tests.identification.synthetic import Setup, simulate
 
@@ -26,10 +27,10 @@ def problem(channels=PLANE, block=0.0):
 
 def test_what_a_camera_overhead_cannot_see_is_neither_free_nor_blamed():
     level = problem()
-    names = {cause.name for cause in causes_of(level)}
+    ids = {cause.id for cause in causes_of(level)}
     assert not {*UNSEEN} & {*level.baseline.paths}
-    assert not {f"parameter:{path}" for path in UNSEEN} & names
-    assert "parameter:inertia.rest[2]" in names
+    assert not {Coefficient(path) for path in UNSEEN} & ids
+    assert Coefficient("inertia.rest[2]") in ids
 
 
 @pytest.mark.parametrize("other", [{"block": 0.01}, {"channels": (*PLANE, "roll")}])

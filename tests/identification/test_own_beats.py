@@ -13,6 +13,7 @@ from fish_env.identification.runs import FREQUENCY
 from fish_env.identification.series import SeriesProblem
 from fish_env.identification.tail_drive import RATE, SCALE, TailDrive, tail_drive
 from fish_env.identification.variation import BEAT, SAG
+from fish_env.inference.hypotheses import EffectParameterId
 from tests.identification.synthetic import Setup, simulate
 
 SETUP = Setup(runs=5, duration=24.0)
@@ -131,6 +132,6 @@ def test_what_ordinary_runs_share_by_chance_is_no_cause(dataset):
 @pytest.mark.parametrize("certain", [False, True])
 def test_a_doubtful_law_of_the_beat_is_left_to_the_runs(dataset, certain):
     problem = SeriesProblem(told(dataset, [1.0, 1.008, 0.99, 1.0, 1.0]))
-    law = tail_drive({"effects.beat_load.load": 1e-4, SCALE: 1.0}, certain)
+    law = tail_drive({EffectParameterId("beat_load", "load"): 1e-4, SCALE: 1.0}, certain)
     beats = own_beats(problem.with_drive(law))
     assert ("beat_load" in beats.drive.effects) == certain

@@ -9,6 +9,7 @@ from fish_env.data import CommandSteps, Dataset, Run
 from fish_env.identification import SeriesProblem
 from fish_env.identification.noise_model import LARGEST_TURN, NoiseModel
 from fish_env.identification.phases import settle_phases
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
 from fish_env.simulator import Simulator
 from tests.identification.synthetic import PATHS, Setup, simulate
@@ -19,7 +20,8 @@ SD = {"x": 0.002, "y": 0.002, "z": 0.002, "yaw": 0.008}
 SOFT = {"tail_flexibility": {"natural_frequency": 4.5, "damping_ratio": 0.25}}
 BEFORE = 6.0
 TRUTH = Point(
-    np.zeros(0), {f"effects.tail_flexibility.{n}": v for n, v in SOFT["tail_flexibility"].items()}
+    np.zeros(0),
+    {EffectParameterId("tail_flexibility", n): v for n, v in SOFT["tail_flexibility"].items()},
 )
 
 

@@ -14,6 +14,7 @@ from fish_env.identification.variation import SENSOR_ERRORS
 from fish_env.inference.estimate.again import run_variation
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.estimate.settle import predicted_variation
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
 from tests.identification.synthetic import PATHS, Setup, simulate
 
@@ -195,8 +196,8 @@ def test_a_late_gyro_has_the_gain_of_what_it_shows(filtered):
     results = late.filtered(point, noise, keep_slopes=True)
     (run,), (result,) = late.runs, results
     gain = 0.01
-    effects = {f"effects.gyro_scale.{axis}": np.array([1.0]) for axis in "pqr"}
-    more = effects | {"effects.gyro_scale.r": np.array([1.0 + gain])}
+    effects = {EffectParameterId("gyro_scale", axis): np.array([1.0]) for axis in "pqr"}
+    more = effects | {EffectParameterId("gyro_scale", "r"): np.array([1.0 + gain])}
     z = point.z[:, None]
     before, after = (late.innovations(z, e, noise, results)[0] for e in (effects, more))
 

@@ -14,13 +14,14 @@ from fish_env.inference.effort import QUICK
 from fish_env.inference.estimate.again import refined
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.estimate.free import Free, linearise
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.probes import causes_of, effect_values
 from fish_env.inference.problem import Point
 from tests.identification.synthetic import PATHS, Setup, simulate
 
-LAG = {"effects.servo_lag.time_constant": 0.013}
-LIMIT = {"effects.servo_rate_limit.rate": 2.0}
-TORQUE = {"effects.servo_torque_limit.torque": 0.01}
+LAG = {EffectParameterId("servo_lag", "time_constant"): 0.013}
+LIMIT = {EffectParameterId("servo_rate_limit", "rate"): 2.0}
+TORQUE = {EffectParameterId("servo_torque_limit", "torque"): 0.01}
 
 
 @pytest.fixture(scope="module")
@@ -103,7 +104,7 @@ def unlikeness(dataset, in_long_steps=SeriesProblem.with_long_steps):
     problem, exact = SeriesProblem(dataset), SeriesProblem(dataset, dt=1e-3)
     filtered = problem.filtered(problem.start, noise_of(problem))
     settings = [
-        (cause.name, setting)
+        (cause.id, setting)
         for cause in causes_of(problem) if cause.is_effect
         for alternative in cause.probes for setting in alternative
     ]  # fmt: skip
@@ -185,7 +186,9 @@ def gliding(dataset):
 
 
 @pytest.mark.parametrize(
-    "effects", [LAG, {}, {"effects.block_reaction.scale": 1.0}], ids=["lag", "nothing", "block"]
+    "effects",
+    [LAG, {}, {EffectParameterId("block_reaction", "scale"): 1.0}],
+    ids=["lag", "nothing", "block"],
 )
 def test_commands_that_glide_need_no_fine_steps(dataset, effects):
     data = gliding(dataset)
@@ -213,10 +216,10 @@ def likeness_where_it_is_off(dataset, effect, kind=SeriesProblem):
     """Cosine between the slope by a lag that is off and what a lag does that steps follow."""
     problem = kind(dataset).without_refinement()
     free, noise = Free(problem, (effect,), ()), noise_of(problem)
-    (path,) = free.names[free.count :]
+    (path,) = free.ids[free.count :]
     nothing = Point(np.zeros(free.count), {path: 0.0})
     filtered = problem.filtered(nothing, noise)
-    free.suit_steps(1e12 * np.eye(len(free.names)))  # as if the data told the smallest change
+    free.suit_steps(1e12 * np.eye(len(free.ids)))  # as if the data told the smallest change
     slope = linearise(problem, free, free.pack(nothing), noise, filtered).slopes[:, -1]
     sizes = {path: np.array([0.0, 0.02])}
     before, after = problem.innovations(np.zeros((free.count, 2)), sizes, noise, filtered)
@@ -235,15 +238,15 @@ def test_only_what_is_too_quick_takes_other_steps(dataset):
     problem = SeriesProblem(dataset).without_refinement()
     free = Free(problem, problem.known, ())
     for side in (-1.0, 1.0):
-        values = {f.path: 3.0 * side * f.step if f.lower < 0.0 else 2.0 for f in free.freedoms}
+        values = {f.id: 3.0 * side * f.step if f.lower < 0.0 else 2.0 for f in free.freedoms}
         start = free.bounds.clip(free.pack(Point(np.zeros(free.count), values)))
         steps = free.lanes(start)[1]
         np.testing.assert_array_equal(np.abs(steps), free.largest_steps)
-    least = {f.path for f in free.freedoms if np.isfinite(f.least)}
+    least = {f.id for f in free.freedoms if np.isfinite(f.least)}
     lags = ("servo_lag", "block_lag", "wake_memory")
-    quick = {f"effects.{name}.time_constant" for name in lags}
+    quick = {EffectParameterId(name, "time_constant") for name in lags}
     # A flat hull that floats bobs fast.
-    assert least == {*quick, "effects.surface_piercing.height"}
+    assert least == {*quick, EffectParameterId("surface_piercing", "height")}
 
 
 def test_late_samples_show_the_time_before_the_run():
@@ -252,7 +255,7 @@ def test_late_samples_show_the_time_before_the_run():
     data = simulate(setup)
     late = SeriesProblem(data)
     prompt = predicted(late, {})
-    shown = predicted(late, {"effects.sensor_delay.delay": delay})
+    shown = predicted(late, {EffectParameterId("sensor_delay", "delay"): delay})
     measured = late.runs[0].measured
     samples = round(delay * setup.rate)
     np.testing.assert_allclose(
@@ -263,8 +266,14 @@ def test_late_samples_show_the_time_before_the_run():
 @pytest.mark.parametrize(
     ("effect", "distort"),
     [
-        ({"effects.position_scale.scale": 0.9}, lambda name, v: 0.9 * v if name in "xyz" else v),
-        ({"effects.depth_bias.offset": 0.3}, lambda name, v: v + 0.3 if name == "z" else v),
+        (
+            {EffectParameterId("position_scale", "scale"): 0.9},
+            lambda name, v: 0.9 * v if name in "xyz" else v,
+        ),
+        (
+            {EffectParameterId("depth_bias", "offset"): 0.3},
+            lambda name, v: v + 0.3 if name == "z" else v,
+        ),
     ],
     ids=["scale", "bias"],
 )

@@ -7,6 +7,7 @@ from fish_env import Simulator
 from fish_env.data import CommandSteps, Dataset, Run
 from fish_env.identification import SeriesProblem, fit
 from fish_env.identification.channels import TABLE, usable_channels
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
 
 FISH = "zheng-2021-a"
@@ -33,7 +34,7 @@ def record(effects=LAG, channels=tuple(SD), seed=0, phase=0.0, known=True):
 
 def lag_of(dataset):
     problem = SeriesProblem(dataset, paths=PATHS, effects=["servo_lag"])
-    start = Point(np.zeros(len(PATHS)), {"effects.servo_lag.time_constant": 0.03})
+    start = Point(np.zeros(len(PATHS)), {EffectParameterId("servo_lag", "time_constant"): 0.03})
     return fit(problem, start=start)
 
 
@@ -54,7 +55,7 @@ def test_a_tail_angle_that_the_model_explains_leaves_white_residuals():
 
 
 def test_it_tells_a_servo_lag_far_better_than_the_camera_alone():
-    path = "effects.servo_lag.time_constant"
+    path = EffectParameterId("servo_lag", "time_constant")
     low, high = lag_of(record()).interval(path)
     assert low < 0.06 < high
     alone = lag_of(record(channels=("x", "y", "yaw"))).interval(path)

@@ -12,6 +12,7 @@ from fish_env.data.vocabulary import COMMANDS
 from fish_env.identification.series import SeriesProblem
 from fish_env.identification.variation import USUAL, WAVE
 from fish_env.inference.estimate.fit import fit
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
 from fish_env.params import load_fish
 from fish_env.simulator import Simulator
@@ -43,7 +44,7 @@ def problem():
 
 
 def begin(problem, **more):
-    shape = {f"effects.wave.{name}": value for name, value in {**TRUTH, **more}.items()}
+    shape = {EffectParameterId("wave", name): value for name, value in {**TRUTH, **more}.items()}
     return Point(problem.start.z, {**problem.beginning(("wave",)), **shape})
 
 
@@ -78,12 +79,12 @@ def test_the_wave_is_found_as_it_is(problem):
     """With one phase for all runs it fades; with own phases size, period and heading come out."""
     start = begin(problem, amplitude=0.01, frequency=0.505, heading=0.8)
     own = fit(problem, ("wave",), start, differing(problem))
-    found = {name: own.point.effects[f"effects.wave.{name}"] for name in TRUTH}
+    found = {name: own.point.effects[EffectParameterId("wave", name)] for name in TRUTH}
     assert found["amplitude"] == pytest.approx(TRUTH["amplitude"], rel=0.05)
     assert found["frequency"] == pytest.approx(TRUTH["frequency"], abs=2e-3)
     assert found["heading"] == pytest.approx(TRUTH["heading"], abs=0.1)
-    phases = own.problem.variation[:, WAVE] + own.point.effects["effects.wave.phase"]
+    phases = own.problem.variation[:, WAVE] + own.point.effects[EffectParameterId("wave", "phase")]
     assert apart(phases, np.array(PHASES)).max() < 0.15
     shared = fit(problem, ("wave",), start, problem.default_noise())
-    assert shared.point.effects["effects.wave.amplitude"] < 0.8 * TRUTH["amplitude"]
+    assert shared.point.effects[EffectParameterId("wave", "amplitude")] < 0.8 * TRUTH["amplitude"]
     assert own.objective < shared.objective - 1000.0

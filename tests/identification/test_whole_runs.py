@@ -16,6 +16,7 @@ from fish_env.identification.whole_runs.noise import (
 from fish_env.identification.whole_runs.prediction import prediction_errors, second_half
 from fish_env.identification.writing import identified_fish
 from fish_env.inference.estimate.free import Free, linearise
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
 from fish_env.params import load_fish
 from fish_env.simulator import Simulator
@@ -24,7 +25,7 @@ from tests.identification.swum_runs import FISH, PACE, PATHS, START, swum
 
 IDENTIFIED = "msu-tail-fish-identified"
 TRUE_START = {"x": 0.1, "y": 0.2, "yaw": 0.3, "u": 0.02, "phase": 1.0, "pace": PACE}
-GAIN, SCALE = "effects.tail_gain.gain", "effects.frequency_scale.scale"
+GAIN, SCALE = EffectParameterId("tail_gain", "gain"), EffectParameterId("frequency_scale", "scale")
 
 
 def true_start(problem):
@@ -125,7 +126,7 @@ def test_a_run_is_predicted_from_its_beginning(found):
 def test_the_fish_carries_what_was_found(found):
     fish = identified_fish(found, "pool")
     assert fish.info(PATHS[0]).status == "identified"
-    assert fish.posterior.names == (*PATHS, SCALE, GAIN)
+    assert fish.posterior.names == (*PATHS, str(SCALE), str(GAIN))
     assert fish.effects["frequency_scale"]["scale"] == pytest.approx(PACE, abs=5e-3)
     assert fish.posterior.validity["ranges"]["tail_offset"] == [-0.35, 0.35]
 
@@ -133,17 +134,20 @@ def test_the_fish_carries_what_was_found(found):
 def test_parameters_that_no_channel_shows_are_not_free():
     """A camera overhead sees no heave: drag there would be anything."""
     problem = WholeRunProblem(swum(seconds=5.0), paths=PATHS, effects=["linear_drag"])
-    free = {freedom.path for freedom in problem.freedoms(["linear_drag"])}
-    assert free == {"effects.linear_drag.surge", "effects.linear_drag.sway"}
+    free = {freedom.id for freedom in problem.freedoms(["linear_drag"])}
+    assert free == {
+        EffectParameterId("linear_drag", "surge"),
+        EffectParameterId("linear_drag", "sway"),
+    }
 
 
 def test_effects_of_either_sign_are_free_where_channels_show_them():
     """The middle of a range that is alike on both sides would be no effect."""
     problem = WholeRunProblem(swum(seconds=4.0), paths=PATHS)
     free = problem.freedoms(["tail_bias", "tail_asymmetry", "depth_bias", "gyro_bias"])
-    assert {one.path for one in free} == {
-        "effects.tail_bias.offset",
-        "effects.tail_asymmetry.ratio",
+    assert {one.id for one in free} == {
+        EffectParameterId("tail_bias", "offset"),
+        EffectParameterId("tail_asymmetry", "ratio"),
     }
 
 

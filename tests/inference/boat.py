@@ -7,13 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from fish_env.arrays import FloatArray
 from fish_env.inference.effects import DeclaredEffect, EffectParameter
+from fish_env.inference.hypotheses import Coefficient, EffectParameterId, ParameterId
 
-Values = Mapping[str, FloatArray | float]
+Values = Mapping[ParameterId, FloatArray | float]
 SURGE, SWAY, YAW, STERN = 32.0, 50.0, 8.0, -0.7
 """Mass with added mass (kg), moment of inertia (kg m^2), place of the rudder (m)."""
 COEFFICIENTS = {
@@ -43,12 +45,38 @@ EFFECTS = (
         ),
     ),
 )
-NEUTRAL = {f"effects.{e.name}.{n}": v for e in EFFECTS for n, v in e.neutral.items()}
+SURGE_DRAG, SWAY_DRAG, YAW_DRAG, THRUST, RUDDER_LIFT = map(Coefficient, COEFFICIENTS)
+RUDDER_BIAS = EffectParameterId("rudder_bias", "offset")
+PROPELLER_WALK = EffectParameterId("propeller_walk", "lever")
+NORTH, EAST = (EffectParameterId("current", name) for name in ("north", "east"))
+PARAMETERS = (
+    SURGE_DRAG, SWAY_DRAG, YAW_DRAG, THRUST, RUDDER_LIFT, RUDDER_BIAS, PROPELLER_WALK, NORTH, EAST,
+)  # fmt: skip
+NEUTRAL = {EffectParameterId(e.name, n): v for e in EFFECTS for n, v in e.neutral.items()}
 CHANNELS = (0, 1, 2, 3, 5)
 """North and east (m), heading (rad), speed through the water (m/s), yaw rate (rad/s)."""
 SENSOR_SD = np.array([0.15, 0.15, 0.01, 0.02, 0.01])
 Foreign = Callable[[FloatArray], FloatArray]
 """States (R, 6, N) -> forces in surge and sway (N) and moment in yaw (N m), (R, 3, N)."""
+
+
+class Record(NamedTuple):
+    """What the simulation computes with, in the order of :data:`PARAMETERS`."""
+
+    surge_drag: FloatArray | float
+    sway_drag: FloatArray | float
+    yaw_drag: FloatArray | float
+    thrust: FloatArray | float
+    rudder_lift: FloatArray | float
+    rudder_offset: FloatArray | float
+    walk_lever: FloatArray | float
+    north: FloatArray | float
+    east: FloatArray | float
+
+
+def record_of(values: Values) -> Record:
+    """Coefficients and effect parameters, (N,) or numbers, as the simulation reads them."""
+    return Record(*(values[id] for id in PARAMETERS))
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +102,7 @@ class Runs:
 
 
 def rates(
-    state: FloatArray, rudder: FloatArray, propeller: FloatArray, p: Values, push: FloatArray
+    state: FloatArray, rudder: FloatArray, propeller: FloatArray, p: Record, push: FloatArray
 ) -> FloatArray:
     """Derivative of the state (R, 6, N): north, east, heading, surge, sway, yaw rate.
 
@@ -82,25 +110,25 @@ def rates(
         state: velocities are relative to the water, in body axes (x ahead, y to starboard).
         rudder: (R, 1) commanded angle (rad).
         propeller: (R, 1) revolutions per second.
-        p: coefficients and effect parameters, (N,) or numbers.
+        p: coefficients and effect parameters.
         push: (R, 3, N) force and moment of other origin.
     """
     _, _, heading, u, v, r = state.transpose(1, 0, 2)
     cos, sin = np.cos(heading), np.sin(heading)
-    thrust = p["thrust"] * propeller * np.abs(propeller)
-    angle = np.sin(rudder + p["effects.rudder_bias.offset"])
-    side = -p["rudder_lift"] * u * (u * angle + v + STERN * r)
-    surge = thrust - p["surge_drag"] * np.abs(u) * u + SWAY * v * r + push[:, 0]
-    sway = side - p["sway_drag"] * v - SURGE * u * r + push[:, 1]
-    walk = p["effects.propeller_walk.lever"] * thrust
-    yaw = STERN * side - p["yaw_drag"] * r + (SURGE - SWAY) * u * v + walk + push[:, 2]
-    north = cos * u - sin * v + p["effects.current.north"]
-    east = sin * u + cos * v + p["effects.current.east"]
+    thrust = p.thrust * propeller * np.abs(propeller)
+    angle = np.sin(rudder + p.rudder_offset)
+    side = -p.rudder_lift * u * (u * angle + v + STERN * r)
+    surge = thrust - p.surge_drag * np.abs(u) * u + SWAY * v * r + push[:, 0]
+    sway = side - p.sway_drag * v - SURGE * u * r + push[:, 1]
+    walk = p.walk_lever * thrust
+    yaw = STERN * side - p.yaw_drag * r + (SURGE - SWAY) * u * v + walk + push[:, 2]
+    north = cos * u - sin * v + p.north
+    east = sin * u + cos * v + p.east
     return np.stack([north, east, r, surge / SURGE, sway / SWAY, yaw / YAW], axis=1)
 
 
 def step(
-    state: FloatArray, rudder: FloatArray, propeller: FloatArray, p: Values, push: FloatArray,
+    state: FloatArray, rudder: FloatArray, propeller: FloatArray, p: Record, push: FloatArray,
     dt: float,
 ) -> FloatArray:  # fmt: skip
     """One RK4 step (s) with commands and push held."""
@@ -118,16 +146,16 @@ def nothing(state: FloatArray) -> FloatArray:
 
 
 def sail(
-    rng: np.random.Generator, runs: int, effects: Mapping[str, float] = {},
+    rng: np.random.Generator, runs: int, effects: Mapping[EffectParameterId, float] = {},
     foreign: Foreign = nothing, straight: bool = False, drifting: bool = False,
-    coefficients: Mapping[str, float] = {}, duration: float = 30.0,
+    coefficients: Mapping[Coefficient, float] = {}, duration: float = 30.0,
 ) -> Runs:  # fmt: skip
     """Measure a boat whose coefficients scatter as their priors say.
 
     Args:
         rng: draws coefficients, commands and noise.
         runs: number of runs.
-        effects: what acts, by path.
+        effects: what acts.
         foreign: force that no effect describes.
         straight: whether rudder and propeller stay where they are.
         drifting: whether the propeller stands still.
@@ -139,8 +167,11 @@ def sail(
     propeller = np.full((runs, len(clock)), 5.5)
     propeller += 0.0 if straight else _held(rng, runs, clock, 2.0)
     propeller *= 0.0 if drifting else 1.0
-    drawn = {n: m * (1.0 + sd * rng.standard_normal()) for n, (m, sd, _) in COEFFICIENTS.items()}
-    p = {**NEUTRAL, **drawn, **coefficients, **effects}
+    drawn = {
+        Coefficient(path): mean * (1.0 + sd * rng.standard_normal())
+        for path, (mean, sd, _) in COEFFICIENTS.items()
+    }
+    p = record_of({**NEUTRAL, **drawn, **coefficients, **effects})
     state = np.zeros((runs, 6, 1))
     state[:, 2, 0] = rng.uniform(-np.pi, np.pi, runs)
     state[:, 3, 0] = 0.0 if drifting else 1.2

@@ -11,9 +11,20 @@ from typing import Any
 import numpy as np
 
 from fish_env.arrays import FloatArray, IntArray
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point, Problem
 from fish_env.inference.vehicle import Coefficients
-from tests.inference.boat import CHANNELS, COEFFICIENTS, EFFECTS, NEUTRAL, SENSOR_SD, Runs, step
+from tests.inference.boat import (
+    CHANNELS,
+    COEFFICIENTS,
+    EFFECTS,
+    NEUTRAL,
+    SENSOR_SD,
+    Record,
+    Runs,
+    record_of,
+    step,
+)
 
 SEEN = list(CHANNELS)
 SMALL = 1e-4
@@ -162,7 +173,7 @@ class BoatProblem(Problem):
     def innovations(
         self,
         z: FloatArray,
-        effects: Mapping[str, FloatArray],
+        effects: Mapping[EffectParameterId, FloatArray],
         noise: BoatNoise,
         filtered: Sequence[Filtered],
         push: FloatArray | None = None,
@@ -182,9 +193,9 @@ class BoatProblem(Problem):
             state = moved + gains[:, k - 1] @ error
         return residuals.reshape(len(residuals), -1)
 
-    def _values(self, z: FloatArray, effects: Mapping[str, FloatArray]) -> dict[str, Any]:
-        coefficients = zip(self.baseline.paths, self.baseline.values(z), strict=True)
-        return {**NEUTRAL, **dict(coefficients), **effects}
+    def _values(self, z: FloatArray, effects: Mapping[EffectParameterId, FloatArray]) -> Record:
+        coefficients = zip(self.baseline.ids, self.baseline.values(z), strict=True)
+        return record_of({**NEUTRAL, **dict(coefficients), **effects})
 
     def _start(self, runs: Runs) -> tuple[FloatArray, FloatArray]:
         """State (R, 6) as first measured, and its covariance (R, 6, 6)."""
@@ -250,6 +261,6 @@ class BoatForces:
         for lane, column in enumerate(columns.tolist(), start=1):
             push[:, :, column % 3, lane] = self.unit(column) * values[column // 3].T
         z = np.repeat(fit.point.z[:, None], lanes, axis=1)
-        effects = {path: np.full(lanes, value) for path, value in fit.point.effects.items()}
+        effects = {id: np.full(lanes, value) for id, value in fit.point.effects.items()}
         rows = self.problem.innovations(z, effects, fit.noise, fit.filtered, push)
         return np.asarray((rows[1:] - rows[0]).T)

@@ -13,13 +13,13 @@ from fish_env.arrays import FloatArray, IntArray
 from fish_env.inference.effects import DeclaredEffect, EffectParameter
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.free import Free, Linearised
-from fish_env.inference.hypotheses import effects_of, parameter_path
+from fish_env.inference.hypotheses import Coefficient, EffectName, EffectParameterId, effects_of
 from fish_env.inference.probes import Cause, Probe, probes_of
 from fish_env.inference.problem import Point, Problem
 from fish_env.inference.projection import Signal
 from fish_env.inference.vehicle import Coefficients, Effect
 
-Residuals = Callable[[FloatArray, Mapping[str, float]], FloatArray]
+Residuals = Callable[[FloatArray, Mapping[EffectParameterId, float]], FloatArray]
 """Coefficients (n,) and values of effects -> residuals (runs, samples), not finite if diverged."""
 SIZE = "size"
 
@@ -65,7 +65,9 @@ class Stated(Problem):
         paths: Sequence[str] = ("c",),
         learns: bool = False,
         limit: float = np.inf,
-        diverging: Callable[[Mapping[str, float], White], bool] = lambda effects, noise: False,
+        diverging: Callable[
+            [Mapping[EffectParameterId, float], White], bool
+        ] = lambda effects, noise: False,
         step: float = 0.01,
     ) -> None:
         self.residuals = residuals
@@ -76,7 +78,7 @@ class Stated(Problem):
         runs, self.samples = self._all(np.zeros(len(paths)), {}).shape
         self.which = list(range(runs))
 
-    def _all(self, z: FloatArray, effects: Mapping[str, float]) -> FloatArray:
+    def _all(self, z: FloatArray, effects: Mapping[EffectParameterId, float]) -> FloatArray:
         return np.asarray(self.residuals(z, {**self.neutral(self.known), **effects}), float)
 
     @property
@@ -123,15 +125,21 @@ class Stated(Problem):
         return [Evaluated(float(-0.5 * row @ row - constant), row) for row in rows]
 
     def innovations(
-        self, z: FloatArray, effects: Mapping[str, FloatArray], noise: White, filtered: Any
+        self,
+        z: FloatArray,
+        effects: Mapping[EffectParameterId, FloatArray],
+        noise: White,
+        filtered: Any,
     ) -> FloatArray:
         self.log.simulated.append((frozenset(effects_of(effects)), self.run_count))
-        lanes = [{path: float(values[i]) for path, values in effects.items()}
+        lanes = [{id: float(values[i]) for id, values in effects.items()}
                  for i in range(z.shape[1])]  # fmt: skip
         pairs = zip(z.T, lanes, strict=True)
         return np.array([self._rows(one, own, noise).ravel() for one, own in pairs])
 
-    def _rows(self, z: FloatArray, effects: Mapping[str, float], noise: White) -> FloatArray:
+    def _rows(
+        self, z: FloatArray, effects: Mapping[EffectParameterId, float], noise: White
+    ) -> FloatArray:
         rows = self._all(z, effects)[self.which] / noise.sd
         return np.full_like(rows, np.nan) if self.diverging(effects, noise) else rows
 
@@ -151,9 +159,9 @@ def effect(
     return DeclaredEffect(name, (size,), **declared)
 
 
-def size_of(name: str) -> str:
-    """Path of the size of such an effect."""
-    return parameter_path(name, SIZE)
+def size_of(name: str) -> EffectParameterId:
+    """The size of such an effect."""
+    return EffectParameterId(name, SIZE)
 
 
 def apart(targets: Mapping[str, Sequence[float]]) -> Residuals:
@@ -164,7 +172,7 @@ def apart(targets: Mapping[str, Sequence[float]]) -> Residuals:
     """
     wanted = np.array(list(targets.values()), float).T
 
-    def residuals(z: FloatArray, effects: Mapping[str, float]) -> FloatArray:
+    def residuals(z: FloatArray, effects: Mapping[EffectParameterId, float]) -> FloatArray:
         sizes = np.array([effects[size_of(name)] for name in targets])
         left = np.where((sizes == 0.0) & np.isnan(wanted), 0.0, sizes - wanted)
         return np.column_stack([left, np.full(len(left), z.sum())])
@@ -175,7 +183,7 @@ def apart(targets: Mapping[str, Sequence[float]]) -> Residuals:
 def fit_of(
     problem: Problem,
     effects: Sequence[str] = (),
-    released: Sequence[str] = (),
+    released: Sequence[Coefficient] = (),
     point: Point | None = None,
     noise: Any = None,
     linearised: Linearised | None = None,
@@ -185,10 +193,10 @@ def fit_of(
     point = point or problem.start
     free = Free(problem, effects, released)
     none = np.zeros(0)
-    count = len(free.names)
+    count = len(free.ids)
     empty = Linearised(none, np.zeros((0, count)), none.astype(np.int64), none)
     values = {
-        "names": free.names, "estimates": np.zeros(count), "covariance": np.eye(count),
+        "ids": free.ids, "estimates": np.zeros(count), "covariance": np.eye(count),
         "log_likelihood": 0.0, "objective": 0.0, "at_bounds": (), "active": np.zeros((0, count)),
         "condition": 1.0, "filtered": (), "linearised": linearised or empty,
     }  # fmt: skip
@@ -206,4 +214,4 @@ def signal_of(cause: Cause, statistic: float, inflation: float = 1.0) -> Signal:
 
 def cause_of(declared: Effect, probes: tuple[tuple[Probe, ...], ...] | None = None) -> Cause:
     """An effect as a cause."""
-    return Cause(declared.name, probes_of(declared) if probes is None else probes)
+    return Cause(EffectName(declared.name), probes_of(declared) if probes is None else probes)

@@ -11,12 +11,12 @@ from fish_env.inference.pipeline import infer, refit_baseline
 from fish_env.inference.probes import causes_of
 from fish_env.inference.result import Result
 from fish_env.inference.screening import screen
-from tests.inference.boat import COEFFICIENTS, sail, split
+from tests.inference.boat import COEFFICIENTS, EAST, NORTH, THRUST, sail, split
+from tests.inference.boat import PROPELLER_WALK as WALK
+from tests.inference.boat import RUDDER_BIAS as BIAS
 from tests.inference.boat_problem import BoatNoise, BoatProblem
 
 FITTED = 4
-BIAS, WALK = "effects.rudder_bias.offset", "effects.propeller_walk.lever"
-NORTH, EAST = "effects.current.north", "effects.current.east"
 HIDDEN = [({BIAS: 0.03}, 0), ({WALK: -0.03}, 1), ({NORTH: 0.05, EAST: -0.1}, 2)]
 
 
@@ -43,7 +43,7 @@ def found(case: int) -> Result:
 def test_each_hidden_effect_is_found_with_the_truth_in_its_interval(case):
     result, effects = found(case), HIDDEN[case][0]
     assert result.verdict.name == "cause"
-    assert result.verdict.causes == (next(iter(effects)).split(".")[1],)
+    assert result.verdict.causes == (next(iter(effects)).effect,)
     estimates = result.estimates()
     assert estimates.keys() == effects.keys()
     for path, truth in effects.items():
@@ -90,10 +90,10 @@ def test_two_effects_are_found_together():
 
 def test_a_wrong_coefficient_is_named_as_one():
     mean, share, _ = COEFFICIENTS["thrust"]
-    result = infer(*problems(6, coefficients={"thrust": mean * (1.0 + 7.0 * share)}), seed=6)
+    result = infer(*problems(6, coefficients={THRUST: mean * (1.0 + 7.0 * share)}), seed=6)
     assert result.verdict.name == "parameters"
-    assert "parameter:thrust" in result.verdict.causes
-    assert result.estimates()["thrust"].value == pytest.approx(1.7 * mean, rel=0.1)
+    assert THRUST in result.verdict.causes
+    assert result.estimates()[THRUST].value == pytest.approx(1.7 * mean, rel=0.1)
 
 
 @pytest.mark.parametrize("seed", [1, 2])
@@ -131,7 +131,7 @@ def test_a_size_that_can_just_be_found_is_found_about_as_often():
     result = infer(problem, seed=8)
     (shown,) = [p for p in result.preconditions if p.name == "rudder_bias"]
     size = shown.smallest_detectable["offset"]
-    truth = dict(zip(baseline.names, baseline.estimates.tolist(), strict=True))
+    truth = dict(zip(baseline.ids, baseline.estimates.tolist(), strict=True))
     seen = []
     for times in (0.3, 3.0):
         rng = np.random.default_rng(8)  # the same commands

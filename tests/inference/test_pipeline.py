@@ -56,7 +56,7 @@ def test_a_weaker_cause_is_kept_if_it_leaves_nothing(wave, unknown, kept):
     targets = {**dict.fromkeys(NAMES, 0.0), "wave": wave, UNKNOWN: unknown}
     runs = {name: np.full(3, size) for name, size in targets.items()}
     problem = Pushed(apart(runs), [effect(name) for name in targets])
-    causes = [cause for cause in causes_of(problem) if cause.name != UNKNOWN]
+    causes = [cause for cause in causes_of(problem) if cause.id != UNKNOWN]
     rng, said = np.random.default_rng(0), []
     before = attribute(problem, fit(problem), causes, rng)
     assert before.accepted.causes == ()
@@ -130,7 +130,7 @@ def test_a_slow_cause_is_found_where_a_disturbance_hid_it(tide, unknown, kept):
     targets = {**dict.fromkeys(NAMES[1:], 0.0), "tide": tide, UNKNOWN: unknown}
     runs = {name: np.full(3, size) for name, size in targets.items()}
     problem = Hiding(apart(runs), [effect(name, reach=10.0) for name in targets])
-    causes = [cause for cause in causes_of(problem) if cause.name != UNKNOWN]
+    causes = [cause for cause in causes_of(problem) if cause.id != UNKNOWN]
     rng, said = np.random.default_rng(0), []
     before = attribute(problem, fit(problem), causes, rng)
     assert before.accepted.causes == ()

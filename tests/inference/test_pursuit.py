@@ -48,9 +48,9 @@ def screened() -> tuple[Fit, Screen]:
 def test_all_hidden_effects_are_picked_in_the_linear_model():
     baseline, shown = screened()
     picks = picked(Projector(baseline), shown, 8)
-    assert {pick.signal.cause.name for pick in picks} >= NAMES
-    assert [p.signal.cause.name for p in picked(Projector(baseline), shown, 1)] == [
-        picks[0].signal.cause.name
+    assert {pick.signal.cause.id for pick in picks} >= NAMES
+    assert [p.signal.cause.id for p in picked(Projector(baseline), shown, 1)] == [
+        picks[0].signal.cause.id
     ]
 
 
@@ -101,7 +101,7 @@ def test_a_substitute_costs_what_a_fit_with_it_loses():
     for name in ("propeller_walk", "current"):
         wrong = fit(boat, (name,), noise=right.noise, refit_noise=False, iterations=10)
         loss = wrong.objective - right.objective
-        inflation = {s.cause.name: s.variance_inflation for s in shown.best()}[name]
+        inflation = {s.cause.id: s.variance_inflation for s in shown.best()}[name]
         assert costs[name] == pytest.approx(loss / inflation, rel=0.2)
 
 
@@ -181,7 +181,7 @@ def test_what_is_like_a_cause_found_does_not_push_out_what_shows():
     problem = Stated(residuals, [*known, effect("bias", 40.0)])
     current = Explanation(("lag",), fit(problem, ("lag",)))
     shown = screen(current.fit, causes_of(problem), np.random.default_rng(0))
-    assert shown.best()[0].cause.name == "bias"
+    assert shown.best()[0].cause.id == "bias"
     said = []
     pursued(current, shown, said.append, most=1)
     assert "fitting delay, bias together" in said

@@ -22,7 +22,7 @@ from fish_env.diagnosis.inputs.weighing import BEAT, Scales
 from fish_env.errors import DatasetError
 from fish_env.identification.beats import own_ratio
 from fish_env.identification.recorded import recorded
-from fish_env.inference.hypotheses import effect_of
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.input_faults import InputFault
 from fish_env.params.io import load_fish
 from fish_env.params.schema import FishParams
@@ -51,14 +51,14 @@ class Inputs:
         dataset: the data with what is decisive put right.
         logged: the data as they were given.
         drive: by how much the tail beats otherwise than commanded in all runs, as effects say it:
-            ``effects.<name>.<parameter>`` -> about its value.
+            effect parameter -> about its value.
         drive_certain: whether chance is ruled out for that.
     """
 
     faults: tuple[InputFault, ...]
     dataset: Dataset
     logged: Dataset
-    drive: Mapping[str, float] = field(default_factory=dict)
+    drive: Mapping[EffectParameterId, float] = field(default_factory=dict)
     drive_certain: bool = False
 
     @property
@@ -105,7 +105,7 @@ def check_inputs(dataset: Dataset, fish: FishParams | None = None, seed: int = 0
     if seen.fine is not None and closer[-1].corrected:
         dataset = seen.fine.change.applied(dataset)
     drive = seen.law.starts(math.prod(change.clocks[""].beat for change in left))
-    drive = {path: v for path, v in drive.items() if effect_of(path) not in nominal.effects}
+    drive = {id: v for id, v in drive.items() if id.effect not in nominal.effects}
     certain = seen.law.p < CERTAIN
     return Inputs(tuple(faults), _noted(dataset, faults), logged, drive, certain)
 

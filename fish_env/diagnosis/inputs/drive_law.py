@@ -19,23 +19,19 @@ from fish_env.diagnosis.inputs.clocks import strokes_of
 from fish_env.diagnosis.inputs.orders import FREQUENCY, drive_terms, windows_of
 from fish_env.diagnosis.inputs.ratios import peaks_of, ratio_near
 from fish_env.effects import catalogue
-from fish_env.identification.tail_drive import SCALE
-from fish_env.inference.hypotheses import effect_of, parameter_of
+from fish_env.identification.tail_drive import RATE, SCALE
+from fish_env.inference.hypotheses import EffectParameterId
 
-TERMS = ("battery_sag.rate", "beat_load.offset", "beat_load.load", "side_load.beat")
-"""Effect parameters by which the beat falls, in the order of the windows' terms."""
 SAID = {
-    "battery_sag.rate": "more with each second of a run (`battery_sag`)",
-    "beat_load.offset": "for each radian of its offset (`beat_load`)",
-    "beat_load.load": "for each rad/s of its stroke (`beat_load`)",
-    "side_load.beat": "with any offset (`side_load`)",
+    RATE: "more with each second of a run (`battery_sag`)",
+    EffectParameterId("beat_load", "offset"): "for each radian of its offset (`beat_load`)",
+    EffectParameterId("beat_load", "load"): "for each rad/s of its stroke (`beat_load`)",
+    EffectParameterId("side_load", "beat"): "with any offset (`side_load`)",
 }
+"""Effect parameters by which the beat falls, in the order of the windows' terms, in words."""
+TERMS = tuple(SAID)
 SMALLEST = tuple(
-    next(
-        p.plausible[0]
-        for p in catalogue()[effect_of(term)].parameters
-        if p.name == parameter_of(term)
-    )
+    next(p.plausible[0] for p in catalogue()[term.effect].parameters if p.name == term.name)
     for term in TERMS
 )
 """The least that the catalogue takes for plausible. Without any such effect the regression finds
@@ -59,16 +55,16 @@ class DriveLaw:
     """
 
     common: float | None = None
-    sizes: Mapping[str, float] = field(default_factory=dict)
+    sizes: Mapping[EffectParameterId, float] = field(default_factory=dict)
     p: float = 1.0
 
     @property
     def words(self) -> str:
         """What the beat does, a clause; empty where it follows its command."""
-        found = [f"by {100.0 * size:.2g} % {SAID[name]}" for name, size in self.sizes.items()]
+        found = [f"by {100.0 * size:.2g} % {SAID[term]}" for term, size in self.sizes.items()]
         return f"the tail beats more slowly than commanded: {' and '.join(found)}" if found else ""
 
-    def starts(self, common: float = 1.0) -> dict[str, float]:
+    def starts(self, common: float = 1.0) -> dict[EffectParameterId, float]:
         """Where fits begin: effect parameter -> value; nothing where no beat is clear.
 
         Args:
@@ -76,8 +72,7 @@ class DriveLaw:
         """
         if self.common is None:
             return {}
-        found = {f"effects.{name}": size for name, size in self.sizes.items()}
-        return {SCALE: self.common * common, **found}
+        return {SCALE: self.common * common, **self.sizes}
 
     def following(self, dataset: Dataset) -> Dataset:
         """The dataset as if it had been commanded to beat as offset and stroke let it.
@@ -91,7 +86,7 @@ class DriveLaw:
     def _following(self, run: Run) -> Run:
         values = run.commands.values.copy()
         terms = drive_terms(np.zeros(len(values)), values)
-        sizes = np.array([self.sizes.get(name, 0.0) for name in TERMS])
+        sizes = np.array([self.sizes.get(term, 0.0) for term in TERMS])
         left = np.prod(np.maximum(1.0 - sizes * terms, 0.0), axis=1)
         values[:, FREQUENCY] *= left * (self.common or 1.0)
         return replace(run, commands=CommandSteps(run.commands.times_s, values))

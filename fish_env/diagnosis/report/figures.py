@@ -17,7 +17,7 @@ from fish_env.diagnosis.regimes import LEVEL, Localisation
 from fish_env.diagnosis.report.series import RunSeries, SteadySeries
 from fish_env.diagnosis.report.units import label, shown_unit
 from fish_env.files import file_name, replacing
-from fish_env.inference.hypotheses import PARAMETER
+from fish_env.inference.hypotheses import short_name
 from fish_env.plotting.comparison import COMMAND_UNITS
 from fish_env.plotting.style import BLUE, DOTS_PER_INCH, MEASURED, VERMILION, drawing, keep_literal
 
@@ -195,7 +195,7 @@ def draw_ranking(answer: Plain, album: Album) -> Path:
             ax.barh(i, gain, height=0.66, ec=HATCH, lw=0, color=colour, hatch=hatch)
             if row.get("ci95") and over_runs:
                 ax.plot(row["ci95"], [i, i], color=MEASURED, lw=1.4, marker="|")
-        names = [row["name"].removeprefix(PARAMETER) for row in rows]
+        names = [short_name(row["name"]) for row in rows]
         ax.set_yticks(range(len(rows)), names)
         ax.set_ylim(-0.7, len(rows) - 0.3)
         if min(gains) > 0 and max(gains) / min(gains) > WIDE:

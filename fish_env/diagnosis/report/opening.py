@@ -12,7 +12,7 @@ import numpy as np
 from fish_env.diagnosis.report.figures import BASELINE, EXTENDED, HATCH, LOOKS, Album, saved, sheet
 from fish_env.diagnosis.report.series import RunSeries
 from fish_env.diagnosis.report.units import label, shown_unit
-from fish_env.inference.hypotheses import PARAMETER
+from fish_env.inference.hypotheses import short_name
 from fish_env.replay import Motion
 
 Plain = Mapping[str, Any]
@@ -97,7 +97,7 @@ def _off(run: RunSeries, motion: Motion) -> float:
 
 def draw_budget(budget: Plain, album: Album) -> Path:
     """The error budget as one bar of shares, largest first, and the rest."""
-    parts = {item["name"].removeprefix(PARAMETER): item["share"] for item in budget["shares"]}
+    parts = {short_name(item["name"]): item["share"] for item in budget["shares"]}
     shares = {BUDGET_NAMES.get(n, n): max(v, 0.0) for n, v in parts.items()}
     shares = dict(sorted(shares.items(), key=lambda pair: -pair[1]))
     shares[RESIDUAL] = max(budget["left"], 0.0)

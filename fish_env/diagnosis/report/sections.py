@@ -24,7 +24,7 @@ from fish_env.diagnosis.report.opening import draw_budget, draw_paths
 from fish_env.diagnosis.report.remainder import asked_for, residual_model
 from fish_env.diagnosis.report.series import SETTLED_S, ReportSeries, RunSeries, SteadySeries
 from fish_env.diagnosis.report.units import shown_unit
-from fish_env.inference.hypotheses import PARAMETER
+from fish_env.inference.hypotheses import short_name
 from fish_env.plotting.comparison import COMMAND_UNITS
 from fish_env.replay import Group, component
 
@@ -79,7 +79,7 @@ def cause_values(answer: Answer, series: Series, album: Album) -> str:
     sets += [(f"or else {i}", rival) for i, rival in enumerate(answer.get("alternatives", []), 1)]
     for word, causes in sets:
         for cause in causes:
-            name = text(cause["name"].removeprefix(PARAMETER))
+            name = text(short_name(cause["name"]))
             for key, p in cause["parameters"].items():
                 low, high = p["ci95"]
                 interval = f"{number(low)} to {number(high)}"
@@ -315,7 +315,7 @@ def coefficients(answer: Answer, series: Series, album: Album) -> str:
         moved = p.get("prior_sds_off")
         rows.append(
             (
-                text(p["name"].removeprefix(PARAMETER)), number(p["nominal"]),
+                text(short_name(p["name"])), number(p["nominal"]),
                 number(p["estimate"]), f"{number(low)} to {number(high)}", text(p.get("unit", "")),
                 "–" if moved is None else f"{moved:+.1f}",
                 number(p["smallest_detectable"]) if p.get("smallest_detectable") else "–",

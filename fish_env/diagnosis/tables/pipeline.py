@@ -102,7 +102,7 @@ def diagnose_table(
     progress("refitting the baseline")
     baseline = refitted(problem)
     absent = untold(problem, baseline)
-    causes = [c for c in causes_of(problem) if c.name not in absent]
+    causes = [c for c in causes_of(problem) if c.id not in absent]
     held_out = whole.on(final) if len(final) else None
     found = investigate(baseline, causes, rng, effort_of(quick), progress, held_out)
     progress("computing intervals of the causes")
@@ -191,7 +191,7 @@ def _notes(
             "the best fit"
         )
     if accepted.at_bounds:
-        notes.append(f"estimates at a bound: {', '.join(accepted.at_bounds)}")
+        notes.append(f"estimates at a bound: {', '.join(map(str, accepted.at_bounds))}")
     return tuple(notes)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import fdtrc
 
 from fish_env.arrays import FloatArray, IntArray
-from fish_env.effects.extended import PREFIX, build_model
+from fish_env.effects.extended import build_model
 from fish_env.effects.registry import catalogue
 from fish_env.errors import DatasetError
 from fish_env.identification.applied_wrench import EFFECT as APPLIED_WRENCH
@@ -37,6 +37,7 @@ from fish_env.identification.tables.scatter import (
 from fish_env.identification.tables.table import Table
 from fish_env.identification.tables.wrenches import HeldWrenches
 from fish_env.inference.evaluation import LackOfFit
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point, Problem
 from fish_env.model.effect import Effect
 from fish_env.params.schema import FishParams
@@ -118,7 +119,7 @@ class TableProblem(Problem):
         other.table = table
         return other
 
-    def neutral(self, names: Iterable[str]) -> dict[str, float]:
+    def neutral(self, names: Iterable[str]) -> dict[EffectParameterId, float]:
         """Values of effects as the fish's file has them, neutral where it says nothing."""
         return neutral_values(self.model, self.known, names)
 
@@ -182,7 +183,7 @@ class TableProblem(Problem):
     def innovations(
         self,
         z: FloatArray,
-        effects: Mapping[str, FloatArray],
+        effects: Mapping[EffectParameterId, FloatArray],
         noise: Scatter,
         filtered: Sequence[Steady],
     ) -> FloatArray:
@@ -192,11 +193,11 @@ class TableProblem(Problem):
         the first near the evaluation's. Where the first has none, the others are not asked.
         """
         known = joined([s.orbit for s in filtered])
-        first = self._finder(z[:, :1], {path: own[:1] for path, own in effects.items()})
+        first = self._finder(z[:, :1], {id: own[:1] for id, own in effects.items()})
         centre = first.find(known, afresh=True)
         means, count = [self.means(centre)], z.shape[1] - 1
         if count:
-            others = self._finder(z[:, 1:], {path: own[1:] for path, own in effects.items()})
+            others = self._finder(z[:, 1:], {id: own[1:] for id, own in effects.items()})
             found = others.find(centre.take(np.tile(np.arange(self.run_count), count)), alike=True)
             means.append(self.means(found))
         return self.missed(np.concatenate(means), noise)
@@ -248,10 +249,10 @@ class TableProblem(Problem):
         rows = [COORDINATES + MEANS.index(name) for name in self.table.observations]
         sizes = np.column_stack([np.zeros(6), np.diag(WRENCH)])
         pushed = {
-            f"{PREFIX}{APPLIED_WRENCH.name}.{p.name}": size
+            EffectParameterId(APPLIED_WRENCH.name, p.name): size
             for p, size in zip(APPLIED_WRENCH.parameters, sizes, strict=True)
         }
-        one = {path: np.full(7, value) for path, value in point.effects.items()}
+        one = {id: np.full(7, value) for id, value in point.effects.items()}
         finder = self._finder(np.tile(point.z[:, None], (1, 7)), {**one, **pushed})
         after, means = finder.beat(np.tile(orbits.states, (1, 7)), np.arange(7 * self.run_count))
         seen = np.concatenate([coordinates(after), means]).reshape(-1, 7, self.run_count)
@@ -305,10 +306,10 @@ class TableProblem(Problem):
             settings: effect -> values at which it acts.
         """
         neutral = {**self.neutral(settings), **point.effects}
-        effects = {path: np.full(1 + len(settings), value) for path, value in neutral.items()}
+        effects = {id: np.full(1 + len(settings), value) for id, value in neutral.items()}
         for i, (name, own) in enumerate(settings.items(), start=1):
             for key, value in own.items():
-                effects[f"{PREFIX}{name}.{key}"][i] = value
+                effects[EffectParameterId(name, key)][i] = value
         z = np.tile(point.z[:, None], (1, 1 + len(settings)))
         near = self.filtered(point, noise)
         changes = np.abs(self.changes(z, effects, noise, near)).max(axis=1)
@@ -332,7 +333,9 @@ class TableProblem(Problem):
             "data, or leave the condition out"
         )
 
-    def _finder(self, z: FloatArray, effects: Mapping[str, FloatArray]) -> OrbitFinder:
+    def _finder(
+        self, z: FloatArray, effects: Mapping[EffectParameterId, FloatArray]
+    ) -> OrbitFinder:
         """Finder of steady motion of N points (n, N) under every condition, points in turn."""
         known = {**self.known, APPLIED_WRENCH.name: APPLIED_WRENCH}
         changes, seen = changes_of(self.model, known, self.baseline, z, effects, SENSED)
@@ -346,9 +349,9 @@ class TableProblem(Problem):
         return finder
 
 
-def _lane(point: Point) -> tuple[FloatArray, dict[str, FloatArray]]:
+def _lane(point: Point) -> tuple[FloatArray, dict[EffectParameterId, FloatArray]]:
     """A point as the only one of a batch."""
-    return point.z[:, None], {path: np.array([value]) for path, value in point.effects.items()}
+    return point.z[:, None], {id: np.array([value]) for id, value in point.effects.items()}
 
 
 def _pace(finder: OrbitFinder) -> FloatArray:

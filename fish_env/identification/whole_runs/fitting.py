@@ -11,7 +11,7 @@ from fish_env.identification.whole_runs.prediction import (
 )
 from fish_env.identification.whole_runs.problem import FREQUENCY_SCALE, WholeRunProblem
 from fish_env.inference.estimate.fit import Fit, fit
-from fish_env.inference.hypotheses import parameter_path
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
 
 FIRST_STEPS, STEPS = 15, 40
@@ -71,15 +71,15 @@ def _near(problem: WholeRunProblem, report: Callable[[str], None]) -> tuple[Whol
     return _begun(near), near.point
 
 
-def _effects_on(problem: WholeRunProblem, names: Sequence[str]) -> dict[str, float]:
+def _effects_on(problem: WholeRunProblem, names: Sequence[str]) -> dict[EffectParameterId, float]:
     """Effects a little on, by parameter; those of the fish's file stay as they are."""
     values = problem.beginning(names)
     for name in names:
         if name in problem.fish.effects or name == FREQUENCY_SCALE:
             continue
         for p in problem.known[name].parameters:
-            path = parameter_path(name, p.name)
-            values[path] += SHARE * (p.far_end(values[path]) - values[path])
+            id = EffectParameterId(name, p.name)
+            values[id] += SHARE * (p.far_end(values[id]) - values[id])
     return values
 
 

@@ -14,6 +14,7 @@ from fish_env.identification.generic_forces import BoundForces, generic_forces
 from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.series import SeriesProblem
 from fish_env.identification.whole_runs.own_numbers import OwnNumbers
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
 
 BLIND_SD = 1e9
@@ -25,7 +26,7 @@ def forces_of(
     series: SeriesProblem,
     kinds: Sequence[OwnNumbers],
     own: Sequence[FloatArray],
-    scale: str,
+    scale: EffectParameterId,
 ) -> BoundForces:
     """Forces and moments that depend on simulated motion, attitude, time, beat or commands.
 

@@ -67,7 +67,7 @@ def simulated(
 
     Samples that were not measured are NaN.
     """
-    effects = {path: np.array([value]) for path, value in point.effects.items()}
+    effects = {id: np.array([value]) for id, value in point.effects.items()}
     errors = problem.errors(point.z[:, None], effects, [own[:, None] for own in starts])
     pairs = zip(problem.runs, errors, strict=True)
     return [run.measured - each[0] for run, each in pairs]

@@ -34,7 +34,7 @@ from fish_env.identification.whole_runs.starts import (
     likeliest,
 )
 from fish_env.inference.evaluation import GenericTerms
-from fish_env.inference.hypotheses import effect_of, parameter_path
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point, Problem
 from fish_env.inference.vehicle import EffectFreedom
 from fish_env.model.effect import Effect
@@ -43,7 +43,7 @@ from fish_env.params.schema import FishParams
 DT_S = 0.02
 FREQUENCY_SCALE = "frequency_scale"
 """Effect that is always free: every run's tail beats a little faster or slower than it says."""
-SCALE = parameter_path(FREQUENCY_SCALE, "scale")
+SCALE = EffectParameterId(FREQUENCY_SCALE, "scale")
 EFFECT_STEP = 0.05
 """Share of the usual step for differences by effects: runs bend more than one-step errors do."""
 
@@ -92,7 +92,7 @@ class WholeRunProblem(Problem):
         )
         self.starts: tuple[FloatArray, ...] | None = None
         self.pace: float | None = None
-        self._shown: dict[str, bool] = {SCALE: True}
+        self._shown: dict[EffectParameterId, bool] = {SCALE: True}
         self._white: dict[SimulationNoise, list[list[FloatArray]]] = {}
 
     @property
@@ -196,11 +196,11 @@ class WholeRunProblem(Problem):
             parts += [np.tile(np.arange(count), len(run.clock)), np.full(len(own.names), count)]
         return (*self.channels, "start"), np.concatenate(parts)
 
-    def neutral(self, names: Iterable[str]) -> dict[str, float]:
+    def neutral(self, names: Iterable[str]) -> dict[EffectParameterId, float]:
         """Values of effects as the fish's file has them, neutral where it says nothing."""
         return self.series.neutral(names)
 
-    def beginning(self, names: Iterable[str]) -> dict[str, float]:
+    def beginning(self, names: Iterable[str]) -> dict[EffectParameterId, float]:
         """Values of effects that estimates can begin from: the frequency is that of the swaying."""
         values = super().beginning(names)
         return {**values, SCALE: self.usual} if SCALE in values else values
@@ -212,23 +212,21 @@ class WholeRunProblem(Problem):
     def freedoms(self, names: Iterable[str]) -> tuple[EffectFreedom, ...]:
         """Free parameters of effects; those that the runs do not show stay as they are."""
         return tuple(
-            EffectFreedom(f.path, f.lower, f.upper, EFFECT_STEP * f.step, f.least)
+            EffectFreedom(f.id, f.lower, f.upper, EFFECT_STEP * f.step, f.least)
             for f in self.series.freedoms(names)
-            if self._is_shown(f.path)
+            if self._is_shown(f.id)
         )
 
-    def _is_shown(self, path: str) -> bool:
+    def _is_shown(self, id: EffectParameterId) -> bool:
         """Whether the runs show an effect parameter, tried at a middling size."""
-        if path not in self._shown:
-            name = effect_of(path)
-            values = {
-                parameter_path(name, p.name): middling(p) for p in self.known[name].parameters
-            }
+        if id not in self._shown:
+            parameters = self.known[id.effect].parameters
+            values = {EffectParameterId(id.effect, p.name): middling(p) for p in parameters}
             shown = shown_parameters(self, values)
             self._shown |= {one: one in shown for one in values}
-        return self._shown[path]
+        return self._shown[id]
 
-    def refines_steps(self, effects: Iterable[str]) -> bool:
+    def refines_steps(self, effects: Iterable[EffectParameterId]) -> bool:
         """Whether one of these effect parameters makes the tail's rate jump."""
         return self.series.refines_steps(effects)
 
@@ -245,9 +243,9 @@ class WholeRunProblem(Problem):
         """The same problem without finer steps for effects that make the tail's rate jump."""
         return self._on(self.series.without_refinement())
 
-    def batch_key(self, effects: Iterable[str]) -> object:
-        """Stages of the quickest kernel for these effect parameters."""
-        return self.series.batch_key((*effects, SCALE))
+    def batch_key(self, names: Iterable[str]) -> object:
+        """Stages of the quickest kernel for these effects."""
+        return self.series.batch_key((*names, FREQUENCY_SCALE))
 
     def default_noise(self) -> SimulationNoise:
         """A centimetre and 0.05 rad, with fifteen independent samples a run."""
@@ -269,7 +267,7 @@ class WholeRunProblem(Problem):
     def errors(
         self,
         z: FloatArray,
-        effects: Mapping[str, FloatArray],
+        effects: Mapping[EffectParameterId, FloatArray],
         own: Sequence[FloatArray],
         runs: Sequence[int] | None = None,
         pushes: Pushes | None = None,
@@ -334,7 +332,7 @@ class WholeRunProblem(Problem):
     def innovations(
         self,
         z: FloatArray,
-        effects: Mapping[str, FloatArray],
+        effects: Mapping[EffectParameterId, FloatArray],
         noise: SimulationNoise,
         filtered: Sequence[RunEvaluation],
         pushes: Pushes | None = None,
@@ -359,7 +357,7 @@ class WholeRunProblem(Problem):
     def changes(
         self,
         z: FloatArray,
-        effects: Mapping[str, FloatArray],
+        effects: Mapping[EffectParameterId, FloatArray],
         noise: SimulationNoise,
         filtered: Sequence[RunEvaluation],
         pushes: Pushes | None = None,

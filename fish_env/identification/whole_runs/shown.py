@@ -8,6 +8,7 @@ import numpy as np
 
 from fish_env.identification.whole_runs.simulated_runs import SimulatedRuns
 from fish_env.inference.effects import EffectParameter
+from fish_env.inference.hypotheses import EffectParameterId
 
 FEW_RUNS = 3
 SILENT = 0.003
@@ -26,7 +27,9 @@ def middling(parameter: EffectParameter) -> float:
     return 0.5 * (parameter.neutral + parameter.far_end(parameter.neutral))
 
 
-def shown_parameters(problem: SimulatedRuns, values: Mapping[str, float]) -> set[str]:
+def shown_parameters(
+    problem: SimulatedRuns, values: Mapping[EffectParameterId, float]
+) -> set[EffectParameterId]:
     """Effect parameters whose change by a tenth changes what is measured.
 
     Args:
@@ -35,9 +38,9 @@ def shown_parameters(problem: SimulatedRuns, values: Mapping[str, float]) -> set
     """
     few = problem.some(problem.spread(FEW_RUNS))
     count = 1 + len(values)
-    effects = {path: np.full(count, value) for path, value in values.items()}
-    for i, path in enumerate(values, start=1):
-        effects[path][i] *= 0.9
+    effects = {id: np.full(count, value) for id, value in values.items()}
+    for i, id in enumerate(values, start=1):
+        effects[id][i] *= 0.9
     z = np.zeros((len(problem.baseline), count))
     own = [np.repeat(kind.guess[:, None], count, axis=1) for kind in few.own]
     moved = np.zeros(count)
@@ -45,4 +48,4 @@ def shown_parameters(problem: SimulatedRuns, values: Mapping[str, float]) -> set
         away = np.abs(np.nan_to_num(errors - errors[:1]) / np.array(few.default_noise().sd))
         away = away.reshape(count, -1)
         moved = np.maximum(moved, away.max(axis=1))
-    return {path for path, change in zip(values, moved[1:], strict=True) if change > SILENT}
+    return {id for id, change in zip(values, moved[1:], strict=True) if change > SILENT}

@@ -9,6 +9,7 @@ from fish_env.arrays import FloatArray
 from fish_env.identification.parameters import Baseline
 from fish_env.identification.whole_runs.noise import SimulationNoise
 from fish_env.identification.whole_runs.own_numbers import OwnNumbers
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
 
 
@@ -49,7 +50,7 @@ class SimulatedRuns(Protocol):
     def errors(
         self,
         z: FloatArray,
-        effects: Mapping[str, FloatArray],
+        effects: Mapping[EffectParameterId, FloatArray],
         own: Sequence[FloatArray],
         runs: Sequence[int] | None = None,
     ) -> list[FloatArray]:

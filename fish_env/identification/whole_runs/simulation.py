@@ -11,16 +11,16 @@ from fish_env.identification.filtering import Pushes
 from fish_env.identification.open_loop import without_feedback
 from fish_env.identification.series import SeriesProblem
 from fish_env.identification.whole_runs.own_numbers import OwnNumbers
-from fish_env.inference.hypotheses import PREFIX, effect_of
+from fish_env.inference.hypotheses import EffectParameterId
 
 
 def simulation_errors(
     series: SeriesProblem,
     z: FloatArray,
-    effects: Mapping[str, FloatArray],
+    effects: Mapping[EffectParameterId, FloatArray],
     kinds: Sequence[OwnNumbers],
     own: Sequence[FloatArray],
-    pace: str,
+    pace: EffectParameterId,
     pushes: Pushes | None = None,
 ) -> list[FloatArray]:
     """Measured less simulated (N, T, C) of each run, SI, zero where nothing was measured.
@@ -36,11 +36,11 @@ def simulation_errors(
         pushes: a prescribed wrench for each point.
     """
     count = z.shape[1]
-    scale = series.neutral([effect_of(pace)])[pace]
+    scale = series.neutral([pace.effect])[pace]
     values = {pace: np.full(count, scale), **effects}
     records, sensors = series.lanes(z, values)
     judge = series.filter_for(values)
-    row = judge.kernels.parameter_names.index(pace.removeprefix(PREFIX))
+    row = judge.kernels.parameter_names.index(f"{pace.effect}.{pace.name}")
     lanes, starts = [], []
     for run, kind, mine in zip(series.runs, kinds, own, strict=True):
         record = np.repeat(records, count, axis=1) if records.shape[1] == 1 else records.copy()

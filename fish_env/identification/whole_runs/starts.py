@@ -159,7 +159,7 @@ def _linearised(
         values[:, 1 : 1 + size] += np.diag(NUDGE * problem.own[i].units)
         moved.append(values)
     z = np.repeat(point.z[:, None], lanes, axis=1)
-    effects = {path: np.full(lanes, value) for path, value in point.effects.items()}
+    effects = {id: np.full(lanes, value) for id, value in point.effects.items()}
     result = {}
     for i, values, errors in zip(runs, moved, problem.errors(z, effects, moved, runs), strict=True):
         finite = np.where(np.isfinite(errors), np.clip(errors, -LOST, LOST), LOST)

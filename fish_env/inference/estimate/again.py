@@ -12,7 +12,7 @@ from fish_env.inference.estimate.free import DIFFERENCE, Free, linearise, spread
 from fish_env.inference.estimate.gauss_newton import predicted_decrease
 from fish_env.inference.estimate.information import gradient, information
 from fish_env.inference.estimate.spread import Likelihood, Spread, fit_spread
-from fish_env.inference.hypotheses import of_effects
+from fish_env.inference.hypotheses import CauseId, of_effects
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point
 
@@ -86,7 +86,7 @@ def run_variation(own: Fit) -> Spread:
     return fit_spread(likelihood, problem.variations)
 
 
-def with_run_variation(own: Fit, dropped: Collection[str] = ()) -> Fit:
+def with_run_variation(own: Fit, dropped: Collection[CauseId] = ()) -> Fit:
     """The fit, made again where its runs differ by more, or less, than it allows for.
 
     A few runs tell no spread. Runs whose drive is uneven differ in everything: every spread is then

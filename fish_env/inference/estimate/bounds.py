@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.box_qp import BoxMinimum, minimise_in_box
+from fish_env.inference.hypotheses import Coefficient
 from fish_env.inference.policy import POLICY
 from fish_env.inference.vehicle import Coefficients
 
@@ -71,7 +72,7 @@ class LinearBounds:
 
 
 def coefficient_range(
-    baseline: Coefficients, released: Iterable[str] = ()
+    baseline: Coefficients, released: Iterable[Coefficient] = ()
 ) -> tuple[FloatArray, FloatArray]:
     """Smallest and largest value of each coefficient, each (n,), in its own unit.
 
@@ -82,15 +83,15 @@ def coefficient_range(
     low, high = baseline.bounds
     free = set(released)
     reach = (
-        np.array([np.inf if p in free else POLICY.prior_reach_sd for p in baseline.paths])
+        np.array([np.inf if c in free else POLICY.prior_reach_sd for c in baseline.ids])
         * baseline.sd
     )
     return np.maximum(low, baseline.mean - reach), np.minimum(high, baseline.mean + reach)
 
 
 def coefficients_at_bounds(
-    baseline: Coefficients, values: FloatArray, released: Iterable[str] = ()
-) -> list[str]:
+    baseline: Coefficients, values: FloatArray, released: Iterable[Coefficient] = ()
+) -> list[Coefficient]:
     """Coefficients that are at an end of their range.
 
     Args:
@@ -101,11 +102,14 @@ def coefficients_at_bounds(
     low, high = coefficient_range(baseline, released)
     margin = 2.0 * MARGIN * baseline.sd
     stuck = (values <= low + margin) | (values >= high - margin)
-    return [path for path, at in zip(baseline.paths, stuck.tolist(), strict=True) if at]
+    return [one for one, at in zip(baseline.ids, stuck.tolist(), strict=True) if at]
 
 
 def parameter_bounds(
-    baseline: Coefficients, lower: npt.ArrayLike, upper: npt.ArrayLike, released: Iterable[str] = ()
+    baseline: Coefficients,
+    lower: npt.ArrayLike,
+    upper: npt.ArrayLike,
+    released: Iterable[Coefficient] = (),
 ) -> LinearBounds:
     """Bounds of a vector of normalised coefficients, then further numbers.
 

@@ -18,6 +18,7 @@ from fish_env.inference.estimate.free import (
     quadratic,
 )
 from fish_env.inference.estimate.gauss_newton import descend
+from fish_env.inference.hypotheses import Coefficient
 from fish_env.inference.problem import Point, Problem
 
 STEPS = 5
@@ -40,7 +41,7 @@ class CoarseFit:
     """
 
     effects: tuple[str, ...]
-    released: tuple[str, ...]
+    released: tuple[Coefficient, ...]
     point: Point
     objective: float
 
@@ -86,7 +87,7 @@ class CoarseFitter:
     def coarse_fit(
         self,
         effects: Sequence[str],
-        released: Sequence[str],
+        released: Sequence[Coefficient],
         starts: Sequence[Point],
         give_up_above: float = np.inf,
     ) -> CoarseFit:
@@ -112,7 +113,11 @@ class CoarseFitter:
         return CoarseFit(tuple(effects), tuple(released), free.unpack(vector), value)
 
     def promising(
-        self, effects: Sequence[str], released: Sequence[str], starts: Sequence[Point], most: int
+        self,
+        effects: Sequence[str],
+        released: Sequence[Coefficient],
+        starts: Sequence[Point],
+        most: int,
     ) -> list[Point]:
         """The likeliest starts, best first, as the runs' own starts have been settled so far.
 

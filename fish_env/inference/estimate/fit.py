@@ -31,6 +31,7 @@ from fish_env.inference.estimate.joint import descend_jointly
 from fish_env.inference.estimate.run_variation import Marginal
 from fish_env.inference.estimate.settle import predicted_variation
 from fish_env.inference.evaluation import Evaluation
+from fish_env.inference.hypotheses import Coefficient, ParameterId
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
 
@@ -48,12 +49,12 @@ class Fit:
         released: baseline coefficients whose prior was lifted.
         point: estimates.
         noise: noise model.
-        names: free parameters, baseline paths first.
+        ids: free parameters, coefficients first.
         estimates: (n,) in physical units.
         covariance: (n, n) in physical units, corrected for coloured residuals.
         log_likelihood: at the estimates, noise included.
         objective: -2 log likelihood + prior, smaller is better.
-        at_bounds: names that ended at a bound.
+        at_bounds: parameters that ended at a bound.
         active: (k, n) gradients of the active constraints (baseline in prior units).
         condition: condition number of the information in prior units.
         filtered: filter results at the estimates.
@@ -64,27 +65,27 @@ class Fit:
 
     problem: Problem
     effects: tuple[str, ...]
-    released: tuple[str, ...]
+    released: tuple[Coefficient, ...]
     point: Point
     noise: Any
-    names: tuple[str, ...]
+    ids: tuple[ParameterId, ...]
     estimates: FloatArray
     covariance: FloatArray
     log_likelihood: float
     objective: float
-    at_bounds: tuple[str, ...]
+    at_bounds: tuple[ParameterId, ...]
     active: FloatArray
     condition: float
     filtered: Sequence[Any] = field(repr=False)
     linearised: Linearised = field(repr=False)
     in_the_limit: bool = False
-    profiles: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    profiles: Mapping[ParameterId, tuple[float, float]] = field(default_factory=dict)
 
     @cached_property
     def leverage(self) -> FloatArray:
         """Share of each residual that the free parameters follow (D,)."""
         baseline = self.problem.baseline
-        prior = prior_precision(baseline, len(self.names) - len(baseline), self.released)
+        prior = prior_precision(baseline, len(self.ids) - len(baseline), self.released)
         return leverage(self.linearised.slopes, prior)
 
     @cached_property
@@ -102,7 +103,7 @@ class Fit:
         Args:
             other: the same problem in these.
         """
-        effects = {path: np.array([value]) for path, value in self.point.effects.items()}
+        effects = {id: np.array([value]) for id, value in self.point.effects.items()}
         (seen,) = other.innovations(self.point.z[:, None], effects, self.noise, self.filtered)
         off = np.sqrt(np.mean((self.marginalised(seen) - self.linearised.residuals) ** 2))
         return bool(off < SAME)
@@ -126,11 +127,11 @@ class Fit:
         marginal = self.linearised.marginal
         return residuals if marginal is None else marginal.residuals(residuals)
 
-    def interval(self, name: str, level: float = 0.95) -> tuple[float, float]:
+    def interval(self, parameter: ParameterId, level: float = 0.95) -> tuple[float, float]:
         """Interval of one parameter: by likelihood where that was worked out, else normal."""
-        if level == 0.95 and name in self.profiles:
-            return self.profiles[name]
-        i = self.names.index(name)
+        if level == 0.95 and parameter in self.profiles:
+            return self.profiles[parameter]
+        i = self.ids.index(parameter)
         half = float(ndtri(0.5 + level / 2)) * np.sqrt(self.covariance[i, i])
         return float(self.estimates[i] - half), float(self.estimates[i] + half)
 
@@ -140,7 +141,7 @@ def fit(
     effects: Sequence[str] | None = None,
     start: Point | None = None,
     noise: Any | None = None,
-    released: Sequence[str] = (),
+    released: Sequence[Coefficient] = (),
     refit_noise: bool = True,
     iterations: int = 5,
     tolerance: float = 0.3,
@@ -295,7 +296,7 @@ def objective_at(
     effects: Sequence[str],
     point: Point,
     noise: Any,
-    released: Sequence[str] = (),
+    released: Sequence[Coefficient] = (),
 ) -> float:
     """-2 log likelihood + prior at a point, without any fitting."""
     free = Free(problem, effects, released)
@@ -309,7 +310,7 @@ def _finish(
     problem: Problem,
     free: Free,
     effects: tuple[str, ...],
-    released: tuple[str, ...],
+    released: tuple[Coefficient, ...],
     vector: FloatArray,
     noise: Any,
     value: float,
@@ -326,11 +327,11 @@ def _finish(
     point = free.unpack(vector)
     estimates = _physical(problem, vector)
     stuck = coefficients_at_bounds(problem.baseline, estimates[: free.count], released)
-    bounds = (*stuck, *free.effects_at_bounds(vector))
+    bounds: tuple[ParameterId, ...] = (*stuck, *free.effects_at_bounds(vector))
     diagonal = np.sqrt(np.diag(hessian))
     condition = float(np.linalg.cond(hessian / np.outer(diagonal, diagonal)))
     return Fit(
-        problem, effects, released, point, noise, free.names, estimates, physical,
+        problem, effects, released, point, noise, free.ids, estimates, physical,
         float(sum(r.log_likelihood for r in filtered)), value, bounds,
         free.bounds.active(hessian, pull, vector), condition, filtered, lin,
     )  # fmt: skip

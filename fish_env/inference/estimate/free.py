@@ -17,6 +17,7 @@ from fish_env.inference.estimate.bounds import LinearBounds, parameter_bounds
 from fish_env.inference.estimate.information import gradient, information, prior_precision
 from fish_env.inference.estimate.run_variation import Marginal
 from fish_env.inference.evaluation import Evaluation
+from fish_env.inference.hypotheses import Coefficient, EffectParameterId, ParameterId
 from fish_env.inference.problem import Point, Problem
 from fish_env.inference.vehicle import finite_values
 
@@ -68,33 +69,34 @@ class Free:
         self,
         problem: Problem,
         effects: Iterable[str],
-        released: Iterable[str],
-        held: Mapping[str, float] | None = None,
+        released: Iterable[Coefficient],
+        held: Mapping[EffectParameterId, float] | None = None,
     ) -> None:
         self.problem = problem
         self.released = tuple(released)
         self.held = dict(held or {})
-        self.freedoms = tuple(f for f in problem.freedoms(effects) if f.path not in self.held)
+        self.freedoms = tuple(f for f in problem.freedoms(effects) if f.id not in self.held)
         self.count = len(problem.baseline)
-        self.names = (*problem.baseline.paths, *(f.path for f in self.freedoms))
-        self.prior = prior_precision(problem.baseline, len(self.freedoms), released)
+        own = (f.id for f in self.freedoms)
+        self.ids: tuple[ParameterId, ...] = (*problem.baseline.ids, *own)
+        self.prior = prior_precision(problem.baseline, len(self.freedoms), self.released)
         self.largest_steps = np.r_[
             np.full(self.count, problem.coefficient_step), [f.step for f in self.freedoms]
         ]
         self.steps = self.largest_steps
-        self.nonsmooth = problem.refines_steps((*(f.path for f in self.freedoms), *self.held))
+        self.nonsmooth = problem.refines_steps((*(f.id for f in self.freedoms), *self.held))
 
     def pack(self, point: Point) -> FloatArray:
         """The vector (n,) of a point; of what is infinite, the mildest plausible value."""
-        own = {f.path: point.effects[f.path] for f in self.freedoms}
+        own = {f.id: point.effects[f.id] for f in self.freedoms}
         values = finite_values(self.problem.known, own)
-        return np.asarray(np.r_[point.z, [values[f.path] for f in self.freedoms]], float)
+        return np.asarray(np.r_[point.z, [values[f.id] for f in self.freedoms]], float)
 
     def unpack(self, vector: FloatArray) -> Point:
         """The point of a vector (n,)."""
         values = vector[self.count :].tolist()
-        paths = [f.path for f in self.freedoms]
-        own = {**dict(zip(paths, values, strict=True)), **self.held}
+        ids = [f.id for f in self.freedoms]
+        own = {**dict(zip(ids, values, strict=True)), **self.held}
         return Point(vector[: self.count].copy(), own)
 
     def suit_steps(self, hessian: FloatArray) -> None:
@@ -117,10 +119,10 @@ class Free:
         lower, upper = [f.lower for f in self.freedoms], [f.upper for f in self.freedoms]
         return parameter_bounds(self.problem.baseline, lower, upper, self.released)
 
-    def effects_at_bounds(self, vector: FloatArray) -> list[str]:
+    def effects_at_bounds(self, vector: FloatArray) -> list[EffectParameterId]:
         """Effect parameters that ended at the edge of what they may be."""
         values = zip(self.freedoms, vector[self.count :], strict=True)
-        return [f.path for f, value in values if value <= f.lower or value >= f.upper]
+        return [f.id for f, value in values if value <= f.lower or value >= f.upper]
 
     def lanes(self, vector: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Perturbed vectors (n, 1 + n), the centre first, and the signed steps (n,).
@@ -138,7 +140,7 @@ class Free:
 
     def scale(self) -> FloatArray:
         """Physical units per unit of the vector, as a matrix (n, n)."""
-        matrix = np.eye(len(self.names))
+        matrix = np.eye(len(self.ids))
         matrix[: self.count, : self.count] = self.problem.baseline.factor
         return matrix
 
@@ -151,8 +153,8 @@ def residuals_at(
     filtered: Sequence[Evaluation],
 ) -> FloatArray:
     """Whitened residuals (N, D) of vectors (n, N) with the gains of a filter that has run."""
-    effects = {f.path: vectors[free.count + i] for i, f in enumerate(free.freedoms)}
-    effects |= {path: np.full(vectors.shape[1], value) for path, value in free.held.items()}
+    effects = {f.id: vectors[free.count + i] for i, f in enumerate(free.freedoms)}
+    effects |= {id: np.full(vectors.shape[1], value) for id, value in free.held.items()}
     return problem.innovations(vectors[: free.count], effects, noise, filtered)
 
 

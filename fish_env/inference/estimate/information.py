@@ -8,22 +8,25 @@ import numpy as np
 
 from fish_env.arrays import FloatArray, IntArray
 from fish_env.inference.estimate.products import inner
+from fish_env.inference.hypotheses import Coefficient
 from fish_env.inference.policy import POLICY
 from fish_env.inference.vehicle import Coefficients
 
 
-def prior_precision(baseline: Coefficients, further: int, released: Iterable[str]) -> FloatArray:
+def prior_precision(
+    baseline: Coefficients, further: int, released: Iterable[Coefficient]
+) -> FloatArray:
     """Precision of the prior of each free parameter, baseline first, in units of its own spread.
 
     Args:
         baseline: coefficients with a prior.
         further: number of parameters without one, such as those of effects.
-        released: paths of coefficients whose prior is lifted, but for a trace that keeps a
+        released: coefficients whose prior is lifted, but for a trace that keeps a
             parameter without effect in place.
     """
     prior = np.concatenate([np.ones(len(baseline)), np.zeros(further)])
-    for path in released:
-        prior[baseline.paths.index(path)] = 1e-4
+    for coefficient in released:
+        prior[baseline.ids.index(coefficient)] = 1e-4
     return prior
 
 

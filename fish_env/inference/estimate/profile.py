@@ -19,6 +19,7 @@ from fish_env.inference.estimate.fit import Fit, fit, gauss_newton
 from fish_env.inference.estimate.free import Free
 from fish_env.inference.estimate.information import information
 from fish_env.inference.evaluation import Evaluation
+from fish_env.inference.hypotheses import EffectParameterId, ParameterId
 from fish_env.inference.problem import Point
 
 LEVEL = 0.95
@@ -125,37 +126,37 @@ def profiled(own: Fit) -> Fit:
     Where the search comes upon a better minimum, the fit moves there. Coloured residuals widen
     these intervals as they widen normal ones.
     """
-    ends = {}
+    ends: dict[ParameterId, tuple[float, float]] = {}
     for freedom in own.problem.freedoms(own.effects):
-        profile = profile_of(own, freedom.path, (freedom.lower, freedom.upper))
+        profile = profile_of(own, freedom.id, (freedom.lower, freedom.upper))
         seen = profile.seen()
         best = min(seen, key=lambda held: held.objective)
         if best.objective < own.objective - BETTER:
             return profiled(_moved(own, best.point))
-        ends[freedom.path] = profile.interval(seen)
+        ends[freedom.id] = profile.interval(seen)
     return replace(own, profiles=ends)
 
 
-def profile_of(own: Fit, path: str, bounds: tuple[float, float]) -> Profile:
+def profile_of(own: Fit, parameter: EffectParameterId, bounds: tuple[float, float]) -> Profile:
     """The objective of a fit along one parameter of an effect.
 
     Args:
         own: the fit; its noise is kept.
-        path: of the parameter.
+        parameter: the parameter.
         bounds: lowest and highest value.
     """
-    i = own.names.index(path)
+    i = own.ids.index(parameter)
     free = Free(own.problem, own.effects, own.released)
     white = np.linalg.inv(information(own.linearised.slopes, free.prior))[i, i]
     widened = float(own.covariance[i, i] / white)
     start = Held(float(own.estimates[i]), own.objective, own.point, own.filtered)
     sd, worse = float(np.sqrt(own.covariance[i, i])), float(chdtri(1, 1.0 - LEVEL)) * widened
-    return Profile(partial(_held, own, path), start, sd, bounds, worse)
+    return Profile(partial(_held, own, parameter), start, sd, bounds, worse)
 
 
-def _held(own: Fit, path: str, value: float, near: Held) -> Held:
+def _held(own: Fit, parameter: EffectParameterId, value: float, near: Held) -> Held:
     """The best fit with one effect's parameter held."""
-    free = Free(own.problem, own.effects, own.released, {path: value})
+    free = Free(own.problem, own.effects, own.released, {parameter: value})
     vector = free.bounds.clip(free.pack(near.point))
     try:
         found, objective, filtered = gauss_newton(

@@ -42,6 +42,10 @@ from fish_env.params import list_fish
 Ask = Callable[[str], str]
 
 QUESTION = "Write the dataset? yes, no, or a correction such as  yaw: {unit: deg, sign: -1} "
+INCOMPLETE = (
+    "What is missing, such as  fish: zheng-2021-a  or  tail_offset: {column: servo, unit: deg}, or "
+    "no to stop: "
+)
 FRAMES = (
     "ned (x north, y east, z down; body forward, starboard, down) or enu (z up, body y to port)"
 )
@@ -187,6 +191,7 @@ def _converse(
 ) -> Imported | None:
     """Shows the mapping, takes corrections until it is confirmed, and writes."""
     shown: Guess | None = guess
+    columns = {column for source in sources for column in source.columns}
     while True:
         built = None
         try:
@@ -200,7 +205,7 @@ def _converse(
             _draw(console, built[1], out)
         shown = None
         while True:
-            answer = _answer(ask)
+            answer = _answer(ask, INCOMPLETE if built is None else QUESTION)
             if answer.lower() in ("n", "no", "q", "quit"):
                 console.print("no dataset is written")
                 return None
@@ -210,15 +215,15 @@ def _converse(
                 console.print("the mapping is not complete: correct it, or answer no")
                 continue
             try:
-                content = corrected(content, answer)
+                content = corrected(content, answer, columns)
                 break
             except DatasetError as error:
                 console.print(str(error), style="yellow", markup=False)
 
 
-def _answer(ask: Ask) -> str:
+def _answer(ask: Ask, question: str) -> str:
     try:
-        return ask(QUESTION).strip()
+        return ask(question).strip()
     except EOFError:
         return "no"
 

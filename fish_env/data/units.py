@@ -48,6 +48,8 @@ _POWER = re.compile(r"(\*\*|\^)(?!\s*-?\d(?!\s*(\*\*|\^|\d)))")
 """An exponent other than one digit: a parser would work out `9**9**9`."""
 
 _PIXELS = ("px", "pixel", "pixels")
+_GRAD = re.compile(r"grad(?:/s|/sec)?")
+"""A degree in German, a tenth less (the gradian) in English."""
 _DEGREE_SIGNS = str.maketrans({"\N{MASCULINE ORDINAL INDICATOR}": "°", "\N{RING ABOVE}": "°"})
 
 
@@ -80,6 +82,11 @@ def parse_unit(name: str, quantity: Quantity, place: Place) -> Unit:
         raise place.refuse(
             "a pixel has no size of its own",
             f"Give the size of one as `scale`, with the unit '{next(iter(fitting))}'",
+        )
+    if _GRAD.fullmatch(name):
+        raise place.refuse(
+            f"'{name}' may mean degrees or gradians",
+            f"Write {name.replace('grad', 'deg')} or {name.replace('grad', 'gon')}",
         )
     known = [root for root in (unit_root(name), unit_root(name.lower())) if root is not None]
     for factor, root in known:
@@ -132,7 +139,8 @@ def _registry() -> Any:
     import pint
 
     registry: Any = pint.UnitRegistry()
-    for alias in ("@alias hertz = hz", "@alias revolution = rev"):
+    # Pint alone takes the German degree, "Grad", for a gigaradian.
+    for alias in ("@alias hertz = hz", "@alias revolution = rev", "@alias degree = Grad"):
         registry.define(alias)
     return registry
 

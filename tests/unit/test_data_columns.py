@@ -109,6 +109,7 @@ def test_a_wrong_cell_is_named_by_the_column_of_the_file(tmp_path):
     [
         ("yaw", "degrees", math.pi / 180.0),
         ("yaw", "°", math.pi / 180.0),
+        ("yaw", "Grad", math.pi / 180.0),
         ("yaw", "Radians", 1.0),
         ("r", "°/s", math.pi / 180.0),
         ("r", "degrees per second", math.pi / 180.0),
@@ -138,6 +139,12 @@ def test_a_unit_of_another_kind_is_never_proposed(tmp_path, unit):
     message = refusal(good_folder(tmp_path, channels={"x": "m", "yaw": unit}))
     assert "rad, deg" in message
     assert "/s" not in message
+
+
+def test_a_unit_that_may_be_degrees_or_gradians_is_refused(tmp_path):
+    message = refusal(good_folder(tmp_path, channels={"x": "m", "yaw": "grad"}))
+    assert "degrees or gradians" in message
+    assert "Write deg or gon" in message
 
 
 def test_radians_that_can_only_be_degrees_are_refused_in_any_spelling(tmp_path):

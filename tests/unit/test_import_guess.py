@@ -28,6 +28,13 @@ def guessed(columns: dict, frame: str | None = "ned", **about) -> Guess:
         ("Heading (deg)", "yaw"),
         ("psi", "yaw"),
         ("rollRate", "p"),
+        ("x (Meter)", "x"),
+        ("Xpos", "x"),
+        ("Yaw Rate (Degrees/s)", "r"),
+        ("Yaw angle in degrees", "yaw"),
+        ("Tiefe [cm]", "depth"),
+        ("Nickwinkel [°]", "pitch"),
+        ("Gierrate [°/s]", "r"),
         ("gyro_z", "r"),
         ("surge velocity", "u"),
         ("tail_servo_position", "tail_angle"),
@@ -54,6 +61,10 @@ def test_a_channel_is_known_by_its_name(column, channel):
         ("", "tailbeat frequency", "tail_frequency"),
         ("", "freq_setpoint_hz", "tail_frequency"),
         ("", "slider_pos_mm", "block_displacement"),
+        ("", "bias angle", "tail_offset"),
+        ("", "Schwanz Versatz [Grad]", "tail_offset"),
+        ("", "Schlagfrequenz [Hz]", "tail_frequency"),
+        ("", "mean", None),
         ("/servo/tail_bias/command", "data", "tail_offset"),
         ("", "x_offset", None),
     ],
@@ -77,6 +88,7 @@ def test_a_command_is_known_by_its_name(part, column, command):
         ({"tail_amplitude": 0.3 + 0 * TIME}, "rad"),
         ({"u": 90 + 0 * TIME}, "mm/s"),
         ({"x_mm": 0.1 * TIME}, "mm"),
+        ({"yaw [grad]": 80 * np.sin(TIME)}, "deg"),
     ],
 )
 def test_a_unit_is_what_the_name_says_or_the_values_allow(columns, unit):
@@ -90,6 +102,15 @@ def test_a_unit_is_what_the_name_says_or_the_values_allow(columns, unit):
 def test_a_rate_is_in_degrees_if_the_angles_are():
     guess = guessed({"yaw_deg": 20 * np.sin(TIME), "r": 0.2 * np.sin(TIME)})
     assert guess.content["channels"]["r"]["unit"] == "deg/s"
+
+
+def test_theta_is_the_yaw_of_a_pose_in_the_plane():
+    guess = guessed({"x": TIME, "y": TIME, "theta": np.sin(TIME)})
+    assert list(guess.content["channels"]) == ["x", "y", "yaw"]
+    assert "yaw: 'theta', as the table has x, y and no other angle" in guess.assumptions
+    for more in ("phi", "psi", "z"):
+        content = guessed({"x": TIME, "y": TIME, more: TIME, "theta": np.sin(TIME)}).content
+        assert "pitch" in content["channels"], more
 
 
 def test_names_tell_of_frames():

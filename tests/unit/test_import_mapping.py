@@ -45,6 +45,11 @@ CONTENT = {
         ("yaw: {sign: -1, frame: enu}", "channels.yaw.sign", "-1"),
         ("yaw: {sign: -1}", "channels.yaw.column", "psi"),
         ("yaw: none", "channels.yaw", None),
+        ("yaw: other", "channels.yaw.column", "other"),
+        ("yaw: other", "channels.yaw.unit", "rad"),
+        ("channels: {yaw: {sign: -1}}", "channels.yaw.sign", "-1"),
+        ("constant_commands: {tail_offset: 0.1}", "constant_commands.tail_offset", 0.1),
+        ("sources: {log: {time: {unit: ms}}}", "sources.log.time.unit", "ms"),
         ("r: {column: gz, unit: dps}", "channels.r.column", "gz"),
         ("tail_offset: 0.1", "constant_commands.tail_offset", 0.1),
         ("tail_offset: 0.1", "commands.tail_offset", None),
@@ -57,7 +62,7 @@ CONTENT = {
 )
 def test_a_correction_changes_one_thing(text, path, value):
     before = yaml.safe_dump(CONTENT)
-    found = corrected(CONTENT, text)
+    found = corrected(CONTENT, text, {"psi", "other"})
     for key in path.split("."):
         found = found.get(key) if isinstance(found, dict) else found
     assert found == value
@@ -66,7 +71,14 @@ def test_a_correction_changes_one_thing(text, path, value):
 
 @pytest.mark.parametrize(
     ("text", "expected"),
-    [("yow: deg", "'yaw'"), ("yaw deg", "key: value"), ("{", "YAML"), ("yaw: [", "YAML")],
+    [
+        ("yow: deg", "'yaw'"),
+        ("yaw deg", "key: value"),
+        ("{", "YAML"),
+        ("yaw: [", "YAML"),
+        ("channels: {yow: deg}", "'yaw'"),
+        ("channels: deg", "'channels' is not known"),
+    ],
 )
 def test_a_correction_that_says_nothing_is_refused(text, expected):
     with pytest.raises(DatasetError, match=expected):

@@ -1,5 +1,6 @@
 """Corrections of a guessed mapping, in the words of the mapping itself."""
 
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -11,18 +12,22 @@ from fish_env.params import list_fish
 
 NOTHING = "none"
 KEYS = ("name", "fish", "frame", "start", "tail_phase", "run_column")
+SECTIONS = ("channels", "commands", "constant_commands", "sources")
+"""Keys of a mapping whose entries may be named with or without them."""
 
 
-def corrected(content: Content, text: str) -> Content:
+def corrected(content: Content, text: str, columns: Collection[str] = ()) -> Content:
     """Changes a mapping as one line says.
 
     `yaw: deg` or `yaw: {unit: deg, sign: -1}` changes a channel or command, `yaw: none` takes it
-    out, `tail_offset: 0` makes a command constant, `frame: enu` changes the dataset, and
-    `pose: {time: {unit: ms}}` changes a source.
+    out, `yaw: psi` takes another column, `tail_offset: 0` makes a command constant, `frame: enu`
+    changes the dataset, and `pose: {time: {unit: ms}}` changes a source. Messages name entries with
+    their section, `constant_commands: {tail_offset: 0}`: that is understood too.
 
     Args:
         content: The mapping.
         text: The line, YAML.
+        columns: Names of the columns of the logs.
 
     Returns:
         The changed mapping; the given one is left as it is.
@@ -32,9 +37,12 @@ def corrected(content: Content, text: str) -> Content:
     """
     section = parse_section(text, Place(Path("correction")))
     sources = content["sources"]
+    entries = dict[str, Any]()
     for key, value in section.content.items():
+        entries |= value if key in SECTIONS and isinstance(value, dict) else {key: value}
+    for key, value in entries.items():
         if key in FILE_CHANNELS or key in COMMANDS:
-            content = _with_entry(content, key, value)
+            content = _with_entry(content, key, value, columns)
         elif key in sources:
             content = {**content, "sources": {**sources, key: _merged(sources[key], value)}}
         elif key in KEYS:
@@ -52,7 +60,7 @@ def _resolved(key: str, value: Any) -> Any:
     return str(Path(value).expanduser().resolve())
 
 
-def _with_entry(content: Content, name: str, value: Any) -> Content:
+def _with_entry(content: Content, name: str, value: Any, columns: Collection[str]) -> Content:
     group = "commands" if name in COMMANDS else "channels"
     entries = dict(content.get(group, {}))
     constants = dict(content.get("constant_commands", {}))
@@ -61,7 +69,9 @@ def _with_entry(content: Content, name: str, value: Any) -> Content:
     if group == "commands" and _is_number(value):
         constants[name] = float(value)
     elif value != NOTHING:
-        entries[name] = _merged(old, {"unit": value} if isinstance(value, str) else value)
+        if isinstance(value, str):
+            value = {"column" if value in columns else "unit": value}
+        entries[name] = _merged(old, value)
     return {**content, group: entries, "constant_commands": constants}
 
 

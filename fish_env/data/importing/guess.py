@@ -10,6 +10,7 @@ from fish_env.data.importing.names import (
     COMMANDING,
     COMPASS,
     GEOGRAPHIC,
+    PLANAR,
     RUN_NAMES,
     UPWARD,
     command_name,
@@ -157,10 +158,22 @@ def _choose_channels(
         for name, candidate in _channel_candidates(kind):
             if (kind.name, candidate.column) not in taken:
                 found.setdefault(kind.name, {}).setdefault(name, candidate)
+    for candidates in found.values():
+        _read_planar_pose(candidates, said)
     chosen: dict[str, Candidate] = {}
     for group in _GROUPS:
         chosen |= _choose_group(group, found, chosen, said)
     return {name: chosen[name] for group in _GROUPS for name in group if name in chosen}
+
+
+def _read_planar_pose(found: dict[str, Candidate], said: list[str]) -> None:
+    """Makes theta the yaw in a table with x, y and theta alone, as in ROS's Pose2D."""
+    theta = found.get("pitch")
+    if theta is None or not PLANAR.fullmatch(take_apart(theta.column).bare):
+        return
+    if {"x", "y"} <= found.keys() and not {"z", "depth", "roll", "yaw"} & found.keys():
+        found["yaw"] = found.pop("pitch")
+        said.append(f"yaw: '{theta.column}', as the table has x, y and no other angle")
 
 
 def _choose_group(

@@ -1,4 +1,7 @@
-"""What names of columns and topics usually mean. Only names that leave no doubt are here."""
+"""What names of columns and topics usually mean. Only names that leave no doubt are here.
+
+English and German words are known: loggers of German tools write decimal commas and such names.
+"""
 
 import re
 from collections.abc import Mapping
@@ -24,7 +27,7 @@ class Name:
     unit: str
 
 
-_BRACKETS = re.compile(r"^(.*?)\s*[\[({]\s*([^\[\](){}]+?)\s*[\])}]\s*$")
+_BRACKETS = re.compile(r"^(.*?)\s*[\[({]\s*(?:in\s+)?([^\[\](){}]+?)\s*[\])}]\s*$")
 _ENDINGS: dict[str, str] = {
     "rad_s": "rad/s", "rads": "rad/s", "rad_per_s": "rad/s", "radps": "rad/s",
     "deg_s": "deg/s", "degs": "deg/s", "deg_per_s": "deg/s", "dps": "deg/s", "degps": "deg/s",
@@ -40,15 +43,17 @@ _ENDINGS: dict[str, str] = {
 def take_apart(column: str) -> Name:
     """Parts a column's name into words and unit: `Pos X [mm]`, `yaw_deg`, `t_ms`."""
     text, unit = column.strip(), ""
-    if (found := _BRACKETS.match(text)) and not found[2].isdigit() and unit_root(found[2]):
-        text, unit = found[1], found[2]
+    if (found := _BRACKETS.match(text)) and not found[2].isdigit():
+        spellings = (found[2], found[2].lower())
+        unit = next((spelling for spelling in spellings if unit_root(spelling)), "")
+        text = found[1] if unit else text
     # posX and roll-rate are pos_x and roll_rate.
     text = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", text)
     bare = re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
     if not unit:
         for ending in sorted(_ENDINGS, key=len, reverse=True):
             if bare.endswith(f"_{ending}"):
-                return Name(bare[: -len(ending) - 1], _ENDINGS[ending])
+                return Name(bare[: -len(ending) - 1].removesuffix("_in"), _ENDINGS[ending])
     return Name(bare, unit)
 
 
@@ -57,8 +62,9 @@ def _each(pattern: str) -> dict[str, str]:
 
 
 _RATE = r"(?:rate|speed|velocity|vel|dot)"
+_ANGLE = r"(?:_?(?:angle|winkel))?"
 _POSITION = _each(
-    rf"{_ANY}(?:pos|position|translation|point|location)_?@|{_BODY}@(?:_pos(?:ition)?)?|p@"
+    rf"{_ANY}(?:pos|position|translation|point|location)_?@|{_BODY}@(?:_?pos(?:ition)?)?|p@"
 )
 _QUATERNION = {
     f"q{axis}": rf"{_ANY}(?:orientation|rotation|quaternion|quat|q|attitude)_{axis}"
@@ -79,16 +85,16 @@ CHANNEL_NAMES: Mapping[str, re.Pattern[str]] = {
         "x": rf"{_POSITION['x']}|{_ANY}(?:north|northing)",
         "y": rf"{_POSITION['y']}|{_ANY}(?:east|easting)",
         "z": rf"{_POSITION['z']}|{_ANY}down",
-        "depth": rf"{_ANY}depth",
-        "roll": rf"{_ANY}(?:roll|phi)(?:_angle)?",
-        "pitch": rf"{_ANY}(?:pitch|theta)(?:_angle)?",
-        "yaw": rf"{_ANY}(?:yaw|psi|heading|compass)(?:_angle)?",
+        "depth": rf"{_ANY}(?:depth|(?:tauch)?tiefe)",
+        "roll": rf"{_ANY}(?:roll|phi){_ANGLE}",
+        "pitch": rf"{_ANY}(?:pitch|nick|theta){_ANGLE}",
+        "yaw": rf"{_ANY}(?:yaw|gier|psi|heading|compass|kurs){_ANGLE}",
         "u": rf"u|{_ANY}surge(?:_speed|_velocity|_vel)?|{_LINEAR['x']}",
         "v": rf"v|{_ANY}sway(?:_speed|_velocity|_vel)?|{_LINEAR['y']}",
         "w": rf"w|{_ANY}heave(?:_speed|_velocity|_vel)?|{_LINEAR['z']}",
         "p": rf"p|{_ANY}roll_?{_RATE}|{_ANGULAR['x']}",
-        "q": rf"q|{_ANY}pitch_?{_RATE}|{_ANGULAR['y']}",
-        "r": rf"r|{_ANY}yaw_?{_RATE}|{_ANGULAR['z']}",
+        "q": rf"q|{_ANY}(?:pitch|nick)_?{_RATE}|{_ANGULAR['y']}",
+        "r": rf"r|{_ANY}(?:yaw|gier)_?{_RATE}|{_ANGULAR['z']}",
         "tail_angle": rf"{_ANY}tail(?:_joint|_servo)?_(?:angle|position|pos|feedback|encoder)"
         r"|(?:\w+_)?position_\w*tail\w*",
         **_QUATERNION,
@@ -99,8 +105,11 @@ CHANNEL_NAMES: Mapping[str, re.Pattern[str]] = {
 UPWARD = re.compile(rf"{_ANY}(?:up|altitude|height|alt)")
 """How z may be called where it grows upwards."""
 
-COMPASS = re.compile(rf"{_ANY}(?:heading|compass)(?:_angle)?")
+COMPASS = re.compile(rf"{_ANY}(?:heading|compass|kurs){_ANGLE}")
 """A yaw so called is measured from north, clockwise."""
+
+PLANAR = re.compile(rf"{_ANY}theta{_ANGLE}")
+"""The yaw of a pose in the plane, beside x and y and no other angle."""
 
 GEOGRAPHIC = re.compile(rf"{_ANY}(?:north|northing|east|easting|down)")
 """Names that are x, y or z of the frame ned whatever the frame of the others is."""
@@ -108,9 +117,10 @@ GEOGRAPHIC = re.compile(rf"{_ANY}(?:north|northing|east|easting|down)")
 COMMAND_NAMES: Mapping[str, re.Pattern[str]] = {
     name: re.compile(pattern)
     for name, pattern in {
-        "tail_offset": rf"(?:{_ANY}tail_)?(?:offset|bias|mean_angle)",
-        "tail_amplitude": rf"{_ANY}(?:amplitude|amp|ampl)",
-        "tail_frequency": rf"{_ANY}(?:frequency|freq|beat_rate)",
+        "tail_offset": rf"(?:{_ANY}(?:tail|schwanz)_?)?"
+        rf"(?:(?:offset|bias|versatz){_ANGLE}|mean_angle)",
+        "tail_amplitude": rf"{_ANY}(?:(?:schwanz)?amplitude|amp|ampl)",
+        "tail_frequency": rf"{_ANY}(?:frequency|freq|beat_rate|(?:schwanz|schlag)?frequenz)",
         "block_displacement": rf"{_ANY}(?:block|mass|slider|weight)"
         r"_(?:displacement|position|pos|shift)",
         "block_angle": rf"{_ANY}(?:block|mass|weight)_(?:angle|rotation)",
@@ -127,7 +137,8 @@ COMMANDING = frozenset(
 _CARRIERS = frozenset(["data", "value", "val", "values"])
 
 TIME_NAMES = re.compile(
-    rf"t|{_ANY}(?:time|timestamp|stamp|clock|epoch|zeit|datetime|date|utc)(?:_utc)?"
+    rf"t|{_ANY}(?:time|timestamp|stamp|clock|epoch|elapsed|datetime|date|utc"
+    r"|(?:uhr)?zeit|datum)(?:_utc)?"
     r"|secs?|seconds|millis|micros|nanos|ms|us|ns"
 )
 RUN_NAMES = re.compile(r"(?:run|trial|test|experiment|episode)(?:_?(?:id|no|nr|number|name))?")

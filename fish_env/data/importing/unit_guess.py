@@ -46,7 +46,7 @@ def guess_units(chosen: Chosen, times: Mapping[str, TimeColumn], said: list[str]
             who = "ROS defines them" if by_type else "the columns say"
             stated.setdefault(who, []).append(f"{name} {unit}")
         elif name not in units and unit:
-            said.append(f"{name}: the unit '{unit}' of '{column}' is no such unit")
+            said.append(f"{name}: the unit '{unit}' of '{column}' is unknown or does not fit")
     said += [f"units as {who}: {', '.join(names)}" for who, names in stated.items()]
     open_ones = {name: place for name, place in chosen.items() if name not in units}
     for group in _groups(open_ones):

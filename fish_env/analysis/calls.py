@@ -149,6 +149,11 @@ def as_dataset(
         return load_dataset(data)
     if isinstance(data, Dataset | SteadyDataset):
         return data
+    if not (isinstance(data, Mapping) or hasattr(data, "columns")):
+        raise DatasetError(
+            f"data of type {type(data).__name__}: give a folder with dataset.yaml, the name of a "
+            "shipped dataset, a dataset, a pandas frame, or frames by run: {'run1': frame}"
+        )
     if fish is None:
         raise DatasetError("frames name no fish: give one, such as fish='zheng-2021-a'")
     if not described or "frame" not in described:

@@ -1,5 +1,6 @@
 """Reading measured data: a folder with dataset.yaml and its CSV files."""
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -63,10 +64,17 @@ def find_description(folder_or_name: str | Path) -> Path:
         path = located(folder_or_name)
     except Unreadable as error:
         raise DatasetError(f"{error}") from None
-    if path.is_file():
+    log = f"{path}: this is no {FILE_NAME}. If it is a log" if path.is_file() else ""
+    if path.is_file() and path.suffix.lower() in ("", ".yaml", ".yml"):
         return path
     if path.is_dir():
-        return path / FILE_NAME
+        if (path / FILE_NAME).exists() or any(path.glob("*.y*ml")):
+            return path / FILE_NAME
+        log = f"{path}: this folder holds no {FILE_NAME}. If it holds logs"
+    if log:
+        raise DatasetError(
+            f"{log}, import first: robofish import {shlex.quote(str(path))} --out FOLDER"
+        )
     if str(folder_or_name) in list_datasets():
         return _packaged() / str(folder_or_name) / FILE_NAME
     raise DatasetError(

@@ -94,7 +94,7 @@ def shared_entries(diagnosis: Diagnosed) -> Plain:
         "ranking": [_rank(ranked) for ranked in attribution.ranking],
         "unexplained": [] if diagnosis.adequacy.reached else _unexplained(diagnosis),
         "next_experiment": experiment_entry(diagnosis.next_experiment),
-        "strained": list(diagnosis.adequacy.implausible),
+        "implausible": list(diagnosis.adequacy.implausible),
     }
 
 

@@ -126,7 +126,7 @@ def doubts(answer: Mapping[str, Any]) -> list[str]:
         answer: the content of ``diagnosis.json``.
     """
     found = [_far_coefficients(answer["parameters"]), _mass_in_disguise(answer["causes"])]
-    found += [f"The best fit is implausible: {s}." for s in answer.get("strained", ())]
+    found += [f"The best fit is implausible: {s}." for s in answer.get("implausible", ())]
     return [doubt for doubt in found if doubt]
 
 

@@ -107,7 +107,7 @@ def investigate(
     report("screening causes")
     attribution = attribute(problem, baseline, causes, rng, effort, report)
     report("what the runs could show")
-    report("testing what is left")
+    report("testing the residual")
     where = baseline if effort.retries else None
     left, shown = both(
         partial(adequacy, attribution.accepted.fit, rng, attribution.tolerated),
@@ -132,7 +132,7 @@ def investigate(
         gap = gap_closed(held_out, baseline, attribution.accepted.fit, rng)
     residual = None
     if effort.retries and not left.reached and describe:
-        report("describing what is left")
+        report("modelling the residual")
         residual = described(attribution, left, describe, held_out)
     report("sharing the misfit among its causes")
     budget = budget_of(attribution, verdict, left, held_out, rng)
@@ -278,7 +278,7 @@ def with_weaker_causes(
     more = extended(begun, causes, rng, FULL, report, POLICY.relaxed_log_p)
     if more.accepted.causes == attribution.accepted.causes:
         return attribution, left
-    report("testing what is left")
+    report("testing the residual")
     after = adequacy(more.accepted.fit, rng, more.tolerated)
     return (more, after) if after.reached else (attribution, left)
 
@@ -323,5 +323,5 @@ def with_slow_causes(
     better = found.score < before.score - POLICY.evidence_doubt
     if found.causes == before.causes or not better or disturbance_at_limit(found.fit):
         return attribution, left
-    report("testing what is left")
+    report("testing the residual")
     return more, adequacy(found.fit, rng, more.tolerated)

@@ -267,6 +267,7 @@ def test_the_command_writes_and_names_its_files(name, tmp_path, capsys):
         (["hold", "--int8", "--onnx", "x.onnx"], "--int8 is for the C header"),
         (["hold", "--c", "-"], "give it a name"),
         (["nothing.npz", "--c", "x.h"], "nothing.npz: no such policy file"),
+        (["holt", "--c", "x.h"], "a shipped policy: hold, track, path, station"),
         (["hold", "--c", "x.h", "--onnx", "x.h"], "two outputs"),
     ],
 )

@@ -87,7 +87,7 @@ def test_nothing_is_found_where_nothing_is_hidden(tmp_path):
     assert "20 s of two runs" in answer["left_out"][0]
     assert not (out / "extended.yaml").exists()
     assert max(pair["extended"] for pair in answer["misfit"].values()) < 1.2
-    assert {"refitting the baseline", "screening causes", "testing what is left"} <= set(steps)
+    assert {"refitting the baseline", "screening causes", "testing the residual"} <= set(steps)
 
 
 @pytest.mark.parametrize("make", [good_folder, steady_folder])

@@ -24,7 +24,7 @@ TIERS = {
     "designs": f"As rich, but other experiments: {'; '.join(DESIGNS)}.",
     "coefficients": "One to three coefficients off by three to six prior deviations.",
     "null": "Nothing wrong, runs as in rich.",
-    "null_strong": "Nothing wrong, pushes of 5 to 10 mN that last 1 to 5 s, of four colours.",
+    "null_strong": "Nothing wrong, disturbances of 5 to 10 mN over 1 to 5 s, with four spectra.",
     "null_camera": "Nothing wrong, seen by a camera.",
     "null_closed_loop": "Nothing wrong, under a controller.",
     "null_designs": "Nothing wrong, experiments as in designs.",

@@ -227,5 +227,12 @@ def test_found_by_folder_file_or_name(tmp_path):
     with pytest.raises(DatasetError, match="msu-steady"):
         load_dataset("msu-stedy")
     (tmp_path / "empty").mkdir()
-    with pytest.raises(DatasetError, match=r"dataset\.yaml: there is no such file"):
+    with pytest.raises(DatasetError, match=r"no dataset\.yaml.*robofish import \S*empty --out"):
         load_dataset(tmp_path / "empty")
+
+
+def test_a_log_is_to_be_imported_first(tmp_path):
+    log = tmp_path / "my log.csv"
+    log.write_text("t,x\n0,0\n", encoding="utf-8")
+    with pytest.raises(DatasetError, match=r"no dataset\.yaml.* import '.*my log.csv' --out"):
+        load_dataset(log)

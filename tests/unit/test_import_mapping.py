@@ -375,6 +375,7 @@ def test_frames_are_guessed_with_a_warning_that_says_how():
         dataset = from_frames(frame(yaw=20 * np.sin(TIME)), fish="zheng-2021-a", frame="ned")
     assert isinstance(dataset, Dataset)
     assert any("yaw: unit deg assumed" in note for note in dataset.notes)
+    assert any("unless start='rest'" in note for note in dataset.notes)
     np.testing.assert_allclose(dataset.runs[0].channels["yaw"], np.radians(20 * np.sin(TIME)))
 
 
@@ -382,7 +383,7 @@ def test_frames_are_guessed_with_a_warning_that_says_how():
     ("data", "time", "expected"),
     [
         (frame(t=1000 * TIME), None, r"looks like a time in ms.*'unit': 'ms'"),
-        (frame(), "stamp", "no such column"),
+        (frame(), "stamp", "no column 'stamp' holds the times.*one of: t, x"),
         (frame(yaw="east"), None, "'east' is not a number"),
         (frame(yaw=[np.nan] * 50 + [40.0] * 50), None, "more than a fish"),
         (frame().iloc[:1], None, "1 rows"),

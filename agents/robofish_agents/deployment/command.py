@@ -52,6 +52,11 @@ def run_export(
     if any(str(path) == STANDARD for path in outputs):
         raise ConfigError("an export has two files; give it a name in place of -")
     file = shipped(policy)[0] if policy in TASKS and not Path(policy).is_file() else Path(policy)
+    if not file.exists():
+        raise ConfigError(
+            f"{policy}: no such policy file. Give the path of a policy.npz, or the task of a "
+            f"shipped policy: {', '.join(TASKS)}"
+        )
     contracts = [contract_path(path) for path in outputs]
     check_outputs([*outputs, *contracts, json], [file, config])
     read = read_policy(file)

@@ -107,7 +107,7 @@ def read_policy(path: str | Path) -> PolicyFile:
 def _unpack(file: Path) -> dict[str, npt.NDArray[Any]]:
     try:
         if not located(file).is_file():
-            raise ConfigError(f"{file}: no such policy file")
+            raise ConfigError(f"{file}: no such policy file; check the path of policy.npz")
         content = read_bytes(file, MOST_BYTES)
         return read_arrays(content, MOST_BYTES)
     except Unreadable as error:

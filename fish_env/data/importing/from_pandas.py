@@ -12,7 +12,7 @@ import numpy as np
 
 from fish_env.data.importing.assemble import assemble_runs
 from fish_env.data.importing.grouping import RunInput, safe_id
-from fish_env.data.importing.guess import guess_mapping
+from fish_env.data.importing.guess import UNKNOWN_START, guess_mapping
 from fish_env.data.importing.plan import FORMAT, Content, parse_plan
 from fish_env.data.importing.source import Source, Values
 from fish_env.data.importing.stamps import guess_unit
@@ -116,12 +116,17 @@ def _guessed(
         content[key] = {
             n: {**entry, "source": names[entry["source"]]} for n, entry in content[key].items()
         }
+    assumed = [words for words in guess.assumptions if words != UNKNOWN_START]
+    if told["start"] == "unknown":
+        assumed.append(
+            "start and tail_phase: estimated from each run, unless start='rest' is given"
+        )
     warnings.warn(
         "from_frames guesses what the columns mean; give `channels` to tell it. Assumed: "
-        f"{'; '.join(guess.assumptions)}",
+        f"{'; '.join(assumed)}",
         stacklevel=3,
     )
-    return content, tuple(f"assumed: {words}" for words in guess.assumptions)
+    return content, tuple(f"assumed: {words}" for words in assumed)
 
 
 def _tables(frames: Frames, name: str) -> dict[str, dict[str, Source]]:
@@ -154,8 +159,13 @@ def frame_source(frame: pd.DataFrame, run: str, part: str) -> Source:
         part: Its name in the run.
 
     Raises:
-        DatasetError: It has no rows, or two columns of one name.
+        DatasetError: It is no frame, has no rows, or two columns of one name.
     """
+    if not (hasattr(frame, "columns") and hasattr(frame, "index")):
+        raise DatasetError(
+            f"from_frames: {run}: of type {type(frame).__name__}, which is no pandas frame. Give a "
+            "frame, or frames by run: {'run1': frame}."
+        )
     dated = frame.index.dtype.kind in "mM"
     index = str(frame.index.name or "time")
     if (frame.index.name is not None or dated) and index not in frame.columns:
@@ -213,7 +223,11 @@ def _time(time: str | Mapping[str, Any] | None, part: str, source: Source) -> Co
         time = time.get(part)
     given = {"column": time or "t"} if time is None or isinstance(time, str) else dict(time)
     column = str(given.get("column", "t"))
-    source.column(column)
+    if column not in source.columns:
+        raise source.place().refuse(
+            f"no column '{column}' holds the times",
+            "Give time={'column': NAME, 'unit': 's'} with one of: " + ", ".join(source.columns),
+        )
     if "unit" in given:
         return given
     stated = source.units.get(column)

@@ -117,7 +117,7 @@ def _swaps(channels: Sequence[str], lines: Lines) -> Iterator[Change]:
             yield Change(
                 "swap", f"{one}, {other}", None, "",
                 lines.swap(one, other),
-                f"{one} and {other} are exchanged",
+                f"{one} and {other} are swapped",
                 channels={one: Column(other), other: Column(one)},
             )  # fmt: skip
 

@@ -165,6 +165,17 @@ def test_nothing_covers_the_bar_when_everything_is_unfolded(opened):
     assert top >= bottom
 
 
+def test_plots_fit_on_paper(opened):
+    width = "document.querySelector('.uplot').getBoundingClientRect().width"
+    on_screen = opened.run(width)
+    opened.run("dispatchEvent(new Event('beforeprint')), 1")
+    opened.run(DRAWN)
+    assert opened.run(width) == 640 != on_screen
+    opened.run("dispatchEvent(new Event('afterprint')), 1")
+    opened.run(DRAWN)
+    assert opened.run(width) == on_screen
+
+
 def test_another_run_can_be_chosen(opened):
     opened.run(
         "(() => { const s = document.querySelector('.rf-run select'); s.value = 1;"

@@ -1,5 +1,6 @@
 "use strict";
 Robofish.PLOT_HEIGHT = 112;
+Robofish.PAPER_WIDTH = 640;  // px; fits on A4 and on letter, upright
 
 // Channels over time, one plot each, with a line at the present time.
 Robofish.Plots = class {
@@ -8,6 +9,9 @@ Robofish.Plots = class {
     this.clock = clock;
     this.plots = [];
     new ResizeObserver(() => this.resize()).observe(holder);
+    // A page is laid out for paper without telling the observer: plots get a width that fits.
+    window.addEventListener("beforeprint", () => this.resize(Robofish.PAPER_WIDTH));
+    window.addEventListener("afterprint", () => this.resize());
   }
 
   show(tracks, specs, dark) {
@@ -97,8 +101,7 @@ Robofish.Plots = class {
     });
   }
 
-  resize() {
-    const width = this.holder.clientWidth;
+  resize(width = this.holder.clientWidth) {
     if (!width) return;
     for (const { chart } of this.plots) chart.setSize({ width, height: Robofish.PLOT_HEIGHT });
     this.update();

@@ -90,15 +90,19 @@ class Marginal:
     run_of: IntArray
 
     @cached_property
-    def parts(self) -> list[tuple[slice, FloatArray, FloatArray]]:
-        """Of each run: its residuals, orthonormal directions (D_r, k), and their variances - 1."""
+    def _parts(self) -> list[tuple[slice, FloatArray, FloatArray]]:
+        """Of each run: its residuals, what they lose, and their variances - 1 along k directions.
+
+        Residuals r (D_r,) lose M S M' r, with slopes M (D_r, K) and S (K, K).
+        """
         found = []
         for own in self._slices:
             mine = self.slopes[own]
             values, vectors = np.linalg.eigh(mine.T @ mine)
             kept = values > 1e-9
-            root = np.sqrt(values[kept])
-            found.append((own, mine @ (vectors[:, kept] / root), values[kept]))
+            along, values = vectors[:, kept], values[kept]
+            shrink = 1.0 - 1.0 / np.sqrt(1.0 + values)
+            found.append((own, (along * (shrink / values)) @ along.T, values))
         return found
 
     @cached_property
@@ -108,9 +112,9 @@ class Marginal:
 
     def rows(self, rows: FloatArray) -> FloatArray:
         """Rows (m, D) of residuals or of their changes, whitened with the variation in place."""
-        for own, directions, variance in self.parts:
-            shrink = 1.0 - 1.0 / np.sqrt(1.0 + variance)
-            rows[:, own] -= ((rows[:, own] @ directions) * shrink) @ directions.T
+        for own, lost, _ in self._parts:
+            mine = self.slopes[own]
+            rows[:, own] -= ((rows[:, own] @ mine) @ lost) @ mine.T
         return rows
 
     def residuals(self, residuals: FloatArray) -> FloatArray:
@@ -121,7 +125,7 @@ class Marginal:
     @cached_property
     def log_det(self) -> float:
         """What integrating costs in -2 log likelihood."""
-        return float(sum(np.log1p(variance).sum() for _, _, variance in self.parts))
+        return float(sum(np.log1p(variance).sum() for _, _, variance in self._parts))
 
     def predicted(
         self, residuals: FloatArray, damping: float = 0.0, least: FloatArray | None = None

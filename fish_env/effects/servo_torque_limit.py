@@ -73,6 +73,11 @@ def start_at_command(inputs, tail, fish, e):
     return rate, *starting(tail.angle, tail), e.speed
 
 
+def speed_alone(values):
+    """A motor that the water does not slow down has a largest rate and nothing else."""
+    return {"servo_rate_limit": {"rate": values["speed"]}} if values["torque"] < inf else {}
+
+
 def fastest(values):
     """Jumps of the rate are spread over a fixed time."""
     return SETTLING_TIME if values["torque"] < inf else inf
@@ -104,8 +109,10 @@ EFFECT = Effect(
     step_error=0.03,
     confusable_with=(
         "beat_load",
+        "body_flexibility",
         "servo_lag",
         "servo_rate_limit",
         "tail_gain",
     ),
+    parts=speed_alone,
 )  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import inf
 
@@ -44,9 +44,16 @@ Parts = Mapping[str, Mapping[str, float]]
 
 
 class Switched:
-    """Something with parameters that switch it on."""
+    """Something with parameters that switch it on.
+
+    Attributes:
+        parameters: its parameters.
+        parts: parameters -> other effects, with their parameters, that together do nearly the
+            same; empty where none do.
+    """
 
     parameters: tuple[EffectParameter, ...]
+    parts: Callable[[Mapping[str, float]], Parts] | None
 
     @property
     def neutral(self) -> dict[str, float]:
@@ -57,6 +64,10 @@ class Switched:
     def switching(self) -> tuple[EffectParameter, ...]:
         """The parameters that switch it on; the others only shape it."""
         return tuple(p for p in self.parameters if not p.shapes)
+
+    def in_parts(self, values: Mapping[str, float]) -> Parts:
+        """Other effects, with their parameters, that together do nearly the same; or none."""
+        return self.parts(values) if self.parts is not None else {}
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +82,8 @@ class DeclaredEffect(Switched):
         step_error: share of its effect that the simulation gets wrong.
         drifts_in_phase: whether a periodic drive gets ever further out of phase.
         diagnosed: whether a diagnosis looks for it; else it is only simulated, and fitted if asked.
+        parts: parameters -> other effects, with their parameters, that together do nearly the
+            same; default: none do.
     """
 
     name: str
@@ -80,10 +93,7 @@ class DeclaredEffect(Switched):
     step_error: float = 0.0
     drifts_in_phase: bool = False
     diagnosed: bool = True
-
-    def in_parts(self, values: Mapping[str, float]) -> Parts:
-        """Other effects that together do nearly the same: none are known."""
-        return {}
+    parts: Callable[[Mapping[str, float]], Parts] | None = None
 
     def is_followed(self, values: Mapping[str, float], step: float) -> bool:
         """Whether simulation steps (s) follow it at these values: they do, at any."""

@@ -196,10 +196,6 @@ class Effect(Switched):
         """Whether the kernel must contain it; if not, it acts on what is recorded alone."""
         return bool(self.hooks or self.command_delay)
 
-    def in_parts(self, values: Mapping[str, float]) -> Parts:
-        """Other effects, with their parameters, that together do nearly the same; or none."""
-        return self.parts(values) if self.parts is not None else {}
-
     def is_followed(self, values: Mapping[str, float], step: float) -> bool:
         """Whether RK4 steps (s) follow it: its shortest time constant is about a step or longer."""
         return self.time_scale is None or self.time_scale(values) >= FOLLOWED * step

@@ -25,6 +25,13 @@ def in_space(gravity: float = 0.0) -> FishParams:
     return dry(balanced(), gravity)
 
 
+def held() -> FishParams:
+    """A fish too heavy for its tail to move it."""
+    values = {"mass.total": 8e3, "mass.buoyancy": 8e3}
+    values |= {f"inertia.rest[{i}]": 1e3 for i in range(3)}
+    return swimmer().replace(values)
+
+
 def run(
     effects: dict | None,
     commands: list = BEAT,

@@ -2,20 +2,14 @@
 
 import numpy as np
 
+from fish_env.effects import get_effect
 from fish_env.simulator import Simulator
 from tests.physics.cases import swimmer
-from tests.unit.effects.support import BEAT, assert_same_motion, run
+from tests.unit.effects.support import BEAT, assert_same_motion, held, run
 
 TORQUE, SPEED = 0.01, 9.0
 WEAK = {"servo_torque_limit": {"torque": TORQUE, "speed": SPEED}}
 SWING = [{"t": 0.0, "tail_amplitude": 0.35, "tail_frequency": 2.0}]
-
-
-def held():
-    """A fish too heavy for its tail to move it."""
-    values = {"mass.total": 8e3, "mass.buoyancy": 8e3}
-    values |= {f"inertia.rest[{i}]": 1e3 for i in range(3)}
-    return swimmer().replace(values)
 
 
 def outputs(effects, commands, seconds, fish=None, dt=0.005):
@@ -54,10 +48,12 @@ def test_a_swimming_fish_pays_for_each_rate_with_torque():
 
 
 def test_a_strong_servo_is_limited_in_rate_alone():
-    strong = {"servo_torque_limit": {"torque": 1e6, "speed": 3.0}}
-    assert_same_motion(
-        run(strong, BEAT, 2.0), run({"servo_rate_limit": {"rate": 3.0}}, BEAT, 2.0), atol=1e-6
-    )
+    """As its declaration says: that is the effect which it has as its limit."""
+    values = {"torque": 1e6, "speed": 3.0}
+    limit = get_effect("servo_torque_limit").in_parts(values)
+    assert limit == {"servo_rate_limit": {"rate": 3.0}}
+    strong = run({"servo_torque_limit": values}, BEAT, 2.0)
+    assert_same_motion(strong, run(limit, BEAT, 2.0), atol=1e-6)
 
 
 def test_smaller_steps_tell_the_same():

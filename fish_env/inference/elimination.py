@@ -9,6 +9,7 @@ from scipy.special import chdtri
 
 from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.fit import Fit
+from fish_env.inference.estimate.information import information, prior_precision
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import CauseId, Coefficient, EffectParameterId, ParameterId
 from fish_env.inference.policy import POLICY
@@ -21,19 +22,59 @@ def backward_elimination(current: Explanation) -> Explanation:
 
     Also without any cause whose interval, beside the others, contains its neutral value: the
     evidence takes the residuals for white, the interval does not. Of a single cause that is the
-    only question, for its evidence has just been found enough.
+    only question, for its evidence has just been found enough. Where a fit without the cause loses
+    more than such an interval allows, the cause acts: what the interval follows from, a linear
+    model, then does not hold as far as neutral.
     """
-    alone = len(current.causes) == 1
-    for name in current.causes:
-        if not alone and surely_acts(current.fit, name):
-            continue
-        doubtful = may_not_act(current.fit, name)
-        if alone and not doubtful:
-            return current
-        smaller = without(current, (name,))
-        if smaller and (doubtful or smaller.score < current.score + POLICY.evidence_doubt):
-            return backward_elimination(smaller)
+    while (smaller := _smaller(current)) is not None:
+        current = smaller
     return current
+
+
+def _smaller(current: Explanation) -> Explanation | None:
+    """The explanation without the first cause that it can do without; None where it needs all."""
+    alone = len(current.causes) == 1
+    for cause in current.causes:
+        if not alone and surely_acts(current.fit, cause):
+            continue
+        doubtful = may_not_act(current.fit, cause)
+        if alone and not doubtful:
+            return None
+        smaller = without(current, (cause,))
+        least = POLICY.evidence_doubt + (allowed_loss(current.fit, cause) if doubtful else 0.0)
+        if smaller and smaller.score < current.score + least:
+            return smaller
+    return None
+
+
+def allowed_loss(fit: Fit, cause: CauseId, level: float = 0.05) -> float:
+    """Growth of -2 log likelihood without a cause, at most, if its region holds neutral values.
+
+    In white residuals it is a quantile of chi-squared; coloured ones multiply it.
+
+    Args:
+        fit: with the cause.
+        cause: the cause.
+        level: share of such regions that do not hold the truth.
+    """
+    at = [fit.ids.index(id) for id in off_values(fit, cause)]
+    return float(chdtri(len(at), level)) * covariance_inflation(fit, at)
+
+
+def covariance_inflation(fit: Fit, at: Sequence[int]) -> float:
+    """How much larger coloured residuals make the variance of some parameters (at least 1).
+
+    Args:
+        fit: with all causes.
+        at: numbers of the parameters.
+    """
+    count = len(fit.problem.baseline)
+    prior = prior_precision(fit.problem.baseline, len(fit.ids) - count, fit.released)
+    scale = np.eye(len(fit.ids))
+    scale[:count, :count] = fit.problem.baseline.factor
+    hessian = information(fit.linearised.slopes, prior)
+    white = np.diag(scale @ np.linalg.inv(hessian) @ scale.T)
+    return float(max(1.0, (np.diag(fit.covariance)[at] / white[at]).max()))
 
 
 def surely_acts(fit: Fit, cause: CauseId) -> bool:

@@ -12,11 +12,14 @@ from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import CauseId, Coefficient, EffectName
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause
+from fish_env.inference.problem import Problem
+from fish_env.inference.projection import Signal
 from fish_env.inference.pursuit import pursued, substitutes
 from fish_env.inference.rivals import rivals_of
 from fish_env.inference.screening import Screen, screen
 from fish_env.inference.shortlist import shortlisted
-from fish_env.inference.substitution import in_parts, substituted, without
+from fish_env.inference.starts import probed
+from fish_env.inference.substitution import in_parts, limit_at, limit_of, substituted, without
 from fish_env.inference.trials import tried_out
 
 LINEAR_DOUBT = 3.0 * POLICY.evidence_doubt
@@ -59,6 +62,7 @@ def pursue(
     if not shortlisted(problem, shown, 1, least, relaxed_log_p):
         return current, shown, []
     begun, replaced = current, []
+    current, shown = _simplified(current, shown, causes, rng, report)
     if disturbance_at_limit(current.fit):
         varied = current.varied(beside_misfit=True)
         if varied.score < current.score - POLICY.evidence_doubt:
@@ -66,22 +70,22 @@ def pursue(
     for _ in range(ALONE):
         if not disturbance_at_limit(current.fit):
             break
-        kept = _beside_drive(current, shown)
+        kept = beside(current, shown)
         more = tried_out(current, kept, report)
         more = more or pursued(current, kept, report, least, relaxed_log_p, most=1)
         if more is current:
             break
-        shown = screen(more.fit, causes, rng)
+        more, shown = _simplified(more, screen(more.fit, causes, rng), causes, rng, report)
         current = _against_likes(more, shown, report)
         if current is not more:
             replaced += [p for p in zip(current.causes, more.causes, strict=True) if p[0] != p[1]]
             shown = screen(current.fit, causes, rng)
     for _ in range(POLICY.pursuits):
-        more = pursued(current, _beside_drive(current, shown), report, least, relaxed_log_p)
+        more = pursued(current, beside(current, shown), report, least, relaxed_log_p)
         if more is current:
             break
-        current = more
-        shown = screen(current.fit, causes, rng)
+        current, shown = more, screen(more.fit, causes, rng)
+        current, shown = _simplified(current, shown, causes, rng, report)
         if disturbance_at_limit(current.fit):
             # Much is still unknown, and what would be picked next stands in for it.
             current = _told_apart(current, begun.causes, shown)
@@ -106,16 +110,49 @@ def _against_likes(
     return substituted(current, pairs, 1, report, beside_misfit=True)[0]
 
 
-def _beside_drive(current: Explanation, shown: Screen) -> Screen:
-    """The screen without what else puts a drive out of step, where its beat was measured.
+def _simplified(
+    current: Explanation,
+    shown: Screen,
+    causes: Sequence[Cause],
+    rng: np.random.Generator,
+    report: Callable[[str], None],
+) -> tuple[Explanation, Screen]:
+    """The explanation, and its screen, with effects that act as a simpler one does replaced by it.
 
-    What was measured is among the causes. Beside it a second clock or beat only trades with it.
+    What is found first makes up for part of what is missing. An effect that has another one as its
+    limit is found in the other's place then, and comes near the limit as more is explained.
     """
-    problem = current.fit.problem
-    if not problem.drive.effects or not problem.drive.effects <= {*current.causes}:
-        return shown
-    kept = tuple(s for s in shown.signals if s.cause.id not in problem.out_of_step)
+    for cause in current.causes:
+        if not limit_of(current.fit, cause):
+            continue
+        simpler = in_parts(current, cause, report)
+        if simpler and simpler.score < current.score + POLICY.evidence_doubt:
+            return simpler, screen(simpler.fit, causes, rng)
+    return current, shown
+
+
+def beside(current: Explanation, shown: Screen) -> Screen:
+    """The screen without causes that may only take the place of one that is there.
+
+    Of an effect and its limit both are in doubt as soon as both are there: each can be done
+    without. Where the beat of a drive was measured, what was measured is among the causes: a second
+    clock or beat only trades with it.
+    """
+    own = current.fit
+    problem = own.problem
+    left_out: set[CauseId | None] = {limit_of(own, cause) for cause in current.causes}
+    left_out |= {s.cause.id for s in shown.signals if _limit(problem, s) in current.causes}
+    if problem.drive.effects and problem.drive.effects <= {*current.causes}:
+        left_out |= {*problem.out_of_step}
+    kept = tuple(s for s in shown.signals if s.cause.id not in left_out)
     return replace(shown, signals=kept)
+
+
+def _limit(problem: Problem, signal: Signal) -> EffectName | None:
+    """The effect that a cause on trial has as its limit; None without one."""
+    if not signal.cause.is_effect:
+        return None
+    return limit_at(problem, signal.cause.effect, probed(problem, signal)[0])
 
 
 def _told_apart(current: Explanation, first: Sequence[CauseId], shown: Screen) -> Explanation:

@@ -21,7 +21,7 @@ from fish_env.inference.adequacy import (
     implausible_estimates,
 )
 from fish_env.inference.budget import RESAMPLES
-from fish_env.inference.elimination import off_values
+from fish_env.inference.elimination import covariance_inflation, off_values
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.free import Free
 from fish_env.inference.estimate.products import inner
@@ -300,15 +300,8 @@ class StandIns:
             shift = np.array([-z / (1.0 + held)])
             loss = z * z * held / (1.0 + held)
             freed = freed - 1.0 / (1.0 + held)
-        return Removed(loss, shift, own, rest, along, freed, self._inflation(own))
-
-    def _inflation(self, own: FloatArray) -> float:
-        """Of the variance of some parameters, by coloured residuals."""
-        scale = np.eye(len(self.fit.ids))
-        count = len(self.fit.problem.baseline)
-        scale[:count, :count] = self.fit.problem.baseline.factor
-        white = np.diag(scale @ np.linalg.inv(self.projector.hessian) @ scale.T)
-        return float(max(1.0, (np.diag(self.fit.covariance)[own] / white[own]).max()))
+        inflation = covariance_inflation(self.fit, own.tolist())
+        return Removed(loss, shift, own, rest, along, freed, inflation)
 
     @cached_property
     def _pool(self) -> list[Signal]:

@@ -17,7 +17,7 @@ import numpy as np
 
 from fish_env.arrays import FloatArray, SingleArray
 from fish_env.inference.adequacy import beyond_plausible, implausible_estimates
-from fish_env.inference.elimination import insignificant, off_values
+from fish_env.inference.elimination import allowed_loss, insignificant, off_values
 from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.estimate.products import inner
@@ -195,7 +195,13 @@ def _needed(
     if not set(causes) - set(idle):
         return current
     report(f"fitting without {listed(idle)}" if idle else "fitting what the runs differ in")
-    found = found.varied(beside_misfit=True, dropped=idle)
+    whole, found = found, found.varied(beside_misfit=True, dropped=idle)
+    level = float(np.exp(shown.threshold))
+    foreseen = sum((allowed_loss(fitted, cause, level) for cause in idle), 0.0)
+    if set(idle) - set(wild) and found.score > whole.score + POLICY.evidence_doubt + foreseen:
+        # The linear model does not hold as far as the values at which they are off.
+        report(f"fitting with {listed(name for name in idle if name not in wild)} after all")
+        found = whole.varied(beside_misfit=True, dropped=wild)
     better = found.score < current.score - POLICY.evidence_doubt
     return found if better and not implausible_estimates(found.fit) else current
 

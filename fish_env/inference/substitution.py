@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import partial
 
 import numpy as np
 
+from fish_env.inference.effects import Parts
 from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.explanation import Explanation, reached
@@ -21,11 +22,12 @@ from fish_env.inference.hypotheses import (
 )
 from fish_env.inference.parallel import side_by_side
 from fish_env.inference.policy import POLICY
-from fish_env.inference.problem import Point
+from fish_env.inference.problem import Point, Problem
 from fish_env.inference.projection import Signal
 from fish_env.inference.search import Report, at_noise, is_off
 from fish_env.inference.starts import baselines, probed
 
+Values = Mapping[EffectParameterId, float]
 MOST_TURNS = 6
 """Sizes from which a coarse fit is tried in turn."""
 
@@ -120,12 +122,10 @@ def in_parts(current: Explanation, cause: CauseId, report: Report) -> Explanatio
         None where nothing does the same together, or the simulation diverges.
     """
     own = current.fit
-    known = own.problem.known
     if isinstance(cause, Coefficient) or cause not in own.effects:
         return None
-    ids = (EffectParameterId(cause, p.name) for p in known[cause].parameters)
-    parts = known[cause].in_parts({id.name: own.point.effects[id] for id in ids})
-    if not parts or not {*parts} <= {*known}:
+    parts = _parts(own.problem, cause, own.point.effects)
+    if not parts:
         return None
     report(f"fitting {' and '.join(parts)} instead of {cause}")
     names = [EffectName(name) for name in parts]
@@ -136,6 +136,33 @@ def in_parts(current: Explanation, cause: CauseId, report: Report) -> Explanatio
     start = (effects, Point(own.point.z, values), own.noise, own.released)
     fitted = reached(partial(fit, own.problem, *start, refit_noise=False, iterations=4))
     return None if fitted is None else Explanation(causes, fitted)
+
+
+def limit_of(own: Fit, cause: CauseId) -> EffectName | None:
+    """The effect that a cause has as its limit, see :func:`limit_at`; None without one."""
+    if isinstance(cause, Coefficient) or cause not in own.effects:
+        return None
+    return limit_at(own.problem, cause, own.point.effects)
+
+
+def limit_at(problem: Problem, effect: EffectName, values: Values) -> EffectName | None:
+    """The one effect that another does nearly the same as, if some parameter hardly acts.
+
+    Args:
+        problem: knows the effects.
+        effect: the effect.
+        values: of its parameters, and perhaps of others.
+    """
+    parts = _parts(problem, effect, values)
+    return EffectName(next(iter(parts))) if len(parts) == 1 else None
+
+
+def _parts(problem: Problem, effect: EffectName, values: Values) -> Parts:
+    """What together does nearly the same as an effect with these values, if all of it is known."""
+    known = problem.known
+    ids = (EffectParameterId(effect, p.name) for p in known[effect].parameters)
+    parts = known[effect].in_parts({id.name: values[id] for id in ids})
+    return parts if {*parts} <= {*known} else {}
 
 
 def without(current: Explanation, dropped: Collection[CauseId]) -> Explanation | None:

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from fish_env.effects import catalogue
-from fish_env.inference.elimination import backward_elimination, may_not_act
+from fish_env.inference.elimination import allowed_loss, backward_elimination, may_not_act
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import Coefficient
-from tests.inference.stated import Stated, apart, effect, fit_of
+from fish_env.inference.problem import Point
+from tests.inference.stated import Stated, apart, effect, fit_of, size_of
 
 
 def fit_with(name, values, sd, correlation=0.0):
@@ -70,3 +71,21 @@ def test_what_the_evidence_does_not_need_is_dropped_though_it_may_act():
     both = Explanation(("current", "scale"), fit(problem, ("current", "scale"), refit_noise=False))
     assert not may_not_act(both.fit, "scale")
     assert backward_elimination(both).causes == ("current",)
+
+
+def test_a_cause_stays_that_a_fit_misses_more_than_its_region_allows():
+    """Far from neutral its size hardly matters, and nothing of that holds at neutral.
+
+    So a rate limit acts whose torque limit may be infinite.
+    """
+
+    def residuals(z, effects):
+        size = effects[size_of("limit")]
+        return np.array([[9.0 * (1.0 - min(size, 1.0)), 0.1 * (size - 3.0), z.sum()]] * 3)
+
+    problem = Stated(residuals, [effect("limit", 5.0)])
+    own = fit(problem, ("limit",), Point(np.zeros(1), {size_of("limit"): 3.0}), refit_noise=False)
+    found = Explanation(("limit",), own)
+    assert may_not_act(own, "limit")
+    assert allowed_loss(own, "limit") < 10.0
+    assert backward_elimination(found).causes == ("limit",)

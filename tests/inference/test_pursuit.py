@@ -11,7 +11,7 @@ from fish_env.inference.effects import DeclaredEffect
 from fish_env.inference.elimination import insignificant
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.explanation import Explanation
-from fish_env.inference.many_causes import challenged, each_in_turn
+from fish_env.inference.many_causes import beside, challenged, each_in_turn, pursue
 from fish_env.inference.pipeline import infer
 from fish_env.inference.probes import causes_of
 from fish_env.inference.projection import Projector
@@ -185,3 +185,36 @@ def test_what_is_like_a_cause_found_does_not_push_out_what_shows():
     said = []
     pursued(current, shown, said.append, most=1)
     assert "fitting delay, bias together" in said
+
+
+def with_its_limit(declared: bool) -> Stated:
+    """Two effects that do the same, one of them declared as the other's limit, and a third."""
+    parts = (lambda values: {"simple": dict(values)}) if declared else None
+
+    def residuals(z, effects):
+        moved = effects[size_of("whole")] + effects[size_of("simple")]
+        return np.array([[moved - 6.0, effects[size_of("other")] - 9.0, z.sum()]] * 3)
+
+    known = [effect("whole", 10.0, parts=parts), effect("simple", 10.0), effect("other", 10.0)]
+    return Stated(residuals, known)
+
+
+@pytest.mark.parametrize(("declared", "kept"), [(True, "simple"), (False, "whole")])
+def test_an_effect_at_its_limit_is_replaced_by_it(declared, kept):
+    stated = with_its_limit(declared)
+    found = Explanation(("whole",), fit(stated, ("whole",), refit_noise=False))
+    rng, causes = np.random.default_rng(0), causes_of(stated)
+    shown = screen(found.fit, causes, rng)
+    more, _, _ = pursue(found, shown, causes, rng, silent, 0.0, 0.0)
+    assert set(more.causes) == {kept, "other"}
+
+
+def test_no_effect_is_searched_for_beside_its_limit():
+    """Each would make the other look unnecessary."""
+    stated = with_its_limit(True)
+    for there, other in (("whole", "simple"), ("simple", "whole")):
+        own = fit(stated, (there,), refit_noise=False)
+        shown = screen(own, causes_of(stated), np.random.default_rng(0))
+        left = {s.cause.name for s in beside(Explanation((there,), own), shown).signals}
+        assert "other" in left
+        assert other not in left

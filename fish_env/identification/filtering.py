@@ -7,15 +7,13 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
-from pathlib import Path
-from threading import Lock
 
 import numpy as np
 
 from fish_env.arrays import FloatArray, IntArray
 from fish_env.effects.extended import ExtendedModel
-from fish_env.identification.applied_wrench import EFFECT as APPLIED_WRENCH
 from fish_env.identification.channels import codes_of
+from fish_env.identification.filter_kernels import filter_kernels, replay_kernels
 from fish_env.identification.jitter import channel_rates
 from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.noise_scoring import Replayed
@@ -29,7 +27,6 @@ from fish_env.identification.variation import (
 )
 from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.model.history import history_rows
-from fish_env.model.runtime import Kernels, kernels
 from fish_env.model.state import BASE_STATES
 from fish_env.rigidbody.kinematics import turned
 from fish_env.sensing.channels import channels_from_states
@@ -41,12 +38,6 @@ POSITIONS = {"x": 0, "y": 1, "z": 2}
 TAIL_PHASE = 13  # row of the state
 CORRECTIONS = 4
 """Each leaves a tenth or less of the error of a start."""
-TEMPLATES = tuple(
-    Path(__file__).with_name(f"{name}_template.py")
-    for name in ("observation", "error_state", "filter", "replay")
-)
-
-_LOADING = Lock()
 
 
 @dataclass(frozen=True, eq=False)
@@ -287,7 +278,7 @@ class RunFilter:
             made_with: noise model they were made with.
             noise: the other noise model.
         """
-        entry = self.kernels.entry("replay_run")
+        entry = replay_kernels().entry("replay_run")
         ends = np.cumsum([len(run.clock) for run in self.runs])
         innovations = np.zeros((ends[-1], len(self.channels)))
         whitening = np.zeros((ends[-1], len(self.channels), len(self.channels)))
@@ -390,11 +381,3 @@ def _threads() -> ThreadPoolExecutor:
 
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_threads.cache_clear)
-
-
-def filter_kernels(model: ExtendedModel) -> Kernels:
-    """Compiled filter for a model whose last effect is the applied wrench."""
-    composition = model.kernels.composition
-    assert composition.effects[-1].name == APPLIED_WRENCH.name
-    with _LOADING:  # fits side by side may ask for the same kernel
-        return kernels(replace(composition, templates=(*composition.templates, *TEMPLATES)))

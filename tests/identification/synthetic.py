@@ -8,7 +8,7 @@ from scipy.interpolate import CubicSpline
 from fish_env.data import CommandSteps, Dataset, Run
 from fish_env.effects.extended import ExtendedModel
 from fish_env.identification.applied_wrench import EFFECT as APPLIED_WRENCH
-from fish_env.identification.filtering import filter_kernels
+from fish_env.identification.filter_kernels import filter_kernels
 from fish_env.identification.noise_model import NoiseModel
 from fish_env.model.grid import Grid
 from fish_env.params import load_fish

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from fish_env.envs.batch import STEP_TEMPLATE
-from fish_env.identification.filtering import TEMPLATES
+from fish_env.identification.filter_kernels import REPLAY_TEMPLATE, TEMPLATES
 from fish_env.model import compose, jit
 from fish_env.model.composition import TEMPLATE, Composition
 
@@ -97,7 +97,11 @@ def hashed(composition: Composition) -> set[Path]:
     return files.union(*(jit.sources_behind(template) for template in composition.templates))
 
 
-@pytest.mark.parametrize("templates", [(STEP_TEMPLATE,), TEMPLATES], ids=["step", "filter"])
+@pytest.mark.parametrize(
+    "templates",
+    [(STEP_TEMPLATE,), TEMPLATES, (REPLAY_TEMPLATE,)],
+    ids=["step", "filter", "replay"],
+)
 def test_whatever_a_composed_module_calls_is_hashed(templates):
     composition = replace(Composition(), templates=(TEMPLATE, *templates))
     called = files_of_code(vars(compose.load(composition)))

@@ -1,6 +1,8 @@
 """What holds for all tests, and a browser for those that open pages."""
 
+import gc
 import os
+from collections import Counter
 from pathlib import Path
 
 import pytest
@@ -9,6 +11,18 @@ from tests.replay.browser import Browser
 
 # Windows are opened where nobody sees them; tests that need a real screen ask for one themselves.
 os.environ.setdefault("SDL_VIDEODRIVER", "dummy")
+
+
+def pytest_collection_modifyitems(items):
+    """Files with slow tests come first, so that no process waits while another ends one."""
+    slow = Counter(item.path for item in items if item.get_closest_marker("slow"))
+    items.sort(key=lambda item: -slow[item.path])
+
+
+def pytest_collection_finish():
+    """Tests and modules stay until the end: whoever collects garbage need not look at them."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="module")

@@ -36,8 +36,9 @@ def cache_folder() -> Path:
 
 
 def helper(function):
-    """Compiles a function that only compiled functions call."""
-    return numba.njit(error_model="numpy")(function)
+    """Compiles a function that only compiled functions call: Python must not, it has no way in."""
+    options = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    return numba.njit(error_model="numpy", **options)(function)
 
 
 def entry_point(function):

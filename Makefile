@@ -10,7 +10,7 @@ CLEANRL := .venv-cleanrl
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-long lint docs bench benchmark-diagnosis benchmark-realistic benchmark-power benchmark-time benchmark-agents benchmark-loop clients measure-export fuzz check-release walks clone-to-verdict clean
+.PHONY: help setup demo test kernels test-long lint docs bench benchmark-diagnosis benchmark-realistic benchmark-power benchmark-time benchmark-agents benchmark-loop clients measure-export fuzz check-release walks clone-to-verdict clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 28
@@ -20,9 +20,15 @@ setup: $(VENV)/.with-dev  ## create .venv and install everything that tests and 
 demo: $(VENV)/.with-base  ## diagnose a small data set, compare a real fish, swim the environment
 	$(BIN)/robofish demo
 
-test: setup lint  ## check style, types and layering, then run the tests
+# Processes that share the cores must not wait for each other's threads.
+test test-long: export OMP_NUM_THREADS = 1
+
+test: setup  ## check style, types and layering, then run the tests
+	$(MAKE) --jobs=2 lint kernels
+	$(BIN)/python -m pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder
+
+kernels: setup  ## compile what the tests share
 	$(BIN)/python -m scripts.warm_kernels --processes $(JOBS)
-	$(BIN)/python -m pytest -n $(JOBS) --dist loadfile
 
 test-long: setup  ## the tests of ten seconds and more that make test leaves out
 	$(BIN)/python -m pytest -n $(JOBS) -m long

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import inf
 
-from fish_env.model.corners import UNTOLD_STEP, rate_against_stops
+from fish_env.model.corners import TOUCH, UNTOLD_STEP, cubic, rate_against_stops, rises
 from fish_env.model.effect import Effect, EffectParameter
 from fish_env.model.jit import kernel
 from fish_env.model.records import Tail
@@ -17,20 +17,52 @@ from fish_env.model.records import Tail
 @kernel
 def stop_tail(tail, inputs, phase, time, fish, e, memory, since):
     """xi = min(max(cmd, lower), upper); at rest against a stop."""
-    (step,) = memory
+    step, side = memory
     held = (tail.angle < e.lower) | (tail.angle > e.upper)
     seen = Tail(
         min(max(tail.angle, e.lower), e.upper),
         rate_against_stops(tail, e.lower, e.upper, held, step),
         0.0 if held else tail.acceleration,
     )
-    return seen, (since if since > 0.0 else step,)
+    return seen, (since if since > 0.0 else step, side)
+
+
+@kernel
+def move_in_part(tail, inputs, phase, time, fish, e, memory, since):
+    """The same until the tail meets a stop or leaves it."""
+    step, side = memory
+    held = side != 0.0
+    seen = Tail(
+        (e.upper if side > 0.0 else e.lower) if held else tail.angle,
+        0.0 if held else tail.rate,
+        0.0 if held else tail.acceleration,
+    )
+    return seen, (step, side)
+
+
+@kernel
+def turns(e):
+    """Whether there is a stop."""
+    return (e.lower > -inf) | (e.upper < inf)
+
+
+@kernel
+def corner(tail, phase, later, later_phase, e, memory, length):
+    """When the tail meets a stop or leaves it; the upper one holds it (1), the lower (-1) or none."""
+    a, b, c, d = cubic(tail, later, length)
+    above = (a > e.upper + TOUCH) | ((a >= e.upper - TOUCH) & (b > 0.0))
+    below = (a < e.lower - TOUCH) | ((a <= e.lower + TOUCH) & (b < 0.0))
+    side = 1.0 if above else (-1.0 if below else 0.0)
+    stop = e.upper if above else e.lower
+    met = min(rises(a - e.upper, b, c, d), rises(e.lower - a, -b, -c, -d))
+    left = rises(side * (stop - a), -side * b, -side * c, -side * d)
+    return length * (left if side != 0.0 else met), (length, side)
 
 
 @kernel
 def start_anywhere(inputs, tail, fish, e):
     """The length of the step before a run is unknown."""
-    return (UNTOLD_STEP,)
+    return UNTOLD_STEP, 1.0 if tail.angle > e.upper else (-1.0 if tail.angle < e.lower else 0.0)
 
 
 EFFECT = Effect(
@@ -44,8 +76,11 @@ EFFECT = Effect(
         EffectParameter("upper", "rad", inf, 0.0, inf, (0.2, 0.7), "stop on the starboard side"),
     ),
     hooks={"tail": stop_tail},
-    memory={"tail": ("step",)},
+    memory={"tail": ("step", "side")},
     initial_states=start_anywhere,
+    turns=turns,
+    corner=corner,
+    part=move_in_part,
     order=3,
     step_error=0.003,
     confusable_with=(

@@ -12,7 +12,16 @@ from __future__ import annotations
 
 from math import inf
 
-from fish_env.model.corners import MEMORY, angle_at, follow, handed_on, starting
+from fish_env.model.corners import (
+    MEMORY,
+    TOUCH,
+    angle_at,
+    cubic,
+    follow,
+    handed_on,
+    rises,
+    starting,
+)
 from fish_env.model.effect import Effect, EffectParameter
 from fish_env.model.jit import kernel
 from fish_env.model.records import Tail
@@ -64,15 +73,56 @@ def take_up_play(tail, inputs, phase, time, fish, e, states, memory, since):
         ),
         settled_rate,
     )
-    return handed_on(e.gap > 0.0, tail, driven, gained, since)
+    return handed_on(e.gap > 0.0, tail, driven, gained, since, memory[5])
+
+
+@kernel
+def move_in_part(tail, inputs, phase, time, fish, e, states, memory, since):
+    """The same until the rate jumps."""
+    (settled_rate,) = states
+    side = memory[5]
+    touching = side != 0.0
+    moved = Tail(
+        tail.angle - side * (0.5 * e.gap) if touching else memory[0],
+        tail.rate if touching else 0.0,
+        tail.acceleration if touching else 0.0,
+    )
+    driven, _ = spread_jumps(moved, settled_rate)
+    return handed_on(e.gap > 0.0, tail, driven, 0.0, since, side)
+
+
+@kernel
+def turns(e):
+    """Whether it is on."""
+    return e.gap > 0.0
+
+
+@kernel
+def corner(tail, phase, later, later_phase, e, memory, length):
+    """When the servo has taken up the play, or turns back.
+
+    The tail rests meanwhile (0), or moves with the servo: to positive angles (1), or back (-1).
+    """
+    half = 0.5 * e.gap
+    angle = within(memory[0], tail.angle, half)
+    ahead = tail.angle - angle
+    pushed = (ahead >= half - TOUCH) & (tail.rate > 0.0)
+    pulled = (ahead <= TOUCH - half) & (tail.rate < 0.0)
+    side = 1.0 if pushed else (-1.0 if pulled else 0.0)
+    _, b, c, d = cubic(tail, later, length)
+    up, down = rises(ahead - half, b, c, d), rises(-ahead - half, -b, -c, -d)
+    back = rises(-side * b, -2.0 * side * c, -3.0 * side * d, 0.0)
+    when = length * (back if side != 0.0 else min(up, down))
+    begun = angle if side == 0.0 else tail.angle - side * half
+    return when, (begun, tail.angle, tail.rate, 0.0, length, side)
 
 
 @kernel
 def start_in_contact(inputs, tail, fish, e):
     """The run starts with the play taken up in the direction in which the servo turns."""
     half = 0.5 * e.gap
-    behind = half if tail.rate > 0.0 else (-half if tail.rate < 0.0 else 0.0)
-    return tail.rate, *starting(tail.angle - behind, tail)
+    side = 1.0 if tail.rate > 0.0 else (-1.0 if tail.rate < 0.0 else 0.0)
+    return tail.rate, *starting(tail.angle - side * half, tail, side)
 
 
 def fastest(values):
@@ -93,6 +143,9 @@ EFFECT = Effect(
     states={"tail": ("settled_rate",)},
     memory={"tail": MEMORY},
     initial_states=start_in_contact,
+    turns=turns,
+    corner=corner,
+    part=move_in_part,
     time_scale=fastest,
     order=6,
     step_error=0.003,

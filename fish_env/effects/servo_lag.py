@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from math import inf
+
+from fish_env.model.corners import followed
 from fish_env.model.effect import Effect, EffectParameter
 from fish_env.model.jit import kernel
 from fish_env.model.records import Tail
@@ -21,6 +24,22 @@ def lag_tail(tail, inputs, phase, time, fish, e, states):
         acceleration if on else tail.acceleration,
     )
     return seen, (rate if on else 0.0,)
+
+
+@kernel
+def turns(e):
+    """Whether it is on."""
+    return e.time_constant > 0.0
+
+
+@kernel
+def settling(tail, e, states):
+    """A jump of the command makes the tail fast for a few time constants."""
+    (angle,) = states
+    on = e.time_constant > 0.0
+    rate = (tail.angle - angle) / (e.time_constant if on else 1.0)
+    excess = abs(rate - tail.rate + e.time_constant * tail.acceleration)
+    return followed(e.time_constant, excess) if on else inf
 
 
 @kernel
@@ -48,6 +67,8 @@ EFFECT = Effect(
     hooks={"tail": lag_tail},
     states={"tail": ("angle",)},
     initial_states=start_at_command,
+    turns=turns,
+    settling=settling,
     time_scale=fastest,
     order=5,
     confusable_with=(

@@ -12,7 +12,7 @@ from math import inf
 from fish_env.model.corners import MEMORY, handed_on, starting
 from fish_env.model.effect import Effect, EffectParameter
 from fish_env.model.jit import kernel
-from fish_env.model.servo import chase
+from fish_env.model.servo import chase, chase_in_part, met_or_left
 from fish_env.model.tail import SETTLING_TIME
 
 
@@ -23,13 +23,36 @@ def limit_rate(tail, inputs, phase, time, fish, e, states, memory, since):
     on = e.rate < inf
     limit = e.rate if on else 1.0
     limited, gained = chase(tail, limit, settled_rate, since, memory)
-    return handed_on(on, tail, limited, gained, since)
+    return handed_on(on, tail, limited, gained, since, memory[5])
+
+
+@kernel
+def move_in_part(tail, inputs, phase, time, fish, e, states, memory, since):
+    """The same until the rate jumps."""
+    (settled_rate,) = states
+    on = e.rate < inf
+    limit = e.rate if on else 1.0
+    limited = chase_in_part(tail, limit, limit, settled_rate, since, memory)
+    return handed_on(on, tail, limited, 0.0, since, memory[5])
+
+
+@kernel
+def turns(e):
+    """Whether it is on."""
+    return e.rate < inf
+
+
+@kernel
+def corner(tail, phase, later, later_phase, e, memory, length):
+    """When the tail meets its command, or the command becomes too fast."""
+    return met_or_left(tail, later, e.rate if e.rate < inf else 1.0, memory, length)
 
 
 @kernel
 def start_at_command(inputs, tail, fish, e):
     """The run starts with the tail at its command, at the commanded rate within the limit."""
-    return min(max(tail.rate, -e.rate), e.rate), *starting(tail.angle, tail)
+    side = 1.0 if tail.rate > e.rate else (-1.0 if tail.rate < -e.rate else 0.0)
+    return min(max(tail.rate, -e.rate), e.rate), *starting(tail.angle, tail, side)
 
 
 def fastest(values):
@@ -50,6 +73,9 @@ EFFECT = Effect(
     states={"tail": ("settled_rate",)},
     memory={"tail": MEMORY},
     initial_states=start_at_command,
+    turns=turns,
+    corner=corner,
+    part=move_in_part,
     time_scale=fastest,
     order=4,
     step_error=0.002,

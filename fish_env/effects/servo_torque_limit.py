@@ -15,7 +15,14 @@ from math import inf
 from fish_env.model.corners import MEMORY, handed_on, starting
 from fish_env.model.effect import Effect, EffectParameter
 from fish_env.model.jit import kernel
-from fish_env.model.servo import ROUNDING, chase, hinge_flow, hinge_moment
+from fish_env.model.servo import (
+    ROUNDING,
+    chase,
+    chase_in_part,
+    hinge_flow,
+    hinge_moment,
+    met_or_left,
+)
 from fish_env.model.tail import SETTLING_TIME
 
 
@@ -48,29 +55,73 @@ def speed_under_load(side, across, along, fish, e):
 
 
 @kernel
-def turn_against_water(tail, inputs, phase, time, fish, motion, e, states, memory, since):
-    """The tail moves towards its command at the mean speed that its load left in this step."""
-    (settled_rate,) = states
-    angle, told, told_rate, gained, step, before = memory
-    on = e.torque < inf
-    reach = before * since
+def speed_now(tail, motion, angle, reach, fish, e):
+    """Speed at which the servo turns from an angle (rad) towards its command, by ``reach`` at most.
+
+    Returns:
+        The speed (rad/s).
+    """
     gap = tail.angle - angle
     here = angle + min(max(gap, -reach), reach)
     left = tail.angle - here
     side = 1.0 if (left if abs(left) > ROUNDING else tail.rate) > 0.0 else -1.0
     across, along = hinge_flow(motion, here, fish)
-    now = speed_under_load(side, across, along, fish, e)
-    kept = (angle, told, told_rate, gained, step)
+    return speed_under_load(side, across, along, fish, e)
+
+
+@kernel
+def turn_against_water(tail, inputs, phase, time, fish, motion, e, states, memory, since):
+    """The tail moves towards its command at the mean speed that its load left in this step."""
+    (settled_rate,) = states
+    angle, told, told_rate, gained, step, side, before = memory
+    on = e.torque < inf
+    now = speed_now(tail, motion, angle, before * since, fish, e)
+    kept = (angle, told, told_rate, gained, step, side)
     limited, more = chase(tail, 0.5 * (before + now), settled_rate, since, kept)
-    seen, slopes, kept = handed_on(on, tail, limited, more, since)
-    return seen, slopes, (kept[0], kept[1], kept[2], kept[3], kept[4], now if on else e.speed)
+    seen, slopes, kept = handed_on(on, tail, limited, more, since, side)
+    return seen, slopes, with_speed(kept, now if on else e.speed)
+
+
+@kernel
+def with_speed(kept, speed):
+    """What is remembered, with the speed (rad/s)."""
+    return kept[0], kept[1], kept[2], kept[3], kept[4], kept[5], speed
+
+
+@kernel
+def move_in_part(tail, inputs, phase, time, fish, motion, e, states, memory, since):
+    """The same until the rate jumps."""
+    (settled_rate,) = states
+    angle, told, told_rate, gained, step, side, before = memory
+    on = e.torque < inf
+    now = speed_now(tail, motion, angle, before * since, fish, e)
+    kept = (angle, told, told_rate, gained, step, side)
+    limited = chase_in_part(tail, 0.5 * (before + now), now, settled_rate, since, kept)
+    seen, slopes, kept = handed_on(on, tail, limited, 0.0, since, side)
+    return seen, slopes, with_speed(kept, now if on else e.speed)
+
+
+@kernel
+def turns(e):
+    """Whether it is on."""
+    return e.torque < inf
+
+
+@kernel
+def corner(tail, phase, later, later_phase, e, memory, length):
+    """When the tail meets its command, or the command becomes too fast for its load."""
+    angle, told, told_rate, gained, step, side, before = memory
+    kept = (angle, told, told_rate, gained, step, side)
+    when, kept = met_or_left(tail, later, before, kept, length)
+    return when, with_speed(kept, before)
 
 
 @kernel
 def start_at_command(inputs, tail, fish, e):
     """The run starts with the tail at its command, at no more than the speed without load."""
     rate = min(max(tail.rate, -e.speed), e.speed) if e.torque < inf else tail.rate
-    return rate, *starting(tail.angle, tail), e.speed
+    side = 1.0 if tail.rate > e.speed else (-1.0 if tail.rate < -e.speed else 0.0)
+    return rate, *starting(tail.angle, tail, side), e.speed
 
 
 def speed_alone(values):
@@ -103,6 +154,9 @@ EFFECT = Effect(
     states={"tail": ("settled_rate",)},
     memory={"tail": (*MEMORY, "speed")},
     initial_states=start_at_command,
+    turns=turns,
+    corner=corner,
+    part=move_in_part,
     loaded=True,
     time_scale=fastest,
     order=4,

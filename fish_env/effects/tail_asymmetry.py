@@ -8,6 +8,8 @@ inertia of the water, contains the whole jump as a wider pulse.
 
 from __future__ import annotations
 
+import math
+
 from fish_env.model.corners import UNTOLD_STEP
 from fish_env.model.effect import Effect, EffectParameter
 from fish_env.model.jit import kernel
@@ -16,6 +18,10 @@ from fish_env.model.tail import TWO_PI
 from fish_env.model.trigonometry import sincos
 
 PULSE_AREA = 0.6169605345437128  # integral of cos^16 over half a turn, pi C(16, 8) / 2^16
+
+
+SAME = 1e-4 / math.pi
+"""Half turns. A phase this close below a multiple of pi has reached it."""
 
 
 @kernel
@@ -27,39 +33,79 @@ def swing_at(amplitude, amplitude_rate, frequency, frequency_rate, phase, ahead)
 
 
 @kernel
-def stretch_half_strokes(tail, inputs, phase, time, fish, e, memory, since):
-    """Adds ratio A1 |sin(phi_t)| to the angle, and its derivatives."""
-    (step,) = memory
-    sine, cosine = sincos(phase)
+def stretched(tail, inputs, sine, cosine, side, e):
+    """The tail with ratio A1 side sin(phi_t) added, and its derivatives; side is that of the sine.
+
+    The acceleration, which is even in the side, holds the jump as a pulse.
+    """
     amplitude, amplitude_rate = inputs.tail_amplitude, inputs.tail_amplitude_rate
     frequency, frequency_rate = inputs.tail_frequency, inputs.tail_frequency_rate
     omega = TWO_PI * frequency
-    side = 1.0 if sine > 0.0 else -1.0
     swing = omega * amplitude
-    smooth = side * (swing * cosine + amplitude_rate * sine)
-    motion = (amplitude, amplitude_rate, frequency, frequency_rate)
-    early = swing_at(*motion, phase, -0.5 * step)
-    late = swing_at(*motion, phase, 0.5 * step)
-    jump = (abs(late) - abs(early)) - side * (late - early)  # zero away from the jump
-    rate = smooth + jump / step
+    rate = side * (swing * cosine + amplitude_rate * sine)
     pulse = cosine * cosine
     pulse = pulse * pulse
     pulse = pulse * pulse
     pulse = pulse * pulse
     bend = (2.0 / PULSE_AREA) * pulse - abs(sine)
     slewing = 2.0 * omega * amplitude_rate + TWO_PI * frequency_rate * amplitude
-    seen = Tail(
-        tail.angle + e.ratio * (amplitude * abs(sine)),
+    return Tail(
+        tail.angle + e.ratio * (amplitude * (side * sine)),
         tail.rate + e.ratio * rate,
         tail.acceleration + e.ratio * (omega * swing * bend + side * (slewing * cosine)),
     )
-    return seen, (since if since > 0.0 else step,)
+
+
+@kernel
+def stretch_half_strokes(tail, inputs, phase, time, fish, e, memory, since):
+    """Adds ratio A1 |sin(phi_t)| to the angle, and its derivatives."""
+    step, half_stroke = memory
+    sine, cosine = sincos(phase)
+    side = 1.0 if sine > 0.0 else -1.0
+    motion = (
+        inputs.tail_amplitude,
+        inputs.tail_amplitude_rate,
+        inputs.tail_frequency,
+        inputs.tail_frequency_rate,
+    )
+    early = swing_at(*motion, phase, -0.5 * step)
+    late = swing_at(*motion, phase, 0.5 * step)
+    jump = (abs(late) - abs(early)) - side * (late - early)  # zero away from the jump
+    smooth = stretched(tail, inputs, sine, cosine, side, e)
+    seen = Tail(smooth.angle, smooth.rate + e.ratio * (jump / step), smooth.acceleration)
+    return seen, (since if since > 0.0 else step, half_stroke)
+
+
+@kernel
+def move_in_part(tail, inputs, phase, time, fish, e, memory, since):
+    """The same until the stroke changes sign."""
+    step, side = memory
+    sine, cosine = sincos(phase)
+    return stretched(tail, inputs, sine, cosine, side, e), (step, side)
+
+
+@kernel
+def turns(e):
+    """Whether it is on."""
+    return e.ratio != 0.0
+
+
+@kernel
+def corner(tail, phase, later, later_phase, e, memory, length):
+    """When the stroke changes its sign; it is positive until then (1) or negative (-1)."""
+    half_turns = math.floor(phase / math.pi + SAME)
+    side = 1.0 if half_turns - 2.0 * math.floor(0.5 * half_turns) == 0.0 else -1.0
+    turned = later_phase - phase
+    left = (half_turns + 1.0) * math.pi - phase
+    share = left / (turned if turned > 0.0 else 1.0)
+    return length * share if turned > left else math.inf, (length, side)
 
 
 @kernel
 def start_anywhere(inputs, tail, fish, e):
-    """The length of the step before a run is unknown."""
-    return (UNTOLD_STEP,)
+    """The length of the step before a run is unknown; the tail is on one side, or goes there."""
+    stroke = tail.angle - inputs.tail_offset
+    return UNTOLD_STEP, 1.0 if (stroke if stroke != 0.0 else tail.rate) > 0.0 else -1.0
 
 
 EFFECT = Effect(
@@ -74,8 +120,11 @@ EFFECT = Effect(
         ),
     ),
     hooks={"tail": stretch_half_strokes},
-    memory={"tail": ("step",)},
+    memory={"tail": ("step", "side")},
     initial_states=start_anywhere,
+    turns=turns,
+    corner=corner,
+    part=move_in_part,
     order=1,
     confusable_with=(
         "com_offset",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import inf, sqrt
 
+from fish_env.model.corners import followed
 from fish_env.model.effect import Effect, EffectParameter
 from fish_env.model.jit import kernel
 from fish_env.model.records import Tail
@@ -23,6 +24,25 @@ def bend(tail, inputs, phase, time, fish, e, states):
         acceleration if on else tail.acceleration,
     )
     return seen, (rate if on else 0.0, acceleration if on else 0.0)
+
+
+@kernel
+def turns(e):
+    """Whether it is on."""
+    return e.natural_frequency < inf
+
+
+@kernel
+def settling(tail, e, states):
+    """A jump of the command makes the tail swing for a few periods, or creep."""
+    angle, rate = states
+    on = e.natural_frequency < inf
+    omega = TWO_PI * (e.natural_frequency if on else 1.0)
+    zeta = max(e.damping_ratio, 1.0)
+    fastest = 1.0 / (omega * (zeta + sqrt(zeta * zeta - 1.0)))
+    behind = tail.angle - angle - 2.0 * e.damping_ratio * tail.rate / omega
+    excess = abs(rate - tail.rate) + omega * abs(behind - tail.acceleration / (omega * omega))
+    return followed(fastest, excess) if on else inf
 
 
 @kernel
@@ -64,6 +84,8 @@ EFFECT = Effect(
     hooks={"tail": bend},
     states={"tail": ("angle", "rate")},
     initial_states=start_unbent,
+    turns=turns,
+    settling=settling,
     time_scale=fastest,
     order=7,
     confusable_with=(

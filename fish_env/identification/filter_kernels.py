@@ -24,7 +24,8 @@ def filter_kernels(model: ExtendedModel) -> Kernels:
     """Compiled filter for a model whose last effect is the applied wrench."""
     composition = model.kernels.composition
     assert composition.effects[-1].name == APPLIED_WRENCH.name
-    return _loaded(replace(composition, templates=(*composition.templates, *TEMPLATES)))
+    templates = (*composition.templates, *TEMPLATES)
+    return _loaded(replace(composition, templates=templates, common_steps=True))
 
 
 def replay_kernels() -> Kernels:

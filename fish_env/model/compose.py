@@ -18,7 +18,8 @@ from fish_env.files import write_text
 from fish_env.model import jit
 from fish_env.model.composition import Composition
 from fish_env.model.effect import STAGES, Effect
-from fish_env.model.emit import HEADER, Emitter
+from fish_env.model.emit import HEADER
+from fish_env.model.emit_corners import CornerEmitter
 from fish_env.model.kernel_cache import cache_root
 
 _BEGIN = "# --- completed by compose ---"
@@ -36,7 +37,7 @@ def source(composition: Composition) -> str:
     texts = [path.read_text(encoding="utf-8") for path in composition.templates]
     bodies = [text[text.index(_END) :] for text in texts]
     imports = [_kept_imports(text) for text in texts]
-    return "\n".join([HEADER, *imports, Emitter(composition).text(), *bodies])
+    return "\n".join([HEADER, *imports, CornerEmitter(composition).text(), *bodies])
 
 
 def cache_folder(composition: Composition) -> Path:
@@ -49,7 +50,10 @@ def cache_folder(composition: Composition) -> Path:
         jit.fingerprint(hook)
         for effect in composition.effects
         if effect.file is None
-        for hook in (*effect.hooks.values(), effect.initial_states)
+        for hook in (
+            *effect.hooks.values(), effect.initial_states, effect.turns, effect.corner,
+            effect.settling, effect.part,
+        )  # fmt: skip
     ]
     return cache_root() / jit.source_hash(files, codes)
 
@@ -109,5 +113,12 @@ def _inject(module: ModuleType, effect: Effect) -> None:
     for stage in STAGES:
         if stage in effect.hooks:
             setattr(module, f"{effect.name}_{stage}", effect.hooks[stage])
-    if effect.initial_states is not None:
-        setattr(module, f"{effect.name}_initial", effect.initial_states)
+    for ending, kernel in (
+        ("initial", effect.initial_states),
+        ("turns", effect.turns),
+        ("corner", effect.corner),
+        ("settling", effect.settling),
+        ("part", effect.part),
+    ):
+        if kernel is not None:
+            setattr(module, f"{effect.name}_{ending}", kernel)

@@ -34,11 +34,14 @@ class Composition:
         effects: effects in the order their hooks run.
         tables: coefficient curves may come from tables (slower: a search for each).
         templates: source files with the entry points; each may use what precedes it.
+        common_steps: every lane takes the same steps, however the rate of its tail jumps; else a
+            rollout parts the steps of each lane where it jumps.
     """
 
     effects: tuple[Effect, ...] = ()
     tables: bool = False
     templates: tuple[Path, ...] = (TEMPLATE,)
+    common_steps: bool = False
 
     @property
     def state_names(self) -> tuple[str, ...]:
@@ -61,6 +64,13 @@ class Composition:
     def tail_rates(self) -> list[bool]:
         """Whether those rows are rates of the tail (rad/s), as their names end, or angles (rad)."""
         return [self.state_names[row].endswith("rate") for row in self.tail_rows]
+
+    @property
+    def corners(self) -> tuple[Effect, ...]:
+        """Effects for which a rollout parts its steps."""
+        if self.common_steps:
+            return ()
+        return tuple(e for e in self.effects if e.turns is not None or e.command_delay)
 
     @property
     def delays(self) -> tuple[str, ...]:
@@ -86,4 +96,5 @@ class Composition:
             "|tables" if self.tables else ""
         )
         kind = "baseline" if not self.effects else f"effects{len(self.effects)}"
+        names += "|common" if self.common_steps else ""
         return f"{kind}_{hashlib.sha256(names.encode()).hexdigest()[:8]}"

@@ -1,13 +1,28 @@
-"""A tail whose rate jumps within a step: what the water sees of it still adds up."""
+"""A tail whose rate jumps within a step: what the water sees of it still adds up.
+
+There are two ways. A rollout parts its steps where the rate jumps: ``Effect.corner`` says when, and
+``Effect.part`` moves the tail until then. Where steps are the same for all lanes, as in a filter,
+the hook of the tail hands on the mean of the rate over one step.
+"""
 
 from __future__ import annotations
+
+import math
 
 from fish_env.model.jit import kernel
 from fish_env.model.records import Tail
 
-MEMORY = ("angle", "told", "told_rate", "gained", "step")
+MEMORY = ("angle", "told", "told_rate", "gained", "step", "side")
 """What is kept from step to step: where tail and command were (rad), how fast the command was
-(rad/s), what the tail gained on it in the second half of the step (rad), its length (s)."""
+(rad/s), what the tail gained on it in the second half of the step (rad), its length (s), and which
+way the tail moves in a part of a step without jumps."""
+TOUCH = 2e-5
+"""rad. An angle this close to another one has met it."""
+NEWTON_STEPS = 8
+FOLLOWED = 0.5
+"""Time constants. A step that follows a rate with 1 rad/s left on its way to where it settles."""
+SLOW = 1e-4
+"""rad/s. As good as settled."""
 UNTOLD_STEP = 1e-3
 """s. Taken for the length of the step before a run."""
 SWITCH = 1e-4
@@ -84,7 +99,7 @@ def follow(ahead_of, limit, tail, since, memory):
         How far the tail is ahead at present (rad), its mean rate over one step around the present
         (rad/s), and what it gained in the second half of the step so far (rad).
     """
-    angle, told, told_rate, gained, step = memory
+    angle, told, told_rate, gained, step, _ = memory
     bent = bend(tail, since, told)
     early, late, before = window(tail, since, step, told, told_rate)
     ahead = ahead_of(angle, tail, bent, since, since, limit)
@@ -95,7 +110,49 @@ def follow(ahead_of, limit, tail, since, memory):
 
 
 @kernel
-def handed_on(on, tail, moved, gained, since):
+def cubic(tail, later, length):
+    """Coefficients of the angle (rad) over a part of a step, which goes from 0 to 1.
+
+    Args:
+        tail: when the part begins.
+        later: at its end.
+        length: of the part (s).
+    """
+    first, last = length * tail.rate, length * later.rate
+    gain = later.angle - tail.angle
+    return tail.angle, first, 3.0 * gain - 2.0 * first - last, first + last - 2.0 * gain
+
+
+@kernel
+def rises(a, b, c, d):
+    """Where a + b s + c s^2 + d s^3 rises through zero: s in [0, 1], infinite where it does not.
+
+    By Newton's method from the end, where it is above zero.
+    """
+    s = 1.0
+    for _ in range(NEWTON_STEPS):
+        value = a + s * (b + s * (c + s * d))
+        slope = b + s * (2.0 * c + s * 3.0 * d)
+        s = min(max(s - value / (slope if slope != 0.0 else 1.0), 0.0), 1.0)
+    return s if a + b + c + d > 0.0 else math.inf
+
+
+@kernel
+def followed(time_constant, excess):
+    """Longest step that follows a rate (rad/s) on its way to where it settles (s).
+
+    What a Runge-Kutta step gets wrong goes with its length to the fifth, and forces go with the
+    square of the rate. For equal errors in equal times the length goes with excess^(-1/2).
+
+    Args:
+        time_constant: of the way (s).
+        excess: what is left of it (rad/s).
+    """
+    return FOLLOWED * time_constant / math.sqrt(max(excess, SLOW))
+
+
+@kernel
+def handed_on(on, tail, moved, gained, since, side):
     """What a tail hook returns: the moved tail where the effect is on, else the command's."""
     seen = Tail(
         moved.angle if on else tail.angle,
@@ -105,11 +162,11 @@ def handed_on(on, tail, moved, gained, since):
     return (
         seen,
         (moved.acceleration if on else 0.0,),
-        (seen.angle, tail.angle, tail.rate, gained if on else 0.0, since),
+        (seen.angle, tail.angle, tail.rate, gained if on else 0.0, since, side),
     )
 
 
 @kernel
-def starting(angle, tail):
+def starting(angle, tail, side):
     """What is remembered at the start of a run, with the tail at an angle (rad)."""
-    return angle, tail.angle, tail.rate, 0.0, UNTOLD_STEP
+    return angle, tail.angle, tail.rate, 0.0, UNTOLD_STEP, side

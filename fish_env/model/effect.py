@@ -97,6 +97,14 @@ class Effect(Switched):
         memory: stage -> names of the numbers kept from step to step (``inputs`` or ``tail``).
         initial_states: (inputs, tail, fish, e) -> tuple of states, then memory, at the start of a
             run; inputs and tail as the hooks before this one leave them.
+        turns: (e) -> whether steps may have to be parted, for ``corner`` and ``settling``.
+        corner: (tail, phase, later, later_phase, e, memory, length) -> (when, memory): the tail and
+            its phase as the hook gets them when a part of a step begins, and at its end, length (s)
+            later -> when in it (s) the rate jumps first, infinite where it does not, and the memory
+            with which the hook moves the tail until then.
+        part: hook of the tail for parts of a step without jumps; default: that in ``hooks``.
+        settling: (tail, e, states) -> longest part of a step (s) that follows its states, for a
+            tail whose states are its angle, or angle and rate.
         command_delay: name of the parameter (s) by which the tail's command is late.
         loaded: whether the hook of the tail takes the motion through the water too.
         order: place among the effects of its section, low ones first.
@@ -131,6 +139,10 @@ class Effect(Switched):
     states: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     memory: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     initial_states: Callable[..., Any] | None = None
+    turns: Callable[..., Any] | None = None
+    corner: Callable[..., Any] | None = None
+    part: Callable[..., Any] | None = None
+    settling: Callable[..., Any] | None = None
     command_delay: str | None = None
     loaded: bool = False
     order: int = 0
@@ -172,6 +184,12 @@ class Effect(Switched):
             raise EffectError(f"effect {self.name}: give initial_states for its states and memory")
         if self.loaded and "tail" not in self.hooks:
             raise EffectError(f"effect {self.name}: a loaded drive has a hook for the tail")
+        if (self.corner or self.part) and "tail" not in self.memory:
+            raise EffectError(f"effect {self.name}: corner and part are for a tail with memory")
+        if self.settling is not None and "tail" not in self.states:
+            raise EffectError(f"effect {self.name}: settling is for a tail with states")
+        if (self.turns is None) != (self.corner is None and self.settling is None):
+            raise EffectError(f"effect {self.name}: turns goes with corner or settling")
         if self.command_delay not in (None, *self.neutral):
             raise EffectError(f"effect {self.name}: no parameter '{self.command_delay}'")
 

@@ -39,7 +39,8 @@ from fish_env.model.coefficients import (
 )
 from fish_env.model.frames import quaternion_rate, rotation, to_body, to_inertial
 from fish_env.model.history import (
-    HEARD, RECORD, assume_running, late_command, recall, remember, running_command,
+    HEARD, RECORD, assume_running, late_command, recall, recall_at, remember, running_command,
+    told_anew,
 )
 from fish_env.model.hydrostatics import buoyancy_force, gravity_wrench
 from fish_env.model.jit import entry_point, kernel, lean_entry_point
@@ -76,6 +77,7 @@ class Emitter:
             f"LATE_TAIL = {bool(self.composition.delays)}\n"
             f"TAIL_ROWS = np.array({self.composition.tail_rows}, np.int64)\n"
             f"TAIL_RATES = np.array({self.composition.tail_rates}, np.bool_)\n"
+            f"CORNERS = {bool(self.composition.corners)}\n"
         )
         parts = (self.derivative, self.terms, self.initialise, self.command, self.memory)
         return "\n".join([sizes, *(part() for part in parts)])
@@ -152,10 +154,10 @@ class Emitter:
                 lines.append(f"work[(X + {row}) * width + k] = m_{effect.name}_{i}")
         return self.function("lane_remember", "k, width, elapsed, h, work", lines)
 
-    def recalled(self) -> str:
+    def recalled(self, rows: str = "PAST", inputs: str = "inputs, phase") -> str:
         """Inputs and phase that reach the tail in a rollout."""
-        past = ", ".join(f"work[(PAST + {i}) * width + k]" for i in range(len(HEARD)))
-        return f"late_command(late, inputs, phase, {past})"
+        past = ", ".join(f"work[({rows} + {i}) * width + k]" for i in range(len(HEARD)))
+        return f"late_command(late, {inputs}, {past})"
 
     def delay(self) -> str:
         """How late the tail's command is (s)."""
@@ -177,16 +179,11 @@ class Emitter:
         """Read parameters, state and inputs of a lane."""
         count = len(RECORD_FIELDS)
         fields = ", ".join(f"work[(PAR + {i}) * width + k]" for i in range(count))
-        lines = [f"fish = Fish({fields})"]
-        row = count
-        for effect in self.effects:
-            rows = range(row, row + len(effect.parameters))
-            values = ", ".join(f"work[(PAR + {i}) * width + k]" for i in rows)
-            lines.append(f"e_{effect.name} = {effect.name}_record({values})")
-            row += len(effect.parameters)
+        lines = [f"fish = Fish({fields})", *self.records()]
         state = [f"work[(X + {i}) * width + k]" for i in range(14)]
         lines += [
             "time = work[TIME * width + k] + elapsed + shift",
+            f"since = shift{' - work[BEGUN * width + k]' if self.composition.corners else ''}",
             f"place = Vector({', '.join(state[:3])})",
             *self.other_water(),
             f"attitude = rotation({', '.join(state[3:7])})",
@@ -199,6 +196,16 @@ class Emitter:
             lines.append(f"u{i} = work[(U + {i}) * width + k] + shift * u{i}_rate")
         rates = ", ".join(f"u{i}_rate" for i in range(5))
         lines.append(f"inputs = Inputs(u0, u1, u2, u3, u4, {rates})")
+        return lines
+
+    def records(self) -> list[str]:
+        """Read the parameters of effects of a lane."""
+        lines, row = [], len(RECORD_FIELDS)
+        for effect in self.effects:
+            rows = range(row, row + len(effect.parameters))
+            values = ", ".join(f"work[(PAR + {i}) * width + k]" for i in rows)
+            lines.append(f"e_{effect.name} = {effect.name}_record({values})")
+            row += len(effect.parameters)
         return lines
 
     def other_water(self) -> list[str]:
@@ -232,9 +239,10 @@ class Emitter:
             given.append(f"({''.join(rows[:count])})")
             targets.append(self.names("d", effect, effect.state_names))
         if stage in effect.memory:
-            given.append(f"({''.join(rows[count:])}), shift")
+            given.append(f"({''.join(rows[count:])}), since")
             targets.append(self.names("m", effect, effect.memory_names))
-        return f"{', '.join(targets)} = {effect.name}_{stage}({', '.join(given)})"
+        parted = stage == "tail" and effect.part is not None and self.composition.corners
+        return f"{', '.join(targets)} = {effect.name}_{'part' if parted else stage}({', '.join(given)})"
 
     def names(self, letter: str, effect: Effect, values: Sequence[str]) -> str:
         """A tuple of variables of an effect."""

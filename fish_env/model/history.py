@@ -36,6 +36,7 @@ RECORD = len(TOLD)
 
 _TWO_PI = 6.283185307179586
 _ROUNDING = 1e-9  # s; times closer than this are one
+_SAME = 1e-9  # SI units; what is told differs by more where it changes
 
 
 @kernel
@@ -58,30 +59,77 @@ def recall(work, width, told, past, start, shift, h, history, first, count):
     Where that is the very moment at which a command changed, the beginning of a step sees the
     new command and its end the old one, as for commands that act at once.
     """
-    slots = (history.shape[0] - 1) // RECORD
     edge = _ROUNDING if shift == 0.0 else -_ROUNDING
     for k in range(width):
         lane = first + (k if k < count else count - 1)
         late = work[(told + RECORD - 1) * width + k]
         time = work[start * width + k] + shift - late
-        newest = int(history[0, lane]) - 1
-        oldest = max(0, newest + 1 - slots)
-        step = max(oldest, newest - int(min(late / h, float(slots))))
-        while (step > oldest) & (history[1 + RECORD * (step & (slots - 1)), lane] > time + edge):
-            step -= 1
-        while (
-            step < newest and history[1 + RECORD * ((step + 1) & (slots - 1)), lane] <= time + edge
-        ):
-            step += 1
+        recall_at(work, width, k, past, time, edge, late / h, history, lane)
+
+
+@kernel
+def recall_at(work, width, k, past, time, edge, ago, history, lane):
+    """Set the ``past`` rows of one lane to what its fish was told at a time, some steps ago."""
+    slots = (history.shape[0] - 1) // RECORD
+    step = told_in(time + edge, ago, history, lane)
+    row = 1 + RECORD * (step & (slots - 1))
+    since = time - history[row, lane]
+    moving = 0.0 if since < -_ROUNDING else 1.0
+    for i in range(3):
+        rate = moving * history[row + 4 + i, lane]
+        work[(past + i) * width + k] = history[row + 1 + i, lane] + since * rate
+        work[(past + 3 + i) * width + k] = rate
+    mean = 0.5 * (history[row + 3, lane] + work[(past + 2) * width + k])
+    work[(past + 6) * width + k] = history[row + 7, lane] + _TWO_PI * mean * since
+
+
+@kernel
+def told_in(time, ago, history, lane):
+    """The step in which a fish was told what it was at a time, the first kept at the earliest."""
+    slots = (history.shape[0] - 1) // RECORD
+    newest = int(history[0, lane]) - 1
+    oldest = max(0, newest + 1 - slots)
+    step = max(oldest, newest - int(min(ago, float(slots))))
+    while (step > oldest) & (history[1 + RECORD * (step & (slots - 1)), lane] > time):
+        step -= 1
+    while step < newest and history[1 + RECORD * ((step + 1) & (slots - 1)), lane] <= time:
+        step += 1
+    return step
+
+
+@kernel
+def told_anew(time, length, ago, history, lane):
+    """How long after a time a fish was told something else, or to move at another rate (s).
+
+    Args:
+        time: when (s).
+        length: how far to look (s).
+        ago: about how many steps ago that was.
+        history: see above.
+        lane: which fish.
+
+    Returns:
+        The time from then; infinite where there is none within the length.
+    """
+    slots = (history.shape[0] - 1) // RECORD
+    newest = int(history[0, lane]) - 1
+    step = told_in(time + _ROUNDING, ago, history, lane)
+    found = np.inf
+    while (found == np.inf) & (step < newest):
         row = 1 + RECORD * (step & (slots - 1))
-        since = time - history[row, lane]
-        moving = 0.0 if since < -_ROUNDING else 1.0
+        after = 1 + RECORD * ((step + 1) & (slots - 1))
+        begin = history[after, lane]
+        if begin >= time + length - _ROUNDING:
+            break
+        lasted = begin - history[row, lane]
         for i in range(3):
-            rate = moving * history[row + 4 + i, lane]
-            work[(past + i) * width + k] = history[row + 1 + i, lane] + since * rate
-            work[(past + 3 + i) * width + k] = rate
-        mean = 0.5 * (history[row + 3, lane] + work[(past + 2) * width + k])
-        work[(past + 6) * width + k] = history[row + 7, lane] + _TWO_PI * mean * since
+            rate = history[row + 4 + i, lane]
+            jump = history[after + 1 + i, lane] - (history[row + 1 + i, lane] + lasted * rate)
+            kink = history[after + 4 + i, lane] - rate
+            if (abs(jump) > _SAME) | (abs(kink) > _SAME):
+                found = begin - time
+        step += 1
+    return found
 
 
 @kernel

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from fish_env.model.corners import angle_at, follow
+from fish_env.model.corners import TOUCH, angle_at, cubic, follow, rises
 from fish_env.model.jit import kernel
 from fish_env.model.records import Tail
 from fish_env.model.tail import spread_jumps, tail_arm, tail_velocity
@@ -61,6 +61,63 @@ def chase(tail, limit, settled_rate, since, memory):
         settled_rate,
     )
     return limited, gained
+
+
+@kernel
+def chase_in_part(tail, limit, now, settled_rate, since, memory):
+    """As :func:`chase`, in a part of a step in which the rate does not jump.
+
+    Args:
+        tail: the command at present.
+        limit: largest rate, its mean in this part (rad/s).
+        now: the same at present.
+        settled_rate: state of :func:`spread_jumps`.
+        since: time from the start of the part (s).
+        memory: see :data:`fish_env.model.corners.MEMORY`; ``side`` is 0 where the tail moves with
+            its command, 1 and -1 where it moves at its limit.
+
+    Returns:
+        The tail.
+    """
+    side = memory[5]
+    behind = side != 0.0
+    moved = Tail(
+        memory[0] + side * limit * since if behind else tail.angle,
+        side * now if behind else min(max(tail.rate, -now), now),
+        0.0 if behind else tail.acceleration,
+    )
+    spread, _ = spread_jumps(moved, settled_rate)
+    return spread
+
+
+@kernel
+def met_or_left(tail, later, limit, memory, length):
+    """When a tail of limited rate meets its command, or the command leaves it behind.
+
+    Args:
+        tail: the command when a part of a step begins.
+        later: the command at its end.
+        limit: largest rate (rad/s).
+        memory: see :data:`fish_env.model.corners.MEMORY`.
+        length: of the part (s).
+
+    Returns:
+        The time from the start of the part (s), infinite where neither happens, and the memory for
+        the time until then.
+    """
+    gap = tail.angle - memory[0]
+    touching, reach = abs(gap) <= TOUCH, limit * length
+    ahead = tail.rate if touching else gap
+    way = 1.0 if ahead > 0.0 else -1.0
+    side = 0.0 if touching & (abs(tail.rate) <= limit) else way
+    angle, b, c, d = cubic(tail, later, length)
+    met = rises(-way * gap, reach - way * b, -way * c, -way * d)
+    left = min(
+        rises(b - reach, 2.0 * c, 3.0 * d, 0.0), rises(-b - reach, -2.0 * c, -3.0 * d, 0.0)
+    )
+    begun = memory[0] if side != 0.0 else angle
+    when = length * (met if side != 0.0 else left)
+    return when, (begun, tail.angle, tail.rate, 0.0, length, side)
 
 
 @kernel

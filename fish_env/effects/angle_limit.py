@@ -53,10 +53,9 @@ def corner(tail, phase, later, later_phase, e, memory, length):
     above = (a > e.upper + TOUCH) | ((a >= e.upper - TOUCH) & (b > 0.0))
     below = (a < e.lower - TOUCH) | ((a <= e.lower + TOUCH) & (b < 0.0))
     side = 1.0 if above else (-1.0 if below else 0.0)
-    stop = e.upper if above else e.lower
-    met = min(rises(a - e.upper, b, c, d), rises(e.lower - a, -b, -c, -d))
-    left = rises(side * (stop - a), -side * b, -side * c, -side * d)
-    return length * (left if side != 0.0 else met), (length, side)
+    up = above | ((not below) & (later.angle > e.upper))
+    way, stop = 1.0 if up == (side == 0.0) else -1.0, e.upper if up else e.lower
+    return length * rises(way * (a - stop), way * b, way * c, way * d), (length, side)
 
 
 @kernel

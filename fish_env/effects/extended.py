@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fish_env.arrays import FloatArray
+from fish_env.effects.kinds import together_with
 from fish_env.effects.registry import catalogue, get_effect, load_effect_file
 from fish_env.errors import EffectError, ParameterError, ScheduleError
 from fish_env.model.composition import Composition
@@ -33,9 +34,9 @@ class ExtendedModel:
     Attributes:
         fish: the parameters.
         effects: complete parameter values of the effects that are on, by name.
-        declared: the effects the kernel contains, in the order their hooks run. None for a fish
-            without effects: then the lean kernel runs it. Loaded drives, which are slow, as a rule
-            only where they are on.
+        declared: the effects the kernel contains, in the order their hooks run: those of the
+            smallest kind that has all that are on (see :mod:`fish_env.effects.kinds`). None for a
+            fish without effects: then the lean kernel runs it.
         measurement: effects that act on what is recorded, not on the motion, in catalogue order.
     """
 
@@ -161,6 +162,7 @@ def build_model(
     effects: EffectValues | None = None,
     user_effects: Iterable[Effect] = (),
     whole_catalogue: bool = False,
+    may_come_on: Collection[str] = (),
 ) -> ExtendedModel:
     """Combine a fish, the effects in its file, and further ones.
 
@@ -171,6 +173,8 @@ def build_model(
             as ``<name>.py`` beside that file, which is run only if ``fish.trust_effects``.
         whole_catalogue: use the kernel with every effect even if all are off, so that parameters
             of any effect can be changed later without another kernel.
+        may_come_on: names of effects whose parameters will be changed later; the kernel has them,
+            and those that are named in ``effects``.
 
     Raises:
         EffectError: an unknown effect or parameter, a value out of bounds, or an effect file that
@@ -191,15 +195,15 @@ def build_model(
     complete = {name: found[name].complete(values) for name, values in wanted.items()}
     on = {name: v for name, v in complete.items() if v != found[name].neutral}
     everything = (*catalogue().values(), *own.values())
-    acting = tuple(
-        effect
-        for effect in everything
-        if effect.acts_on_motion
-        and (whole_catalogue or effect.name in {*on, *own} or not effect.loaded)
-    )
-    needed = whole_catalogue or any(e.name in on or e.name in own for e in acting)
+    moving = [e for e in everything if e.acts_on_motion]
+    acting: tuple[Effect, ...] = ()
+    if whole_catalogue:
+        acting = tuple(moving)
+    elif any(e.name in {*on, *own, *may_come_on} for e in moving):
+        ours = (e for e in own.values() if e.acts_on_motion)
+        acting = (*together_with({*wanted, *may_come_on}), *ours)
     measured = tuple(e for e in everything if e.name in on and e.acts_on_record)
-    return ExtendedModel(fish, on, acting if needed else (), measured)
+    return ExtendedModel(fish, on, acting, measured)
 
 
 def _beside(fish: FishParams, name: str) -> Effect:

@@ -17,7 +17,7 @@ from pathlib import Path
 from fish_env.errors import EffectError
 from fish_env.model.effect import SECTIONS, Effect
 
-_NOT_EFFECTS = {"registry", "extended"}
+_NOT_EFFECTS = {"registry", "extended", "kinds"}
 
 
 @cache

@@ -110,10 +110,14 @@ def corner(tail, phase, later, later_phase, e, memory, length):
     pulled = (ahead <= TOUCH - half) & (tail.rate < 0.0)
     side = 1.0 if pushed else (-1.0 if pulled else 0.0)
     _, b, c, d = cubic(tail, later, length)
-    up, down = rises(ahead - half, b, c, d), rises(-ahead - half, -b, -c, -d)
-    back = rises(-side * b, -2.0 * side * c, -3.0 * side * d, 0.0)
-    when = length * (back if side != 0.0 else min(up, down))
-    begun = angle if side == 0.0 else tail.angle - side * half
+    moving, way = side != 0.0, 1.0 if later.angle > angle else -1.0
+    when = length * rises(
+        -side * b if moving else way * ahead - half,
+        -2.0 * side * c if moving else way * b,
+        -3.0 * side * d if moving else way * c,
+        0.0 if moving else way * d,
+    )
+    begun = tail.angle - side * half if moving else angle
     return when, (begun, tail.angle, tail.rate, 0.0, length, side)
 
 

@@ -95,8 +95,8 @@ def env_options(
     if cruise_speed is not None:
         settings.tree["goal"]["cruise_speed"] = speed_range("cruise_speed", cruise_speed)
     loaded = as_fish(fish, trust_effects)
-    whole = _names_effects(randomization, loaded)
-    model = build_model(loaded, _water(effects, current, wave), whole_catalogue=whole)
+    drawn = _drawn_effects(randomization, loaded)
+    model = build_model(loaded, _water(effects, current, wave), may_come_on=drawn)
     _check_effects({} if effects is None else effects, model)
     _check_reach(settings, loaded)
     ends = zip(settings.low.tolist(), settings.high.tolist(), strict=True)
@@ -157,12 +157,13 @@ def _water(
     return combined
 
 
-def _names_effects(spec: str | Mapping[str, Any] | None, fish: FishParams) -> bool:
-    """Whether effects that are off now may come on by a draw, so that the kernel needs them."""
+def _drawn_effects(spec: str | Mapping[str, Any] | None, fish: FishParams) -> set[str]:
+    """Names of effects that may come on by a draw, so that the kernel needs them."""
     names: Iterable[Any] = spec if isinstance(spec, Mapping) else ()
     if isinstance(spec, str) and spec == "posterior" and fish.posterior is not None:
         names = fish.posterior.names
-    return any(str(name).startswith(PREFIX) for name in names)
+    drawn = (str(name) for name in names if str(name).startswith(PREFIX))
+    return {name.removeprefix(PREFIX).partition(".")[0] for name in drawn}
 
 
 def _check_effects(wanted: EffectValues, model: ExtendedModel) -> None:

@@ -18,7 +18,7 @@ MEMORY = ("angle", "told", "told_rate", "gained", "step", "side")
 way the tail moves in a part of a step without jumps."""
 TOUCH = 2e-5
 """rad. An angle this close to another one has met it."""
-NEWTON_STEPS = 8
+NEWTON_STEPS = 5
 FOLLOWED = 0.5
 """Time constants. A step that follows a rate with 1 rad/s left on its way to where it settles."""
 SLOW = 1e-4

@@ -111,13 +111,14 @@ def met_or_left(tail, later, limit, memory, length):
     way = 1.0 if ahead > 0.0 else -1.0
     side = 0.0 if touching & (abs(tail.rate) <= limit) else way
     angle, b, c, d = cubic(tail, later, length)
-    met = rises(-way * gap, reach - way * b, -way * c, -way * d)
-    left = min(
-        rises(b - reach, 2.0 * c, 3.0 * d, 0.0), rises(-b - reach, -2.0 * c, -3.0 * d, 0.0)
+    behind, fast = side != 0.0, 1.0 if later.rate > 0.0 else -1.0
+    when = length * rises(
+        -way * gap if behind else fast * b - reach,
+        reach - way * b if behind else 2.0 * fast * c,
+        -way * c if behind else 3.0 * fast * d,
+        -way * d if behind else 0.0,
     )
-    begun = memory[0] if side != 0.0 else angle
-    when = length * (met if side != 0.0 else left)
-    return when, (begun, tail.angle, tail.rate, 0.0, length, side)
+    return when, (memory[0] if behind else angle, tail.angle, tail.rate, 0.0, length, side)
 
 
 @kernel

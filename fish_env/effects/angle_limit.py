@@ -48,7 +48,7 @@ def turns(e):
 
 @kernel
 def corner(tail, phase, later, later_phase, e, memory, length):
-    """When the tail meets a stop or leaves it; the upper one holds it (1), the lower (-1) or none."""
+    """When the tail meets a stop or leaves it: held by the upper (1), the lower (-1), or none."""
     a, b, c, d = cubic(tail, later, length)
     above = (a > e.upper + TOUCH) | ((a >= e.upper - TOUCH) & (b > 0.0))
     below = (a < e.lower - TOUCH) | ((a <= e.lower + TOUCH) & (b < 0.0))

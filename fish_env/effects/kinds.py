@@ -19,14 +19,15 @@ STAGES_OF = {
     "water": {"density", "barycentre", "water", "water_rate", "body_drag"},
 }
 """Groups of effects, by stages of their hooks: each effect belongs to the first that has one. The
-others are forces."""
+others are forces, but for effects that make the tail's rate jump, the group ``corners``."""
 KINDS = (
     {"commands"},
     {"tail"},
+    {"corners"},
     {"water"},
     {"forces"},
     {"inertia"},
-    {"commands", "tail"},
+    {"commands", "tail", "corners"},
     {"water", "forces"},
 )
 """Groups that are computed together, besides all of them: small kinds first."""
@@ -34,7 +35,9 @@ KINDS = (
 
 def group_of(effect: Effect) -> str:
     """The group of an effect on the motion."""
-    hooks = {"tail"} if effect.command_delay else set(effect.hooks)
+    if effect.corner is not None or effect.command_delay:
+        return "corners"
+    hooks = set(effect.hooks)
     return next((name for name, stages in STAGES_OF.items() if stages & hooks), "forces")
 
 
@@ -51,5 +54,6 @@ def together_with(names: Collection[str]) -> tuple[Effect, ...]:
     """
     moving = [e for e in catalogue().values() if e.acts_on_motion]
     wanted = {group_of(e) for e in moving if e.name in names}
-    kind = next((kind for kind in KINDS if wanted <= kind), {group_of(e) for e in moving})
+    every = {group_of(e) for e in moving}
+    kind = next((kind for kind in KINDS if wanted <= kind), every) if wanted else set()
     return tuple(e for e in moving if e.name in names or (group_of(e) in kind and not e.loaded))

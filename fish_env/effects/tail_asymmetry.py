@@ -15,7 +15,7 @@ from fish_env.model.effect import Effect, EffectParameter
 from fish_env.model.jit import kernel
 from fish_env.model.records import Tail
 from fish_env.model.tail import TWO_PI
-from fish_env.model.trigonometry import sincos
+from fish_env.model.trigonometry import rounded, sincos
 
 PULSE_AREA = 0.6169605345437128  # integral of cos^16 over half a turn, pi C(16, 8) / 2^16
 
@@ -93,8 +93,8 @@ def turns(e):
 @kernel
 def corner(tail, phase, later, later_phase, e, memory, length):
     """When the stroke changes its sign; it is positive until then (1) or negative (-1)."""
-    half_turns = math.floor(phase / math.pi + SAME)
-    side = 1.0 if half_turns - 2.0 * math.floor(0.5 * half_turns) == 0.0 else -1.0
+    half_turns = rounded(phase / math.pi + SAME - 0.5)
+    side = 1.0 if half_turns - 2.0 * rounded(0.5 * half_turns - 0.25) == 0.0 else -1.0
     turned = later_phase - phase
     left = (half_turns + 1.0) * math.pi - phase
     share = left / (turned if turned > 0.0 else 1.0)

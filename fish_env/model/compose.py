@@ -9,27 +9,56 @@ from __future__ import annotations
 import importlib.util
 import sys
 import warnings
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from fish_env.errors import OutputError
 from fish_env.files import write_text
 from fish_env.model import jit
 from fish_env.model.composition import Composition
 from fish_env.model.effect import STAGES, Effect
-from fish_env.model.emit import HEADER
 from fish_env.model.emit_corners import CornerEmitter
 from fish_env.model.kernel_cache import cache_root
 
+HEADER = '''"""Composed physics, generated: edit the sources in fish_env/model and effects."""
+import math
+
+import numpy as np
+
+from fish_env.model.body import (
+    damping_moment, impact_moment, plane_flow, plane_xy_velocity, plane_xz_velocity,
+    relative_motion,
+)
+from fish_env.model.coefficients import (
+    analytic_drag, analytic_lift, analytic_moment, table_drag, table_lift, table_moment,
+)
+from fish_env.model.frames import quaternion_rate, rotation, to_body, to_inertial
+from fish_env.model.history import (
+    HEARD, RECORD, assume_running, late_command, recall, recall_at, remember, running_command,
+    told_anew,
+)
+from fish_env.model.hydrostatics import buoyancy_force, gravity_wrench
+from fish_env.model.jit import entry_point, kernel, lean_entry_point
+from fish_env.model.mass_properties import barycentre, rigid_inertia
+from fish_env.model.newton_euler import inertial_wrench, solve_full, solve_rigid
+from fish_env.model.plate import drag_force, lift_force, speed_and_inverse
+from fish_env.model.records import Fish, Inputs, Vector, Wrench
+from fish_env.model.tail import (
+    TWO_PI, commanded_tail, hinge_power, tail_arm, tail_velocity, tail_wrench, wrench_at,
+)
+'''
+_TYPES = "from __future__ import annotations\n"
 _BEGIN = "# --- completed by compose ---"
 _END = "# --- end ---"
 
 
 def _kept_imports(template: str) -> str:
-    """The template's own imports: what stands between ``import numpy`` and the marked part."""
+    """The template's own imports: what stands between the one for types and the marked part."""
     before = template[: template.index(_BEGIN)]
-    return before[before.index("import numpy as np") :]
+    return before.partition(_TYPES)[2]
 
 
 def source(composition: Composition) -> str:
@@ -47,13 +76,10 @@ def cache_folder(composition: Composition) -> Path:
         files += jit.sources_behind(template)
     # An effect made in Python has no file to tell one version from the next: its code does.
     codes = [
-        jit.fingerprint(hook)
+        jit.fingerprint(kernel)
         for effect in composition.effects
         if effect.file is None
-        for hook in (
-            *effect.hooks.values(), effect.initial_states, effect.turns, effect.corner,
-            effect.settling, effect.part,
-        )  # fmt: skip
+        for kernel in _kernels_of(effect).values()
     ]
     return cache_root() / jit.source_hash(files, codes)
 
@@ -110,15 +136,18 @@ def _executed(composition: Composition, name: str, path: Path, source: str | Non
 def _inject(module: ModuleType, effect: Effect) -> None:
     """Give the module the effect's kernels by name."""
     setattr(module, f"{effect.name}_record", effect.record_type)
-    for stage in STAGES:
-        if stage in effect.hooks:
-            setattr(module, f"{effect.name}_{stage}", effect.hooks[stage])
-    for ending, kernel in (
-        ("initial", effect.initial_states),
-        ("turns", effect.turns),
-        ("corner", effect.corner),
-        ("settling", effect.settling),
-        ("part", effect.part),
-    ):
-        if kernel is not None:
-            setattr(module, f"{effect.name}_{ending}", kernel)
+    for name, kernel in _kernels_of(effect).items():
+        setattr(module, f"{effect.name}_{name}", kernel)
+
+
+def _kernels_of(effect: Effect) -> dict[str, Callable[..., Any]]:
+    """What the composed source calls of an effect, by the ending of its name there."""
+    found = {
+        **{stage: effect.hooks.get(stage) for stage in STAGES},
+        "initial": effect.initial_states,
+        "turns": effect.turns,
+        "corner": effect.corner,
+        "part": effect.part,
+        "settling": effect.settling,
+    }
+    return {ending: kernel for ending, kernel in found.items() if kernel is not None}

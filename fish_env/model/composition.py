@@ -11,6 +11,7 @@ from fish_env.model.state import BASE_STATES
 from fish_env.params.packing import RECORD_FIELDS
 
 TEMPLATE = Path(__file__).with_name("rollout_template.py")
+PARTS_TEMPLATE = Path(__file__).with_name("parts_template.py")
 BASE_TERMS = (
     "gravity",
     "buoyancy",
@@ -40,7 +41,7 @@ class Composition:
 
     effects: tuple[Effect, ...] = ()
     tables: bool = False
-    templates: tuple[Path, ...] = (TEMPLATE,)
+    templates: tuple[Path, ...] = (TEMPLATE, PARTS_TEMPLATE)
     common_steps: bool = False
 
     @property

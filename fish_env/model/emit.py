@@ -25,34 +25,6 @@ OUTPUTS = {
     "heave_through_water": "motion.w",
 }
 """Quantities reported beside the wrenches (rad, rad/s, W, m, m/s) and what they are called here."""
-HEADER = '''"""Composed physics, generated: edit the sources in fish_env/model and effects."""
-import math
-
-import numpy as np
-
-from fish_env.model.body import (
-    damping_moment, impact_moment, plane_flow, plane_xy_velocity, plane_xz_velocity,
-    relative_motion,
-)
-from fish_env.model.coefficients import (
-    analytic_drag, analytic_lift, analytic_moment, table_drag, table_lift, table_moment,
-)
-from fish_env.model.frames import quaternion_rate, rotation, to_body, to_inertial
-from fish_env.model.history import (
-    HEARD, RECORD, assume_running, late_command, recall, recall_at, remember, running_command,
-    told_anew,
-)
-from fish_env.model.hydrostatics import buoyancy_force, gravity_wrench
-from fish_env.model.jit import entry_point, kernel, lean_entry_point
-from fish_env.model.mass_properties import barycentre, rigid_inertia
-from fish_env.model.newton_euler import inertial_wrench, solve_full, solve_rigid
-from fish_env.model.plate import drag_force, lift_force, speed_and_inverse
-from fish_env.model.records import Fish, Inputs, Vector, Wrench
-from fish_env.model.tail import (
-    TWO_PI, commanded_tail, hinge_power, tail_arm, tail_velocity, tail_wrench, wrench_at,
-)
-'''
-
 ACROSS = {1: "xz_", 2: "xy_"}
 """Component of the force across each body plane, which is zero."""
 
@@ -242,7 +214,8 @@ class Emitter:
             given.append(f"({''.join(rows[count:])}), since")
             targets.append(self.names("m", effect, effect.memory_names))
         parted = stage == "tail" and effect.part is not None and self.composition.corners
-        return f"{', '.join(targets)} = {effect.name}_{'part' if parted else stage}({', '.join(given)})"
+        hook = f"{effect.name}_{'part' if parted else stage}"
+        return f"{', '.join(targets)} = {hook}({', '.join(given)})"
 
     def names(self, letter: str, effect: Effect, values: Sequence[str]) -> str:
         """A tuple of variables of an effect."""

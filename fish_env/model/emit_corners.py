@@ -55,7 +55,9 @@ class CornerEmitter(Emitter):
         """The command that reaches the tail when a part begins, and the one at its end."""
         ahead = ", ".join(f"u{i} + length * u{i}_rate" for i in range(5))
         rates = ", ".join(f"u{i}_rate" for i in range(5))
-        turned = f"{0.5 * TWO_PI!r} * length * (inputs.tail_frequency + later_inputs.tail_frequency)"
+        turned = (
+            f"{0.5 * TWO_PI!r} * length * (inputs.tail_frequency + later_inputs.tail_frequency)"
+        )
         heard = "later_inputs, later_phase"
         return [
             *self.command_lines(self.recalled()),

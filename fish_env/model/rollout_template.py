@@ -18,22 +18,14 @@ from fish_env.model.composed import (
     N_PARAMETERS,
     N_STATES,
     lane_command,
-    lane_corner,
     lane_derivative,
     lane_initialise,
     lane_remember,
     lane_terms,
     lane_turns,
+    step_in_parts,
 )
-from fish_env.model.history import (
-    HEARD,
-    RECORD,
-    assume_running,
-    recall,
-    recall_at,
-    remember,
-    told_anew,
-)
+from fish_env.model.history import HEARD, RECORD, assume_running, recall, remember
 from fish_env.model.jit import entry_point, kernel, lean_entry_point
 
 # --- end ---
@@ -44,6 +36,7 @@ X0 = 0
 X = X0 + N_STATES
 DX = X + N_STATES
 SUM = DX + N_STATES
+SCALE, SIZE, TAKEN = SUM, SUM + 1, SUM + 2
 U = SUM + N_STATES
 U_RATE = U + 5
 U_END = U_RATE + 5
@@ -63,9 +56,6 @@ TURNS = CORNER + CORNERS  # and whether it may jump at all
 PAR = TURNS + CORNERS
 WORK_ROWS = PAR + N_PARAMETERS
 LARGEST = 1e4  # a state beyond this many SI units has diverged
-SHORTEST = 1e-3  # of a step: a part as long as this is none of its own
-MOST_PARTS = 32  # of a step
-INSTANT = 1e-9  # s; what is told at a time is told this much later too
 
 
 @kernel
@@ -170,141 +160,45 @@ def rk4_step(work, width, elapsed, h, tables, late, history, first, count, pace)
 
 
 @kernel
-def accept_lane(k, width, elapsed, work, moved):
-    """Normalise the quaternion; a lane that diverged stays at its last good state for good."""
-    norm = 0.0
-    for j in range(3, 7):
-        component = work[(X + j) * width + k]
-        norm += component * component
-    scale = 1.0 / np.sqrt(norm)
-    size = 0.0
-    for j in range(N_STATES):
-        value = work[(X + j) * width + k]
-        bounded = (j < 13) | ((j >= 18) & (j < N_SLOPES))
-        size += abs(value) if bounded else 0.0 * value
-    failed = work[FAILED * width + k]
-    good = (size < LARGEST) & (failed == np.inf)
-    taken = good & moved
-    for j in range(N_STATES):
-        value = work[(X + j) * width + k]
-        value = value * scale if (j >= 3) & (j < 7) else value
-        work[(X0 + j) * width + k] = value if taken else work[(X0 + j) * width + k]
-    now = work[TIME * width + k] + elapsed
-    work[FAILED * width + k] = min(failed, now) if moved & (not good) else failed
+def accept_states(work, width, elapsed):
+    """Normalise the quaternion; a lane that diverged stays at its last good state for good.
 
-
-@kernel
-def accept_step(work, width, elapsed):
-    """Take on the states at the end of a step, and the actuators."""
-    for k in range(width):
-        accept_lane(k, width, elapsed, work, True)
-    for n in range(5 * width):
-        work[U * width + n] = work[U_END * width + n]
-
-
-@kernel
-def recall_in_part(work, width, past, share, h, history, first, count):
-    """As ``recall``, at a share of each lane's part of the step."""
-    edge = INSTANT if share == 0.0 else -INSTANT
-    for k in range(width):
-        lane = first + (k if k < count else count - 1)
-        ago = work[(TOLD + RECORD - 1) * width + k]
-        shift = work[BEGUN * width + k] + share * work[LENGTH * width + k]
-        time = work[BEGIN * width + k] + shift - ago
-        recall_at(work, width, k, past, time, edge, ago / h, history, lane)
-
-
-@kernel
-def look_ahead(work, width, elapsed, h, late, history, first, count, last):
-    """End each lane's part of the step where the rate of its tail jumps first."""
-    for k in range(width):
-        work[LENGTH * width + k] = h - work[BEGUN * width + k]
-    if late:
-        recall_in_part(work, width, PAST, 0.0, h, history, first, count)
-        recall_in_part(work, width, PAST_END, 1.0, h, history, first, count)
-    for k in range(width):
-        lane_corner(k, width, elapsed, work)
-    if late:
-        for k in range(width):
-            lane = first + (k if k < count else count - 1)
-            ago, length = work[(TOLD + RECORD - 1) * width + k], work[LENGTH * width + k]
-            time = work[BEGIN * width + k] + work[BEGUN * width + k] - ago
-            anew = told_anew(time, length, ago / h, history, lane)
-            corner = work[CORNER * width + k]
-            work[CORNER * width + k] = min(corner, anew) if ago > 0.0 else corner
-    for k in range(width):
-        length, least = work[LENGTH * width + k], SHORTEST * h
-        corner = work[CORNER * width + k]
-        whole = last | (corner > length - least)
-        work[LENGTH * width + k] = length if whole else max(corner, least)
-
-
-@kernel
-def step_in_parts(work, width, elapsed, h, tables, late, history, first, count, turns):
-    """One step of every lane, as ``rk4_step`` and ``accept_step``, in parts between corners.
-
-    A lane without corners in the step takes it whole, to the same bits whatever the others do.
+    Row by row, so that it runs in vector registers however many rows there are. The rows of SUM,
+    which are free by now, hold each lane's scale, its size, and whether its state is taken on.
     """
     for k in range(width):
-        work[BEGUN * width + k] = 0.0
-        work[LENGTH * width + k] = h
-    for n in range(N_STATES * width):
-        work[X * width + n] = work[X0 * width + n]
-    if late:
-        tell_tail(work, width, elapsed, history, first, count)
-    for part in range(MOST_PARTS):
-        if turns:
-            last = part == MOST_PARTS - 1
-            look_ahead(work, width, elapsed, h, late, history, first, count, last)
-        rk4_part(work, width, elapsed, h, tables, late, history, first, count)
-        unfinished = 0
+        norm = 0.0
+        for j in range(3, 7):
+            component = work[(X + j) * width + k]
+            norm += component * component
+        work[SCALE * width + k] = 1.0 / np.sqrt(norm)
+        work[SIZE * width + k] = 0.0
+    for j in range(N_STATES):
+        bounded = (j < 13) | ((j >= 18) & (j < N_SLOPES))
         for k in range(width):
-            begun, length = work[BEGUN * width + k], work[LENGTH * width + k]
-            accept_lane(k, width, elapsed + h, work, length > 0.0)
-            done = begun + length
-            finished = done > h - 0.5 * SHORTEST * h
-            work[BEGUN * width + k] = h if finished else done
-            unfinished += 0 if finished else 1
-        if unfinished == 0:
-            break
-        for n in range(N_STATES * width):
-            work[X * width + n] = work[X0 * width + n]
-    for n in range(5 * width):
-        work[U * width + n] = work[U_END * width + n]
+            value = work[(X + j) * width + k]
+            work[SIZE * width + k] += abs(value) if bounded else 0.0 * value
+    for k in range(width):
+        moved = work[LENGTH * width + k] > 0.0 if CORNERS else True
+        failed = work[FAILED * width + k]
+        good = (work[SIZE * width + k] < LARGEST) & (failed == np.inf)
+        now = work[TIME * width + k] + elapsed
+        work[FAILED * width + k] = min(failed, now) if moved & (not good) else failed
+        work[TAKEN * width + k] = 1.0 if good & moved else 0.0
+    for j in range(N_STATES):
+        turned = (j >= 3) & (j < 7)
+        for k in range(width):
+            value = work[(X + j) * width + k]
+            value = value * work[SCALE * width + k] if turned else value
+            taken = work[TAKEN * width + k] > 0.0
+            work[(X0 + j) * width + k] = value if taken else work[(X0 + j) * width + k]
 
 
 @kernel
-def rk4_part(work, width, elapsed, h, tables, late, history, first, count):
-    """One Runge-Kutta step of every lane over its own part of the step, from X = X0."""
-    for n in range(N_SLOPES * width):
-        work[SUM * width + n] = 0.0
-    for stage in range(4):
-        fraction = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
-        weight = 1.0 if (stage == 0) | (stage == 3) else 2.0
-        ahead = 0.5 if stage < 2 else 1.0
-        if late:
-            recall_in_part(work, width, PAST, fraction, h, history, first, count)
-        for k in range(width):
-            shift = work[BEGUN * width + k] + fraction * work[LENGTH * width + k]
-            lane_derivative(k, width, elapsed, shift, work, tables)
-        if stage < 3:
-            for i in range(N_SLOPES):
-                for k in range(width):
-                    slope = work[(DX + i) * width + k]
-                    length = work[LENGTH * width + k]
-                    work[(SUM + i) * width + k] += weight * slope
-                    work[(X + i) * width + k] = (
-                        work[(X0 + i) * width + k] + (ahead * length) * slope
-                    )
-        else:
-            for i in range(N_SLOPES):
-                for k in range(width):
-                    total = work[(SUM + i) * width + k] + work[(DX + i) * width + k]
-                    sixth = work[LENGTH * width + k] / 6.0
-                    work[(X + i) * width + k] = work[(X0 + i) * width + k] + sixth * total
-    for k in range(count):
-        shift = work[BEGUN * width + k] + work[LENGTH * width + k]
-        lane_remember(k, width, elapsed, shift, work)
+def accept_actuators(work, width):
+    """Leave the actuators where they are at the end of a step."""
+    for n in range(5 * width):
+        work[U * width + n] = work[U_END * width + n]
 
 
 @kernel
@@ -345,7 +239,8 @@ def advance_block(
                 )  # fmt: skip
             else:
                 rk4_step(work, width, elapsed, h, tables, late, history, first, count, own_time)
-                accept_step(work, width, elapsed + h)
+                accept_states(work, width, elapsed + h)
+                accept_actuators(work, width)
             if (trace.shape[0] > 0) & ((i + 1) % every[segment] == 0):
                 sample = stored % trace.shape[0]
                 for j in range(trace.shape[1]):

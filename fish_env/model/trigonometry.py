@@ -13,6 +13,12 @@ _ROUND = 6755399441055744.0  # 1.5 * 2**52: adding and subtracting it rounds to 
 
 
 @kernel
+def rounded(value):
+    """The nearest whole number, for abs(value) < 2**50."""
+    return (value + _ROUND) - _ROUND
+
+
+@kernel
 def sincos(angle):
     """Sine and cosine of an angle (rad), to one unit in the last place for abs(angle) < 1e6.
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from fish_env.model.effect import Effect
@@ -43,6 +43,10 @@ class Composition:
     tables: bool = False
     templates: tuple[Path, ...] = (TEMPLATE, PARTS_TEMPLATE)
     common_steps: bool = False
+
+    def in_common_steps(self, templates: tuple[Path, ...]) -> Composition:
+        """The same with further templates, where every lane takes the same steps."""
+        return replace(self, templates=(*self.templates, *templates), common_steps=True)
 
     @property
     def state_names(self) -> tuple[str, ...]:

@@ -71,7 +71,7 @@ class CornerEmitter(Emitter):
     def look(self, effect: Effect) -> list[str]:
         """Ask an effect when its jump comes, and keep how it moves until then."""
         rows = self.rows_of(effect)[len(effect.state_names) :]
-        memory = ", ".join(f"work[(X0 + {row}) * width + k]" for row in rows)
+        memory = ", ".join(f"work[(X + {row}) * width + k]" for row in rows)
         told = self.names("m", effect, effect.memory_names)
         name = effect.name
         given = f"tail, tail_phase, later_tail, later_phase, e_{name}, ({memory},), length"
@@ -81,9 +81,9 @@ class CornerEmitter(Emitter):
             "corner = min(corner, when if turning else np.inf)",
         ]
         for i, row in enumerate(rows):
-            kept = f"m_{name}_{i} if turning else work[(X0 + {row}) * width + k]"
-            lines.append(f"work[(X0 + {row}) * width + k] = {kept}")
-            lines.append(f"work[(X + {row}) * width + k] = work[(X0 + {row}) * width + k]")
+            kept = f"m_{name}_{i} if turning else work[(X + {row}) * width + k]"
+            lines.append(f"work[(X + {row}) * width + k] = {kept}")
+            lines.append(f"work[(X0 + {row}) * width + k] = work[(X + {row}) * width + k]")
         return lines
 
     def settle(self, effect: Effect) -> list[str]:

@@ -71,7 +71,7 @@ def look_ahead(work, width, elapsed, h, late, history, first, count, last):
     for k in range(width):
         length, least = work[LENGTH * width + k], SHORTEST * h
         corner = work[CORNER * width + k]
-        whole = last | (corner > length - least)
+        whole = last | (not (corner <= length - least))
         work[LENGTH * width + k] = length if whole else max(corner, least)
 
 

@@ -18,6 +18,7 @@ from fish_env.model.composed import (
     N_PARAMETERS,
     N_STATES,
     lane_command,
+    lane_corner,
     lane_derivative,
     lane_initialise,
     lane_remember,
@@ -56,6 +57,7 @@ TURNS = CORNER + CORNERS  # and whether it may jump at all
 PAR = TURNS + CORNERS
 WORK_ROWS = PAR + N_PARAMETERS
 LARGEST = 1e4  # a state beyond this many SI units has diverged
+MOMENT = 1e-6  # s; how a tail goes on is how it is for this long
 
 
 @kernel
@@ -306,11 +308,20 @@ def advance_one(
 
 @kernel
 def presume_told(work, width):
-    """Presume that tails whose command is late were always told what they are told now."""
+    """Presume that tails whose command is late were always told what they are told now.
+
+    How a tail whose rate jumps goes on from now is looked up too.
+    """
     if LATE_TAIL:
         for k in range(width):
             lane_command(k, width, 0.0, work)
         assume_running(work, width, TOLD, PAST)
+    if LATE_TAIL & CORNERS:
+        assume_running(work, width, TOLD, PAST_END)
+    if CORNERS:
+        for k in range(width):
+            work[LENGTH * width + k] = MOMENT
+            lane_corner(k, width, 0.0, work)
 
 
 @entry_point

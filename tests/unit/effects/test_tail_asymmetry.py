@@ -28,7 +28,7 @@ def tail_at(phase, ratio=RATIO, step=1e-3, **changes):
     inputs = SimpleNamespace(**{**values, **changes})
     given = py_function(commanded_tail)(inputs, phase)
     return py_function(stretch_half_strokes)(
-        given, inputs, phase, 0.0, None, SimpleNamespace(ratio=ratio), (step,), 0.0
+        given, inputs, phase, 0.0, None, SimpleNamespace(ratio=ratio), (step, 1.0), 0.0
     )[0]
 
 

@@ -27,6 +27,7 @@ from tests.hidden.simulate import simulate
 FISH = "zheng-2021-a"
 SWIM = (0.0, 0.3, 2.0, 0.0, 0.0)
 EFFECT: EffectValues = {"servo_lag": {"time_constant": 0.05}}
+CORNERS: EffectValues = {"servo_backlash": {"gap": 0.05}}
 WATER: EffectValues = {"current": {"north": 0.01}}
 LOADED: EffectValues = {"servo_torque_limit": {"torque": 0.05}}
 
@@ -81,12 +82,17 @@ TASKS: Mapping[str, tuple[Callable[[EffectValues], None], EffectValues]] = {
     "filter, a loaded drive": (filters, LOADED),
     "filter, all effects": (filters, {**EFFECT, **WATER}),
     "filter, effects of water": (filters, WATER),
+    "filter, an effect of the tail": (filters, EFFECT),
+    "filter, no effects": (filters, {}),
     "hidden physics": (hidden_fish, {}),
 } | {
     f"{name}, {kind}": (task, effects)
-    for kind, effects in (("an effect of the tail", EFFECT), ("no effects", {}))
+    for kind, effects in (
+        ("an effect of the tail", EFFECT),
+        ("a tail whose rate jumps", CORNERS),
+        ("no effects", {}),
+    )
     for name, task in (
-        ("filter", filters),
         ("vector environment", vector_environment),
         ("environment", single_environment),
         ("batch", many_fish),

@@ -162,7 +162,8 @@ class RoboticFish3DEnv(Watched, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.
     ## Versions
 
     * v0: first version. The tasks ``path`` and ``station`` were added later, without changing any
-      bit of ``hold`` and ``track``.
+      bit of ``hold`` and ``track``. Effects of a tail whose rate jumps or lags were later computed
+      more accurately, without changing any bit of fish without them.
 
     Args:
         task: ``"hold"`` (constant references), ``"track"`` (steps, ramps, sines), ``"path"``

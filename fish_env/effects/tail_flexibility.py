@@ -34,14 +34,19 @@ def turns(e):
 
 @kernel
 def settling(tail, e, states):
-    """A jump of the command makes the tail swing for a few periods, or creep."""
+    """A jump of the command makes the tail swing for a few periods, or creep.
+
+    What it leaves over is how far angle and rate are from those behind a smooth command.
+    """
     angle, rate = states
     on = e.natural_frequency < inf
     omega = TWO_PI * (e.natural_frequency if on else 1.0)
     zeta = max(e.damping_ratio, 1.0)
     fastest = 1.0 / (omega * (zeta + sqrt(zeta * zeta - 1.0)))
-    behind = tail.angle - angle - 2.0 * e.damping_ratio * tail.rate / omega
-    excess = abs(rate - tail.rate) + omega * abs(behind - tail.acceleration / (omega * omega))
+    late = 2.0 * e.damping_ratio / omega
+    bent = (late * late - 1.0 / (omega * omega)) * tail.acceleration
+    slow = rate - tail.rate + late * tail.acceleration
+    excess = abs(slow) + omega * abs(tail.angle - angle - late * tail.rate + bent)
     return followed(fastest, excess) if on else inf
 
 

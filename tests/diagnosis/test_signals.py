@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from fish_env.data import load_dataset
-from fish_env.effects.extended import PREFIX
 from fish_env.identification.series import SeriesProblem
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.params import load_fish
 from tests.hidden.designs import swim_design
 from tests.hidden.plans import PLANS
@@ -51,7 +51,7 @@ def still(swum):
 
 def residuals(still, problem, effect="", values=None):
     _, noise, filtered = still
-    lanes = {f"{PREFIX}{effect}.{key}": np.array([v]) for key, v in (values or {}).items()}
+    lanes = {EffectParameterId(effect, k): np.array([v]) for k, v in (values or {}).items()}
     return problem.innovations(np.zeros((len(problem.baseline), 1)), lanes, noise, filtered)[0]
 
 

@@ -131,8 +131,10 @@ def _sagging(problem: SeriesProblem, own: Mapping[str, float]) -> OwnBeats:
     means = np.array([own.get(run.id, 1.0) for run in problem.runs])
     sags = np.zeros(len(means))
     left = _left_on_grid(problem, MEANS, SAGS, middle)
+    shared = 0.0
     if left is not None:
-        for i, mine in enumerate(left):
+        shared = float(SAGS[int(np.argmin(left.min(axis=1).sum(axis=0)))])
+        for i, mine in enumerate(left + _unusual(SAGS - shared)):
             mean, sag = np.unravel_index(int(np.argmin(mine)), mine.shape)
             if 0 < mean < len(MEANS) - 1 and 0 < sag < len(SAGS) - 1:
                 means[i], sags[i] = 1.0 + MEANS[mean], SAGS[sag]
@@ -143,7 +145,8 @@ def _sagging(problem: SeriesProblem, own: Mapping[str, float]) -> OwnBeats:
         dict(zip(ids, sags.tolist(), strict=True)),
     )
     left = _left_on_grid(with_own_beats(problem, begun), FINE_MEANS, FINE_SAGS, middle)
-    for i, mine in enumerate(left if left is not None else ()):
+    for i, squares in enumerate(left if left is not None else ()):
+        mine = squares + _unusual(sags[i] + FINE_SAGS - shared)
         mean, sag = np.unravel_index(int(np.argmin(mine)), mine.shape)
         means[i] += _between(mine[:, sag], FINE_MEANS, int(mean))
         sags[i] += _between(mine[mean], FINE_SAGS, int(sag))
@@ -155,6 +158,8 @@ def _left_on_grid(
 ) -> FloatArray | None:
     """Squared innovations (R, means, sags) that each mean frequency and sag leave in each run.
 
+    In units of the smallest mean square of each run: beside a misfit that is not one.
+
     Args:
         problem: the runs, told the beat that they share.
         means: frequencies in the middle of a run, less that beat, as a share of it.
@@ -163,7 +168,16 @@ def _left_on_grid(
     """
     mean, sag = (axis.ravel() for axis in np.meshgrid(means, sags, indexing="ij"))
     left = _left(problem, {RATE: sag, SCALE: problem.drive.scale * (1.0 + mean + middle * sag)})
-    return None if left is None else left.T.reshape(-1, len(means), len(sags))
+    if left is None:
+        return None
+    samples = np.array([np.isfinite(run.measured).sum() for run in problem.runs])
+    by_run = left.T / (left.min(axis=0) / samples)[:, None]
+    return np.asarray(by_run.reshape(-1, len(means), len(sags)))
+
+
+def _unusual(sags: FloatArray) -> FloatArray:
+    """-2 log prior of sags beside what runs share (1/s): a short run hardly tells its own."""
+    return np.asarray((sags / USUAL_SAG) ** 2)
 
 
 def _beside_shared(

@@ -64,14 +64,14 @@ EFFECT = Effect(
     source="Pseudo-rigid-body model, Howell, Compliant Mechanisms, chapter 5",
     parameters=(
         EffectParameter(
-            "stiffness", "N m/rad", inf, 1e-3, inf, (0.05, 0.5), "of the body at the tail's root"
+            "stiffness", "N m/rad", inf, 1e-3, inf, (0.1, 1.0), "of the body at the tail's root"
         ),
         EffectParameter(
-            "natural_frequency", "Hz", 5.0, 0.5, 20.0, (3.0, 10.0), "of tail and body, undamped",
+            "natural_frequency", "Hz", 5.0, 0.5, 20.0, (2.0, 6.0), "of tail and body, undamped",
             shapes=True, probed=False,
         ),
         EffectParameter(
-            "damping_ratio", "-", 0.3, 0.05, 5.0, (0.1, 1.0), "1 is critical",
+            "damping_ratio", "-", 0.3, 0.05, 5.0, (0.1, 0.5), "1 is critical",
             shapes=True, probed=False,
         ),
     ),

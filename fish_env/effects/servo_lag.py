@@ -72,6 +72,7 @@ EFFECT = Effect(
     time_scale=fastest,
     order=5,
     confusable_with=(
+        "body_flexibility",
         "sensor_delay",
         "servo_delay",
         "servo_rate_limit",

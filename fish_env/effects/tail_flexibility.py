@@ -94,6 +94,7 @@ EFFECT = Effect(
     time_scale=fastest,
     order=7,
     confusable_with=(
+        "body_flexibility",
         "servo_delay",
         "servo_lag",
         "tail_gain",

@@ -35,6 +35,7 @@ EFFECT = Effect(
     hooks={"inputs": scale_amplitude},
     confusable_with=(
         "angle_limit",
+        "body_flexibility",
         "frequency_scale",
         "linear_drag",
         "position_scale",

@@ -14,7 +14,7 @@ from fish_env.inference.estimate.again import finished
 from fish_env.inference.estimate.covariance import sandwich
 from fish_env.inference.estimate.free import Linearised
 from fish_env.inference.estimate.products import inner
-from fish_env.inference.hypotheses import EffectParameterId
+from fish_env.inference.hypotheses import Coefficient, EffectParameterId
 from fish_env.inference.problem import Point
 from fish_env.params import load_fish, save_fish
 from fish_env.simulator import Simulator
@@ -45,7 +45,7 @@ def test_intervals_cover(fits):
         low <= truth[path] <= high
         for truth, result in fits
         for path in PATHS
-        for low, high in [result.interval(path)]
+        for low, high in [result.interval(Coefficient(path))]
     )
     count = DATA_SETS * len(PATHS)
     assert binom.ppf(0.002, count, 0.95) <= hits

@@ -16,7 +16,7 @@ from fish_env.identification.whole_runs.noise import (
 from fish_env.identification.whole_runs.prediction import prediction_errors, second_half
 from fish_env.identification.writing import identified_fish
 from fish_env.inference.estimate.free import Free, linearise
-from fish_env.inference.hypotheses import EffectParameterId
+from fish_env.inference.hypotheses import Coefficient, EffectParameterId
 from fish_env.inference.problem import Point
 from fish_env.params import load_fish
 from fish_env.simulator import Simulator
@@ -112,7 +112,7 @@ def test_a_hidden_effect_is_found_with_the_truth_in_its_interval(found):
     assert low < 0.85 < high
     assert high - low < 0.1
     for path in PATHS:
-        low, high = found.interval(path)
+        low, high = found.interval(Coefficient(path))
         assert low < load_fish(FISH).get(path) < high
     assert found.noise.sd[0] < 2e-3
 

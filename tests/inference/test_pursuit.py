@@ -215,6 +215,6 @@ def test_no_effect_is_searched_for_beside_its_limit():
     for there, other in (("whole", "simple"), ("simple", "whole")):
         own = fit(stated, (there,), refit_noise=False)
         shown = screen(own, causes_of(stated), np.random.default_rng(0))
-        left = {s.cause.name for s in beside(Explanation((there,), own), shown).signals}
+        left = {s.cause.id for s in beside(Explanation((there,), own), shown).signals}
         assert "other" in left
         assert other not in left

@@ -136,6 +136,7 @@ def test_the_catalogue_is_that_of_the_specification():
         "servo_delay": {"delay": 0},
         "servo_backlash": {"gap": 0},
         "tail_flexibility": {"natural_frequency": np.inf, "damping_ratio": 1},
+        "body_flexibility": {"stiffness": np.inf, "natural_frequency": None, "damping_ratio": None},
         "frequency_scale": {"scale": 1},
         "battery_sag": {"rate": 0},
         "block_scale": {"scale": 1},

@@ -1,12 +1,12 @@
 """An asymmetric tail: half strokes, their rate, and the kink where they meet."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
+from fish_env.effects import get_effect
 from fish_env.effects.tail_asymmetry import stretch_half_strokes
 from fish_env.model.jit import py_function
+from fish_env.model.records import Inputs
 from fish_env.model.tail import commanded_tail
 from tests.unit.effects.support import run, tail
 
@@ -17,18 +17,11 @@ SWING = [{"t": 0.0, "tail_offset": 0.1, "tail_amplitude": 0.3, "tail_frequency":
 
 def tail_at(phase, ratio=RATIO, step=1e-3, **changes):
     """The asymmetric tail at a phase, from the hook itself, in steps of a length (s)."""
-    values = {
-        "tail_offset": 0.1,
-        "tail_amplitude": 0.3,
-        "tail_frequency": 1.0,
-        "tail_offset_rate": 0.0,
-        "tail_amplitude_rate": 0.0,
-        "tail_frequency_rate": 0.0,
-    }
-    inputs = SimpleNamespace(**{**values, **changes})
+    inputs = Inputs(0.1, 0.3, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)._replace(**changes)
     given = py_function(commanded_tail)(inputs, phase)
+    own = get_effect("tail_asymmetry").record_type(ratio)
     return py_function(stretch_half_strokes)(
-        given, inputs, phase, 0.0, None, SimpleNamespace(ratio=ratio), (step, 1.0), 0.0
+        given, inputs, phase, 0.0, None, own, (step, 1.0), 0.0
     )[0]
 
 

@@ -5,6 +5,7 @@ import pytest
 
 from fish_env.effects.wave import wave_number
 from fish_env.model.jit import py_function
+from fish_env.model.state import BASE_STATES
 from fish_env.simulator import InitialState, Simulator
 from tests.physics.cases import dry, swimmer
 from tests.unit.effects.support import REST, STILL, balanced
@@ -102,7 +103,8 @@ def test_added_mass_alone_in_still_water_is_as_ever():
     calm = {**TANK, "amplitude": 0.0}
     one = Simulator(swimmer(), effects={"added_mass": HEAVY}).state_derivative(state)
     two = Simulator(swimmer(), effects={"added_mass": HEAVY, "wave": calm}).state_derivative(state)
-    np.testing.assert_array_equal(one, two)
+    fish = len(BASE_STATES)  # each kernel has states of its own effects behind these
+    np.testing.assert_array_equal(one[:fish], two[:fish])
 
 
 def test_a_wave_heaves_a_drifting_fish_at_its_frequency():

@@ -6,10 +6,12 @@ import pytest
 from fish_env.inference import elimination
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.explanation import Explanation, reached
-from fish_env.inference.hypotheses import effects_of
+from fish_env.inference.hypotheses import EffectParameterId, effects_of
+from fish_env.inference.probes import causes_of
+from fish_env.inference.screening import screen
 from fish_env.inference.search import refits
 from fish_env.inference.substitution import without
-from tests.inference.stated import Stated, White, apart, cause_of, effect, signal_of
+from tests.inference.stated import SIZE, Stated, White, apart, cause_of, effect, signal_of
 
 SIZES = {"a": 60.0, "b": 50.0, "c": 40.0}
 """Of causes, by which they explain what is there; sketches of each are as good in that order."""
@@ -73,3 +75,19 @@ def test_what_looks_like_the_best_is_tried_too():
     """A strong effect is screened far from where it is, and one that looks like it may hide it."""
     _, tried, _ = contest("", shown="bc")
     assert [e.causes for e in tried] == [("a",), ("b",), ("c",)]
+
+
+@pytest.mark.parametrize("huge", [1e200, np.inf])
+def test_an_effect_that_moves_beyond_all_measure_shows_nothing(huge):
+    """A simulation may diverge and stay finite: its change must not reach the linear model."""
+
+    def residuals(z, effects):
+        size = effects[EffectParameterId("a", SIZE)]
+        lost = 0.0 if effects[EffectParameterId("b", SIZE)] == 0.0 else huge
+        return np.array([[size - 9.0 + lost, lost, z.sum()]] * 3)
+
+    problem = Stated(residuals, [effect("a", 10.0), effect("b", 10.0)])
+    own = fit(problem, refit_noise=False)
+    with np.errstate(all="raise"):
+        shown = screen(own, causes_of(problem), np.random.default_rng(0))
+    assert [s.cause.id for s in shown.best() if s.cause.is_effect] == ["a"]

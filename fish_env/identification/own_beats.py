@@ -5,7 +5,7 @@ seconds, and so is one whose battery loses a per cent in that time; then nothing
 is filtered with a comb of frequencies at once, its starting phase being free within what servos
 differ by. Where runs differ, it is filtered with a grid of frequencies and sags: the best frequency
 without a sag may be that of half a run, from which no sag leads to the other half. Fits begin where
-the grid leaves least, and estimate what is left of both as something the runs differ in. What the
+the grid leaves least, and estimate the rest of both as something the runs differ in. What the
 runs share, beyond what the mean of so many ordinary runs may be, is a cause, to be found and named.
 """
 

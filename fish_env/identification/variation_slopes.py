@@ -13,7 +13,7 @@ from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.runs import RunData
 from fish_env.identification.tail_drive import RATE, SCALE, TailDrive
 from fish_env.identification.variation import BEAT, SAG, unseen
-from fish_env.inference.estimate.free import LARGEST_SLOPE
+from fish_env.inference.estimate.free import diverged
 from fish_env.inference.hypotheses import EffectParameterId, effects_of
 from fish_env.inference.problem import Point
 
@@ -84,4 +84,4 @@ def leave_diverged(slopes: FloatArray) -> None:
     Args:
         slopes: (D, K) of the innovations of one run.
     """
-    slopes[:, ~(np.abs(slopes).max(axis=0) < LARGEST_SLOPE)] = 0.0
+    slopes[:, diverged(slopes.T)] = 0.0

@@ -9,7 +9,6 @@ from scipy.special import chdtri
 
 from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.fit import Fit
-from fish_env.inference.estimate.information import information, prior_precision
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import CauseId, Coefficient, EffectParameterId, ParameterId
 from fish_env.inference.policy import POLICY
@@ -58,23 +57,7 @@ def allowed_loss(fit: Fit, cause: CauseId, level: float = 0.05) -> float:
         level: share of such regions that do not hold the truth.
     """
     at = [fit.ids.index(id) for id in off_values(fit, cause)]
-    return float(chdtri(len(at), level)) * covariance_inflation(fit, at)
-
-
-def covariance_inflation(fit: Fit, at: Sequence[int]) -> float:
-    """How much larger coloured residuals make the variance of some parameters (at least 1).
-
-    Args:
-        fit: with all causes.
-        at: numbers of the parameters.
-    """
-    count = len(fit.problem.baseline)
-    prior = prior_precision(fit.problem.baseline, len(fit.ids) - count, fit.released)
-    scale = np.eye(len(fit.ids))
-    scale[:count, :count] = fit.problem.baseline.factor
-    hessian = information(fit.linearised.slopes, prior)
-    white = np.diag(scale @ np.linalg.inv(hessian) @ scale.T)
-    return float(max(1.0, (np.diag(fit.covariance)[at] / white[at]).max()))
+    return float(chdtri(len(at), level)) * fit.inflation(at)
 
 
 def surely_acts(fit: Fit, cause: CauseId) -> bool:

@@ -21,7 +21,7 @@ from fish_env.inference.adequacy import (
     implausible_estimates,
 )
 from fish_env.inference.budget import RESAMPLES
-from fish_env.inference.elimination import covariance_inflation, off_values
+from fish_env.inference.elimination import off_values
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.free import Free
 from fish_env.inference.estimate.products import inner
@@ -300,7 +300,7 @@ class StandIns:
             shift = np.array([-z / (1.0 + held)])
             loss = z * z * held / (1.0 + held)
             freed = freed - 1.0 / (1.0 + held)
-        inflation = covariance_inflation(self.fit, own.tolist())
+        inflation = self.fit.inflation(own)
         return Removed(loss, shift, own, rest, along, freed, inflation)
 
     @cached_property

@@ -10,7 +10,7 @@ import numpy as np
 
 from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.fit import Fit
-from fish_env.inference.estimate.free import LARGEST_SLOPE
+from fish_env.inference.estimate.free import diverged
 from fish_env.inference.estimate.products import inner
 from fish_env.inference.hypotheses import Coefficient, effects_of
 from fish_env.inference.parallel import side_by_side
@@ -111,18 +111,12 @@ def residual_changes(fit: Fit, jobs: Sequence[tuple[str, Probe]], z: FloatArray)
         z: (coefficients, n) where to simulate each.
     """
     rows = _changes_of_kinds(fit, fit.comparing, jobs, z)
-    lost = _diverged(rows)
+    lost = np.flatnonzero(diverged(rows)).tolist()
     if lost and fit.comparing is not fit.problem:
         again = [jobs[i] for i in lost]
         rows[lost] = _changes_of_kinds(fit, fit.problem, again, z[:, lost])
-    rows[_diverged(rows)] = np.nan
+    rows[diverged(rows)] = np.nan
     return fit.linearised.whitened(rows).T
-
-
-def _diverged(rows: FloatArray) -> list[int]:
-    """Numbers of the changes (n, D) that are not finite, or so large that nothing moves so."""
-    within = (rows.min(axis=1) > -LARGEST_SLOPE) & (rows.max(axis=1) < LARGEST_SLOPE)
-    return np.flatnonzero(~within).tolist()
 
 
 def _changes_of_kinds(

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.special import ndtri
 
-from fish_env.arrays import FloatArray
+from fish_env.arrays import FloatArray, IntArray
 from fish_env.inference.estimate.bounds import coefficients_at_bounds
 from fish_env.inference.estimate.covariance import sandwich
 from fish_env.inference.estimate.free import (
@@ -87,6 +87,22 @@ class Fit:
         baseline = self.problem.baseline
         prior = prior_precision(baseline, len(self.ids) - len(baseline), self.released)
         return leverage(self.linearised.slopes, prior)
+
+    @cached_property
+    def _white_variance(self) -> FloatArray:
+        """Variance (n,) of the estimates, in physical units, if the residuals were white."""
+        free = Free(self.problem, self.effects, self.released)
+        scale = free.scale()
+        inverse = np.linalg.inv(information(self.linearised.slopes, free.prior))
+        return np.asarray(np.diag(scale @ inverse @ scale.T))
+
+    def inflation(self, at: Sequence[int] | IntArray) -> float:
+        """How much larger coloured residuals make the variance of some parameters (at least 1).
+
+        Args:
+            at: their numbers.
+        """
+        return float(max(1.0, (np.diag(self.covariance)[at] / self._white_variance[at]).max()))
 
     @cached_property
     def comparing(self) -> Problem:

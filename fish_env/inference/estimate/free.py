@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from fish_env.arrays import FloatArray, IntArray
+from fish_env.arrays import BoolArray, FloatArray, IntArray
 from fish_env.inference.estimate.bounds import LinearBounds, parameter_bounds
 from fish_env.inference.estimate.information import gradient, information, prior_precision
 from fish_env.inference.estimate.run_variation import Marginal
@@ -158,6 +158,12 @@ def residuals_at(
     return problem.innovations(vectors[: free.count], effects, noise, filtered)
 
 
+def diverged(rows: FloatArray) -> BoolArray:
+    """(n,) which changes of residuals (n, D) are not finite, or so large that nothing moves so."""
+    within = (rows.min(axis=1) > -LARGEST_SLOPE) & (rows.max(axis=1) < LARGEST_SLOPE)
+    return np.asarray(~within)
+
+
 def linearise(
     problem: Problem,
     free: Free,
@@ -184,7 +190,7 @@ def linearise(
     # In place: memory fresh from the system costs as much as the arithmetic.
     rows -= innovations[0]
     rows /= steps[:, None]
-    rows[~((rows.min(axis=1) > -LARGEST_SLOPE) & (rows.max(axis=1) < LARGEST_SLOPE))] = 0.0
+    rows[diverged(rows)] = 0.0
     residuals = innovations[0]
     if marginal is not None:
         residuals, rows = marginal.residuals(residuals), marginal.rows(rows)

@@ -63,8 +63,10 @@ def substituted(
         causes = tuple(signal.cause.id if c == name else c for c in current.causes)
         enough = fitter.base + leeway[name]
         coarse = _swapped(fitter, own, name, signal, enough)
-        if coarse is not None and coarse.objective < enough:
-            found.append((coarse.objective, causes, coarse))
+        if coarse is None or coarse.objective >= enough:
+            continue
+        if limit_at(own.problem, signal.cause.effect, coarse.point.effects) != name:
+            found.append((coarse.objective, causes, coarse))  # else it would act as the cause does
     others = []
     # Beside a misfit the numbers of the runs have not settled yet, and no fit is hopeless.
     give_up_above = np.inf if beside_misfit else own.objective + POLICY.out_of_reach

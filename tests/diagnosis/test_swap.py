@@ -1,5 +1,7 @@
 """A look-alike that was taken for an earlier cause gives way once the others are there."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -99,3 +101,15 @@ def test_one_that_ends_switched_off_is_tried_from_each_size():
     best = substituted(now, pairs(LAG), 1, lambda step: None)[0]
     assert best.causes == (LAG, CURRENT)
     assert best.fit.point.effects[size_of(LAG)] == pytest.approx(0.2, abs=0.01)
+
+
+@pytest.mark.parametrize(("near", "others"), [(True, 0), (False, 1)])
+def test_one_that_acts_as_the_cause_does_takes_no_place(near, others):
+    """A limit of torque that is never reached limits the speed, which is a cause already."""
+    parts = {SOFT: {"size": 1.0}} if near else {}
+    both = replace(KNOWN[LAG], parts=lambda values: parts)
+    problem = swimming(SOFT, 1.5)
+    problem.known = {**problem.known, LAG: both}
+    own = fit(problem, (SOFT, CURRENT), refit_noise=False)
+    found = substituted(Explanation((SOFT, CURRENT), own), pairs(LAG), 1, lambda step: None)
+    assert len(found) == 1 + others

@@ -104,9 +104,9 @@ def _share(rate: Mapping[str, float]) -> str:
 def statements(page: Path = STATEMENTS) -> str:
     """How many of the paper's statements are held, in one line."""
     text = page.read_text(encoding="utf-8").partition("\n## ")[0]
-    total = re.search(r"(\d+) of (\d+) statements are held", text)
+    total = re.search(r"reproduces (\d+) of (\d+) statements", text)
     if total is None:
-        raise ValueError(f"{page}: no sentence 'N of M statements are held'")
+        raise ValueError(f"{page}: no sentence 'reproduces N of M statements'")
     motions: dict[str, list[bool]] = {}
     for line in text.splitlines():
         cells = [cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]]

@@ -87,7 +87,7 @@ class OneStep:
 
     def fit(self, problem: SeriesProblem, start: Point | None, report: Report) -> Fit:
         """Fit coefficients, effects and noise."""
-        report("looking for a start")
+        report("searching for initial values")
         begin = start or likely_start(problem, problem.effects)
         return fit(problem, start=begin, report=report).extrapolated
 

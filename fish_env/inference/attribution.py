@@ -155,12 +155,12 @@ def settled(found: Attribution, thoroughly: bool, report: Callable[[str], None])
         report: told what is being done.
     """
     if found.accepted.causes:
-        report("dropping causes that are not needed")
+        report("removing unnecessary causes")
     current, unnecessary = backward_elimination(found.accepted)
     failed = found.failed if current.causes == found.accepted.causes else frozenset()
     # What else is missing moves estimates by more than a few steps more would.
     if current.causes and thoroughly and not disturbance_at_limit(current.fit):
-        report("fitting the estimates to the end")
+        report("iterating the estimates to convergence")
         final = reached(lambda: to_publish(current.fit))
         current = Explanation(current.causes, final) if final else current
     # A rival that contains the accepted causes is no rival once a cause is dropped.

@@ -61,7 +61,7 @@ def measured(nothing: Explanation, report: Callable[[str], None]) -> Explanation
     if not values:
         return None
     effects = tuple(dict.fromkeys(EffectName(id.effect) for id in values))
-    report(f"putting the drive in step by {' and '.join(effects)}")
+    report(f"fitting the drive with {' and '.join(effects)}")
     noise = own.problem.default_noise()
     begin = [Point(z, values) for z in baselines(own)]
     # The runs' own numbers have gone far to make up for what was measured.
@@ -125,7 +125,7 @@ def _relaxed(baseline: Fit, objective: float, report: Callable[[str], None]) -> 
     noise = baseline.problem.relaxed_noise(baseline.noise)
     if noise is None:
         return None
-    report("following the drive")
+    report("fitting with a random-walk phase of the drive")
     loose = fitted_again(baseline.problem, baseline, noise)
     if loose is None or loose.objective > objective - POLICY.evidence_doubt:
         return None

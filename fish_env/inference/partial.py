@@ -76,7 +76,7 @@ def confirmed(
     measured = _measured(accepted)
     if doubtful := _dependent(accepted) - measured:
         left_out = listed(sorted(doubtful, key=name_of))
-        report(f"leaving out {left_out}: coefficients contradict their priors")
+        report(f"rejecting {left_out}: coefficients contradict their priors")
         smaller = without(accepted, doubtful) if doubtful < {*accepted.causes} else None
         if smaller is None:
             return None
@@ -86,14 +86,14 @@ def confirmed(
         weakest = _blamed(others, found)
         if weakest is not None:
             words = "; ".join(one.words for one in found)
-            report(f"leaving out {name_of(weakest)}: its estimate is implausible ({words})")
+            report(f"rejecting {name_of(weakest)}: its estimate is implausible ({words})")
         else:
             log_p = StandIns(accepted, threshold).log_p()
             log_p = {name: value for name, value in log_p.items() if name not in measured}
             weakest = max(log_p, key=lambda name: log_p[name])
             if log_p[weakest] < threshold:
                 return accepted
-            report(f"leaving out {name_of(weakest)}: forces without a name explain as much")
+            report(f"rejecting {name_of(weakest)}: generic forces explain as much")
         smaller = without(accepted, (weakest,))
         if smaller is None:
             return None
@@ -170,7 +170,7 @@ def sustained(
         if least[worst] > 0.0:
             return found
         left_out = name_of(worst)
-        report(f"leaving out {left_out}: simulated without feedback it does not help in most runs")
+        report(f"rejecting {left_out}: it does not improve open-loop predictions of most runs")
         smaller = without(found, (worst,))
         if smaller is None:
             return None

@@ -106,7 +106,7 @@ def investigate(
     problem = baseline.problem
     report("screening causes")
     attribution = attribute(problem, baseline, causes, rng, effort, report)
-    report("what the runs could show")
+    report("computing detectable sizes")
     report("testing the residual")
     where = baseline if effort.retries else None
     left, shown = both(
@@ -123,7 +123,7 @@ def investigate(
     verdict = decide(attribution, left, shown)
     partly_known = verdict.name == "outside_library" and bool(attribution.accepted.causes)
     if effort.retries and partly_known:
-        report("testing which causes act beside what is unknown")
+        report("testing each cause beside generic forces")
         attribution, verdict = partly(attribution, left, verdict, rng, report)
     attribution = attribution.extrapolated()
     gap = None
@@ -134,7 +134,7 @@ def investigate(
     if effort.retries and not left.reached and describe:
         report("modelling the residual")
         residual = described(attribution, left, describe, held_out)
-    report("sharing the misfit among its causes")
+    report("computing the error budget")
     budget = budget_of(attribution, verdict, left, held_out, rng)
     return Result(attribution, left, shown, verdict, gap, residual, budget)
 
@@ -307,7 +307,7 @@ def with_slow_causes(
     noise = own.problem.passing_noise(own.noise)
     if noise is None:
         return attribution, left
-    report("looking for slow causes")
+    report("searching for slow causes")
     passing = reached(
         lambda: fit(own.problem, own.effects, own.point, noise, own.released, refit_noise=False)
     )

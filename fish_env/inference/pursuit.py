@@ -194,13 +194,13 @@ def _needed(
     idle = (*wild, *insignificant(fitted, sober, shown.threshold))
     if not set(causes) - set(idle):
         return current
-    report(f"fitting without {listed(idle)}" if idle else "fitting what the runs differ in")
+    report(f"fitting without {listed(idle)}" if idle else "fitting run-to-run variation")
     whole, found = found, found.varied(beside_misfit=True, dropped=idle)
     level = float(np.exp(shown.threshold))
     foreseen = sum((allowed_loss(fitted, cause, level) for cause in idle), 0.0)
     if set(idle) - set(wild) and found.score > whole.score + POLICY.evidence_doubt + foreseen:
         # The linear model does not hold as far as the values at which they are off.
-        report(f"fitting with {listed(name for name in idle if name not in wild)} after all")
+        report(f"fitting again with {listed(name for name in idle if name not in wild)}")
         found = whole.varied(beside_misfit=True, dropped=wild)
     better = found.score < current.score - POLICY.evidence_doubt
     return found if better and not implausible_estimates(found.fit) else current

@@ -77,7 +77,7 @@ def substituted(
             others.append(Explanation(causes, fitted))
     found_all = [current, *others]
     if beside_misfit and others:
-        report("fitting what the runs differ in")
+        report("fitting run-to-run variation")
         found_all = side_by_side([e.varied_to_the_end for e in found_all])
     return sorted(found_all, key=lambda e: e.score)
 

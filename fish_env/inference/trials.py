@@ -40,7 +40,7 @@ def tried_out(
     swamped = problem.drive.uneven and problem.swamped(current.fit.noise)
     if not hidden or not swamped:
         return None
-    report(f"trying {listed(s.cause.id for s in hidden)} in fits of their own")
+    report(f"trying {listed(s.cause.id for s in hidden)} one at a time")
     tasks = [partial(_trial, current, "", {})]
     begun = [(s.cause.effect, values) for s in hidden for values in probed(problem, s)]
     tasks += [partial(_trial, current, *begin) for begin in begun]

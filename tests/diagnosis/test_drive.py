@@ -49,4 +49,4 @@ def test_a_wake_is_found_beside_a_slow_beat(tmp_path):
 def test_a_tail_in_step_is_not_followed(tmp_path):
     found, _, _, steps = beside(tmp_path / "data", {})
     assert found is None
-    assert steps == ["following the drive"]
+    assert steps == ["fitting with a random-walk phase of the drive"]

@@ -135,7 +135,7 @@ def test_a_slow_cause_is_found_where_a_disturbance_hid_it(tide, unknown, kept):
     before = attribute(problem, fit(problem), causes, rng)
     assert before.accepted.causes == ()
     found, left = with_slow_causes(before, LEFT, causes, rng, said.append)
-    assert ("looking for slow causes" in said) == (tide > 0.0 or unknown > 0.0)
+    assert ("searching for slow causes" in said) == (tide > 0.0 or unknown > 0.0)
     assert found.accepted.causes == kept
     assert (found is before) == (left is LEFT) == (not kept)
     assert left.reached == bool(kept)

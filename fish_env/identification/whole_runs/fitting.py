@@ -49,7 +49,7 @@ def fit_whole_runs(
     found = fit(problem, names, start, noise, refit_noise=False, iterations=steps)
     if not refit_noise:
         return found
-    report("fitting the errors' size")
+    report("fitting the noise")
     again = _begun(found)
     return fit(again, names, found.point, noise, iterations=steps, rounds=2)
 
@@ -60,13 +60,13 @@ def _near(problem: WholeRunProblem, report: Callable[[str], None]) -> tuple[Whol
         replace(problem.default_noise(), speed_sd=speed, rate_sd=rate, memory_s=memory)
         for speed, rate, memory in DRIFTS
     ]
-    report("looking for a start")
+    report("searching for initial values")
     first = (FREQUENCY_SCALE,)
     alone = fit(problem, first, noise=drifting[0], refit_noise=False, iterations=FIRST_STEPS)
     names = problem.effects
     z = KEPT * alone.point.z if names != first else alone.point.z
     begin = Point(z, {**_effects_on(problem, names), **alone.point.effects})
-    report("looking for a start with the effects")
+    report("searching for initial values with the effects")
     near = fit(_begun(alone), names, begin, drifting[1], refit_noise=False, iterations=FIRST_STEPS)
     return _begun(near), near.point
 

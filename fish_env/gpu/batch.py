@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from numba import cuda
 
 from fish_env.arrays import BoolArray, FloatArray
 from fish_env.envs import start
@@ -207,10 +208,13 @@ class DeviceBatch:
             if np.shape(draws) != self._draws.shape:
                 raise ConfigError(f"draws must have shape {self._draws.shape}")
             self._draws.copy_to_device(np.ascontiguousarray(draws, self.real))
+        chosen = put(mask, np.bool_)
+        cuda.synchronize()  # what was copied, was copied on another stream
         self._launch(
-            self._kernels.reset, stream, put(mask, np.bool_), draws is not None, self._data,
+            self._kernels.reset, stream, chosen, draws is not None, self._data,
             *self._start_arrays(), self._counters, self._whole,
         )  # fmt: skip
+        cuda.synchronize()
         self._started = True
         self._check_start(mask)
 

@@ -36,22 +36,22 @@ if TYPE_CHECKING:  # what a composed module defines
         N_STATES,
         PAR,
         REAL,
+        ROW_GOAL,
         ROW_GUIDE,
         ROW_OUTPUT,
         ROW_POINTS,
         ROW_REWARD,
         ROW_TIME,
         ROW_WITHIN,
-        ROW_GOAL,
         SLEW,
         SUBSTEPS,
         TIME,
         TRACE_ROW,
         TRACE_ROWS,
         TURNS,
-        U,
         WORK_ROWS,
         X0,
+        U,
         accept_actuators,
         accept_states,
         gather,
@@ -173,11 +173,9 @@ def begin(
 ):  # fmt: skip
     """Start an episode of one fish, and observe it.
 
-    Args:
-        draws: (numbers, N) uniform numbers; filled here, unless
-        given: says that the caller has filled them.
-        whole: (3, N) whole numbers of each fish.
-        ring_at: slot of the ring that the next step writes first.
+    ``draws``, (numbers, N), are its uniform numbers; unless ``given`` says that the caller has
+    filled them, they are drawn here. ``ring_at`` is the slot of the ring that the next step writes
+    first, ``whole``, (3, N), holds the whole numbers of each fish.
     """
     number = whole[EPISODE, lane]
     whole[EPISODE, lane] = number + 1
@@ -210,13 +208,12 @@ def reset(
 ):  # fmt: skip
     """Start an episode of every fish in ``mask``, (N,)."""
     lane = cuda.grid(1)
-    if lane < data.shape[1]:
-        if mask[lane]:
-            work = cuda.local.array(WORK_ROWS, REAL)
-            begin(
-                work, data, lane, draws, given, ranges, nominal, drawn_rows, drawn, slew, queue,
-                ring, counters[RING_AT], history, noise, noise_sd, obs, setup, seed, whole,
-            )  # fmt: skip
+    if lane < data.shape[1] and mask[lane]:
+        work = cuda.local.array(WORK_ROWS, REAL)
+        begin(
+            work, data, lane, draws, given, ranges, nominal, drawn_rows, drawn, slew, queue, ring,
+            counters[RING_AT], history, noise, noise_sd, obs, setup, seed, whole,
+        )  # fmt: skip
 
 
 def finish(
@@ -226,13 +223,9 @@ def finish(
 ):  # fmt: skip
     """End episodes behind a control step, and start others, as ``MODE`` says.
 
-    Args:
-        longest: control steps until truncation.
-        reward: (N,) float32, and
-        terminated: (N,) with
-        truncated: (N,) of this step, written.
-        final_obs: (N, observations) of episodes that ended, and
-        final_outputs: (len(OUTPUTS), N), written where they end.
+    An episode ends where the fish failed, or after ``longest`` control steps. ``reward``,
+    ``terminated`` and ``truncated``, (N,), are written for every fish; ``final_obs``,
+    (N, observations), and ``final_outputs``, (len(OUTPUTS), N), where an episode ends.
     """
     lane = cuda.grid(1)
     if lane < data.shape[1]:

@@ -159,10 +159,9 @@ def start_parameters(data, lane, draws, nominal, drawn_rows, drawn):
         data[ROW_PAR + drawn_rows[i], lane] = min(max(value, drawn[3, i]), drawn[4, i])
     if count > 0:
         derive(data, lane)
-    if TASK == TASK_STATION:
-        if FLOW_NORTH_ROW >= 0:
-            data[ROW_GOAL + FLOW_NORTH, lane] = data[ROW_PAR + FLOW_NORTH_ROW, lane]
-            data[ROW_GOAL + FLOW_EAST, lane] = data[ROW_PAR + FLOW_EAST_ROW, lane]
+    if TASK == TASK_STATION and FLOW_NORTH_ROW >= 0:
+        data[ROW_GOAL + FLOW_NORTH, lane] = data[ROW_PAR + FLOW_NORTH_ROW, lane]
+        data[ROW_GOAL + FLOW_EAST, lane] = data[ROW_PAR + FLOW_EAST_ROW, lane]
 
 
 def derive(data, lane):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -43,6 +44,18 @@ def tensor(array: Any) -> Any:
     if SIMULATED:
         return torch.from_numpy(array._ary)
     return torch.as_tensor(array, device="cuda")
+
+
+def wait() -> None:
+    """Wait until the device has done all that it was told."""
+    synchronise: Callable[[], None] = cuda.synchronize
+    synchronise()
+
+
+def available() -> bool:
+    """Whether there is a device, be it simulated."""
+    found: Callable[[], bool] = cuda.is_available
+    return SIMULATED or found()
 
 
 def current_stream() -> Any:

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from numba import cuda
 
 from fish_env.arrays import BoolArray, FloatArray
 from fish_env.envs import start
@@ -16,7 +15,7 @@ from fish_env.envs.options import EnvOptions
 from fish_env.envs.randomization import Randomization
 from fish_env.errors import ConfigError
 from fish_env.gpu import loops
-from fish_env.gpu.arrays import fetch, put, zeros
+from fish_env.gpu.arrays import fetch, put, wait, zeros
 from fish_env.gpu.compiled import (
     EnvironmentKernels,
     blocks_for,
@@ -209,12 +208,12 @@ class DeviceBatch:
                 raise ConfigError(f"draws must have shape {self._draws.shape}")
             self._draws.copy_to_device(np.ascontiguousarray(draws, self.real))
         chosen = put(mask, np.bool_)
-        cuda.synchronize()  # what was copied, was copied on another stream
+        wait()  # what was copied, was copied on another stream
         self._launch(
             self._kernels.reset, stream, chosen, draws is not None, self._data,
             *self._start_arrays(), self._counters, self._whole,
         )  # fmt: skip
-        cuda.synchronize()
+        wait()
         self._started = True
         self._check_start(mask)
 

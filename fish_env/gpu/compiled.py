@@ -15,6 +15,7 @@ from fish_env.envs.start import FLOW
 from fish_env.errors import ConfigError
 from fish_env.gpu import loops
 from fish_env.gpu.arithmetic import FLOAT32
+from fish_env.gpu.arrays import available
 from fish_env.gpu.goals import TASK_NUMBERS
 from fish_env.gpu.target import SIMULATED, Target
 from fish_env.model.runtime import Kernels
@@ -42,9 +43,7 @@ def check_device() -> None:
     Raises:
         ConfigError: there is none; says what to do.
     """
-    from numba import cuda
-
-    if not SIMULATED and not cuda.is_available():
+    if not available():
         raise ConfigError(
             "no CUDA GPU can be used: install the extra with `pip install robotic-fish[gpu]` on a "
             "machine with an NVIDIA GPU and its driver, or use gymnasium.make_vec on the CPU"
@@ -62,7 +61,7 @@ def threads_for(count: int) -> int:
 
 
 def _target(module: ModuleType, real: type[Any], further: Mapping[str, Any]) -> Target:
-    replacements = {module.advance_block: loops.advance_fish}
+    replacements: dict[Any, Any] = {module.advance_block: loops.advance_fish}
     if real is np.float32:
         replacements |= FLOAT32
     return Target(real, replacements, vars(module) | {"REAL": real} | dict(further))

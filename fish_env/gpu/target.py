@@ -13,12 +13,13 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from numba import config, cuda
+from numba import cuda
+from numba.core import config
 from numba.core.dispatcher import Dispatcher
 
 from fish_env.model.jit import py_function
 
-SIMULATED = bool(config.ENABLE_CUDASIM)
+SIMULATED = bool(vars(config)["ENABLE_CUDASIM"])
 """Whether CUDA is simulated in Python (``NUMBA_ENABLE_CUDASIM=1``), for tests without a GPU."""
 
 
@@ -57,7 +58,7 @@ class Target:
         if function not in self._made:
             own = self._retyped(self._replacements.get(function, function))
             options = {} if SIMULATED else {"forceinline": True}
-            self._made[function] = cuda.jit(device=True, **options)(own)
+            self._made[function] = _compile(own, device=True, **options)
         return self._made[function]
 
     def launched(self, function: Callable[..., None], **options: Any) -> Any:
@@ -67,7 +68,7 @@ class Target:
             function: what one thread does.
             **options: of ``numba.cuda.jit``; the simulator takes none.
         """
-        return cuda.jit(**({} if SIMULATED else options))(self._retyped(function))
+        return _compile(self._retyped(function), **({} if SIMULATED else options))
 
     def _retyped(self, function: Any) -> Any:
         """A copy of a function with numbers of this target, which calls device functions."""
@@ -97,6 +98,11 @@ class Target:
         if isinstance(value, np.ndarray) and value.dtype.kind == "f":
             return value.astype(self.real)
         return self._numpy if value is np else value
+
+
+def _compile(function: Callable[..., Any], **options: Any) -> Any:
+    decorate: Callable[..., Any] = cuda.jit
+    return decorate(**options)(function)
 
 
 def _numpy_for(real: type[Any]) -> types.ModuleType:

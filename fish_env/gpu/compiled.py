@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from functools import cache
 from types import ModuleType
@@ -20,6 +21,8 @@ from fish_env.gpu.goals import TASK_NUMBERS
 from fish_env.gpu.target import SIMULATED, Target
 from fish_env.model.runtime import Kernels
 
+# Of a few fish there is nothing else to launch.
+warnings.filterwarnings("ignore", message="Grid size .* under-utilization")
 THREADS = 128
 """Threads of a block."""
 REGISTERS = 255

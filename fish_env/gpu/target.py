@@ -58,7 +58,7 @@ class Target:
         if function not in self._made:
             own = self._retyped(self._replacements.get(function, function))
             options = {} if SIMULATED else {"forceinline": True}
-            self._made[function] = _compile(own, device=True, **options)
+            self._made[function] = self._compile(own, device=True, **options)
         return self._made[function]
 
     def launched(self, function: Callable[..., None], **options: Any) -> Any:
@@ -68,7 +68,11 @@ class Target:
             function: what one thread does.
             **options: of ``numba.cuda.jit``; the simulator takes none.
         """
-        return _compile(self._retyped(function), **({} if SIMULATED else options))
+        return self._compile(self._retyped(function), **({} if SIMULATED else options))
+
+    def _compile(self, function: Callable[..., Any], **options: Any) -> Any:
+        decorate: Callable[..., Any] = cuda.jit
+        return decorate(**options)(function)
 
     def _retyped(self, function: Any) -> Any:
         """A copy of a function with numbers of this target, which calls device functions."""
@@ -98,11 +102,6 @@ class Target:
         if isinstance(value, np.ndarray) and value.dtype.kind == "f":
             return value.astype(self.real)
         return self._numpy if value is np else value
-
-
-def _compile(function: Callable[..., Any], **options: Any) -> Any:
-    decorate: Callable[..., Any] = cuda.jit
-    return decorate(**options)(function)
 
 
 def _numpy_for(real: type[Any]) -> types.ModuleType:

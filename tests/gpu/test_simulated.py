@@ -33,7 +33,7 @@ def test_on_the_simulator(file):
 
 
 def test_all_files_are_run():
-    assert len(FILES) == 3
+    assert len(FILES) == 4
 
 
 def test_without_a_gpu_the_user_is_told_what_to_do(monkeypatch):

@@ -20,6 +20,7 @@ from fish_env.identification.runs import RunData
 from fish_env.identification.series import SeriesProblem, series_of
 from fish_env.inference.attribution import Attribution
 from fish_env.inference.estimate.fit import Fit
+from fish_env.inference.estimate.free import diverged
 from fish_env.inference.hypotheses import CauseId, EffectParameterId, effects_of, listed
 from fish_env.inference.preconditions import Precondition
 from fish_env.inference.probes import effect_values
@@ -30,6 +31,7 @@ from fish_env.model.state import BASE_STATES
 
 RATE_HZ = 25.0
 STEP_S = 0.02
+"""Longest step of a simulated manoeuvre; shorter where the fit has shorter ones, for quick lags."""
 SHOWN = 25.0
 """A manoeuvre shows an effect that it changes the record by more than five deviations with."""
 
@@ -146,6 +148,7 @@ def changes_on(
     nudged = [replace(fit.point, z=fit.point.z + step * np.eye(count)[i]) for i in range(count)]
     z, effects = _lanes(problem, [fit.point, *nudged, *rivals])
     changes = problem.changes(z, effects, noise, filtered)
+    changes[diverged(changes)] = 0.0  # nothing is known of what a simulation cannot follow
     return changes[:count].T / step, changes[count:].T
 
 
@@ -190,7 +193,8 @@ def flown(fit: Fit, manoeuvre: Manoeuvre) -> SeriesProblem:
 def _blank(problem: SeriesProblem, manoeuvre: Manoeuvre) -> RunData:
     """A run of zeros: prediction errors on it are the prediction, negative."""
     clock = np.arange(0.0, DURATION_S, 1.0 / RATE_HZ)
-    substeps = np.full(len(clock), int(np.ceil(1.0 / RATE_HZ / STEP_S - 1e-9)), np.int64)
+    step = min(STEP_S, problem.longest_step)
+    substeps = np.full(len(clock), int(np.ceil(1.0 / RATE_HZ / step - 1e-9)), np.int64)
     state = np.zeros(len(BASE_STATES))
     state[3] = 1.0
     state[2] = np.median([run.state0[2] for run in problem.runs])

@@ -63,16 +63,19 @@ def substituted(
         causes = tuple(signal.cause.id if c == name else c for c in current.causes)
         enough = fitter.base + leeway[name]
         coarse = _swapped(fitter, own, name, signal, enough)
-        if coarse is not None and coarse.objective < enough:
-            found.append((coarse.objective, causes, coarse))
+        if coarse is None or coarse.objective >= enough:
+            continue
+        if limit_at(own.problem, signal.cause.effect, coarse.point.effects) != name:
+            found.append((coarse.objective, causes, coarse))  # else it would act as the cause does
     others = []
     # Beside a misfit the numbers of the runs have not settled yet, and no fit is hopeless.
     give_up_above = np.inf if beside_misfit else own.objective + POLICY.out_of_reach
     for _, causes, coarse in sorted(found, key=lambda f: f[0])[:most]:
         report(f"fitting {listed(causes, ' and ')}")
         fitted = at_noise(own.problem, coarse, own.noise, 4, give_up_above)
-        if fitted is not None:
-            others.append(Explanation(causes, fitted))
+        if fitted is None or any(is_off(own.problem, fitted.point, e) for e in fitted.effects):
+            continue
+        others.append(Explanation(causes, fitted))
     found_all = [current, *others]
     if beside_misfit and others:
         report("fitting what the runs differ in")

@@ -76,6 +76,10 @@ class Effect(Protocol):
         ...
 
 
+BEYOND = 1e4
+"""Multiple of the largest plausible value at which nothing is too quick that is not at any."""
+
+
 @dataclass(frozen=True)
 class EffectFreedom:
     """A free parameter of an effect.
@@ -83,7 +87,8 @@ class EffectFreedom:
     Attributes:
         id: the parameter.
         lower: smallest value allowed.
-        upper: largest value allowed.
+        upper: largest value allowed; of what is off at infinity, the largest that the simulation
+            follows.
         step: size for finite differences, about a hundredth of what matters.
         least: values between neutral and this one are too quick to be simulated; minus infinity
             where none is.
@@ -102,12 +107,28 @@ def freedoms(effect: Effect, step: float) -> tuple[EffectFreedom, ...]:
         EffectFreedom(
             EffectParameterId(effect.name, p.name),
             p.lower,
-            p.upper,
+            min(p.upper, most_followed(effect, p, step)),
             0.02 * (p.plausible[1] - p.plausible[0]),
             least_followed(effect, p, step),
         )
         for p in effect.parameters
     )
+
+
+def most_followed(effect: Effect, parameter: EffectParameter, step: float) -> float:
+    """Largest value of a parameter that is off at infinity which RK4 steps (s) follow.
+
+    Infinity where they follow any, or none that is plausible, and for all other parameters. Beyond
+    it an effect is too quick to be simulated, and does hardly anything.
+    """
+    low, far = parameter.plausible[0], BEYOND * parameter.plausible[1]
+
+    def is_followed(value: float) -> bool:
+        return effect.is_followed({**effect.neutral, parameter.name: value}, step)
+
+    if np.isfinite(parameter.neutral) or is_followed(far) or not is_followed(low):
+        return np.inf
+    return float(bisect(lambda value: is_followed(value) - 0.5, low, far))
 
 
 def least_followed(effect: Effect, parameter: EffectParameter, step: float) -> float:

@@ -6,13 +6,21 @@ import numpy as np
 import pytest
 
 from fish_env.diagnosis.manoeuvres import DURATION_S, MENU, Manoeuvre
-from fish_env.diagnosis.next_experiment import best_of, flown, unfollowed
+from fish_env.diagnosis.next_experiment import (
+    best_of,
+    changes_on,
+    flown,
+    separation,
+    unfollowed,
+)
 from fish_env.identification.series import SeriesProblem
 from fish_env.identification.variation import SENSOR_ERRORS
 from fish_env.inference.estimate.fit import fit
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
 from fish_env.inference.verdict import Verdict
 from tests.identification.synthetic import PATHS, Setup, simulate
+from tests.inference.stated import Stated, fit_of
 
 LIMITS = {"tail_offset": 0.6, "tail_amplitude": 0.6, "tail_frequency": 2.6,
           "block_displacement": 0.01, "block_angle": 0.6}  # fmt: skip
@@ -86,3 +94,41 @@ def test_a_proposed_run_has_no_errors_of_an_old_one():
     assert np.array_equal(new.corrected, plain.corrected)
     assert not new.sensor_errors.any()
     assert np.ptp(new.corrected[:, 0]) > 0.0
+
+
+def with_quick_lag(seconds):
+    """A fit with a servo lag that steps of 0.02 s cannot follow."""
+    setup = Setup(runs=1)
+    problem = SeriesProblem(simulate(setup), paths=PATHS)
+    begin = Point(np.zeros(len(PATHS)), {EffectParameterId("servo_lag", "time_constant"): seconds})
+    return fit(problem, ("servo_lag",), begin, setup.noise, rounds=0)
+
+
+def test_a_manoeuvre_is_simulated_in_steps_that_the_fit_needs():
+    found = with_quick_lag(0.006)
+    apart = separation(found, [Point(found.point.z, {})], MENU[0])
+    assert np.abs(flown(found, MENU[0]).runs[0].measured).max() < 20.0
+    assert np.isfinite(apart).all()
+    with np.errstate(all="ignore"):
+        diverged = flown(in_long_steps(found), MENU[0]).runs[0].measured
+    assert not np.abs(diverged).max() < 100.0
+
+
+def in_long_steps(found):
+    """The fit in steps of 0.02 s, in which the lag diverges."""
+    problem = found.problem
+    longer = [run.in_long_steps() for run in problem.runs]
+    return replace(found, problem=problem.with_runs(longer))
+
+
+@pytest.mark.parametrize("nonsense", [np.nan, np.inf, 1e200])
+def test_a_rival_that_cannot_be_simulated_is_not_said_to_be_separated(nonsense):
+    def residuals(z, effects):
+        return np.full((1, 3), nonsense if z[0] > 5.0 else z[0])
+
+    problem = Stated(residuals, paths=("c",))
+    rivals = [Point(np.array([c]), {}) for c in (9.0, 2.0)]
+    fitted = fit_of(problem, point=Point(np.zeros(1), {}))
+    slopes, differences = changes_on(problem, fitted, problem.default_noise(), rivals)
+    assert slopes[:, 0] == pytest.approx(np.ones(3))
+    assert np.array_equal(differences, [[0.0, 2.0]] * 3)

@@ -1,11 +1,15 @@
 """A look-alike that was taken for an earlier cause gives way once the others are there."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from fish_env.inference.effects import DeclaredEffect, EffectParameter
 from fish_env.inference.estimate.coarse_fit import CoarseFitter
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.explanation import Explanation
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
 from fish_env.inference.substitution import substituted
 from tests.inference.stated import Stated, cause_of, effect, signal_of, size_of
@@ -49,6 +53,36 @@ def test_a_better_look_alike_takes_the_place(acting, size, fitted):
     assert best.fit.point.effects.keys() == {size_of(acting), size_of(CURRENT)}
 
 
+STIFFNESS = EffectParameterId("stiff_tail", "stiffness")
+
+
+class Stiff(DeclaredEffect):
+    """A tail that bends the less the stiffer it is, and that steps follow up to a stiffness."""
+
+    def __init__(self, followed):
+        stiffness = EffectParameter("stiffness", "Hz", np.inf, 0.1, np.inf, (1.0, 10.0))
+        super().__init__("stiff_tail", (stiffness,))
+        object.__setattr__(self, "followed", followed)
+
+    def is_followed(self, values, step):
+        return values["stiffness"] <= self.followed
+
+
+@pytest.mark.parametrize(("followed", "others"), [(30.0, 0), (300.0, 1)])
+def test_one_that_steps_cannot_follow_takes_no_place(followed, others):
+    """At the end of what they follow it explains nearly as much, and would do nothing beyond."""
+    stiff = Stiff(followed)
+
+    def residuals(z, effects):
+        late = effects[size_of(LAG)] + 1.0 / effects[STIFFNESS]
+        return np.tile(z[0] + 100.0 * (late - 0.03) * SHAPES[0], (3, 1))
+
+    own = fit(Stated(residuals, [KNOWN[LAG], stiff]), (LAG,), refit_noise=False)
+    pair = (LAG, signal_of(cause_of(stiff), 50.0))
+    found = substituted(Explanation((LAG,), own), [pair], 1, lambda step: None)
+    assert len(found) == 1 + others
+
+
 def astray(size):
     """From a large size, which explains more than a small one, the slope leads past the truth."""
     return 20.0 * float(np.interp(size, *zip(*TURNS, strict=True)))
@@ -67,3 +101,15 @@ def test_one_that_ends_switched_off_is_tried_from_each_size():
     best = substituted(now, pairs(LAG), 1, lambda step: None)[0]
     assert best.causes == (LAG, CURRENT)
     assert best.fit.point.effects[size_of(LAG)] == pytest.approx(0.2, abs=0.01)
+
+
+@pytest.mark.parametrize(("near", "others"), [(True, 0), (False, 1)])
+def test_one_that_acts_as_the_cause_does_takes_no_place(near, others):
+    """A limit of torque that is never reached limits the speed, which is a cause already."""
+    parts = {SOFT: {"size": 1.0}} if near else {}
+    both = replace(KNOWN[LAG], parts=lambda values: parts)
+    problem = swimming(SOFT, 1.5)
+    problem.known = {**problem.known, LAG: both}
+    own = fit(problem, (SOFT, CURRENT), refit_noise=False)
+    found = substituted(Explanation((SOFT, CURRENT), own), pairs(LAG), 1, lambda step: None)
+    assert len(found) == 1 + others

@@ -146,12 +146,16 @@ def plan_play(t, h, late, e, table, drive):
 
 @helper
 def close_step(t, late, e, table, drive):
-    """Remembers where the angles are at the end of a step."""
+    """Remembers where the angles are at the end of a step.
+
+    The play follows the limit, so its angle is read before the limit's own is moved on.
+    """
+    angle, rate, _ = driven(t, late, e, table, drive)
     if is_limited(e):
         drive[LIMIT] = limited(t, late, e, table, drive)[0]
     if e.servo_backlash_gap != 0.0:
-        drive[PLAY] = driven(t, late, e, table, drive)[0]
-    drive[LAST] = driven(t, late, e, table, drive)[1]
+        drive[PLAY] = angle
+    drive[LAST] = rate
 
 
 @helper

@@ -150,6 +150,24 @@ def test_long_steps_are_those_of_the_usual_freedoms_and_never_finer(dataset):
     assert all((a.substeps <= b.substeps).all() for a, b in pairs)
 
 
+def test_what_is_off_at_infinity_goes_as_far_as_steps_follow_it(dataset):
+    """Beyond, a tail that hardly bends diverges, and a fit would run there to do nothing."""
+    problem = SeriesProblem(dataset)
+    (quick,) = (f for f in problem.freedoms(["tail_flexibility"]) if f.id.name != "damping_ratio")
+    known = problem.known["tail_flexibility"]
+    assert known.is_followed({**known.neutral, quick.id.name: 0.99 * quick.upper}, problem.dt)
+    assert not known.is_followed({**known.neutral, quick.id.name: 1.01 * quick.upper}, problem.dt)
+    (shorter,) = (
+        f for f in SeriesProblem(dataset, dt=0.005).freedoms(["tail_flexibility"])
+        if f.id == quick.id
+    )  # fmt: skip
+    assert shorter.upper == pytest.approx(2.0 * quick.upper, rel=1e-3)
+    (limit,) = problem.freedoms(["servo_rate_limit"])
+    assert limit.upper == np.inf
+    (lag,) = problem.freedoms(["servo_lag"])
+    assert lag.upper == problem.known["servo_lag"].parameters[0].upper
+
+
 def test_estimates_to_be_published_are_made_in_the_usual_steps(dataset):
     """However often a fit went to long steps, and on a part of its runs."""
     usual = SeriesProblem(dataset)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
@@ -53,9 +54,9 @@ def wait() -> None:
 
 
 def available() -> bool:
-    """Whether there is a device, be it simulated."""
+    """Whether there is a device, be it simulated, and what compiles for it."""
     found: Callable[[], bool] = cuda.is_available
-    return SIMULATED or found()
+    return SIMULATED or (find_spec("numba_cuda") is not None and found())
 
 
 def current_stream() -> Any:

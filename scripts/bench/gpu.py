@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from collections.abc import Callable
 from statistics import median
 from typing import Any
 
@@ -88,9 +89,9 @@ def accuracy(precision: str, count: int, steps: int) -> dict[str, Any]:
 def speeds(options: argparse.Namespace) -> tuple[list[dict[str, Any]], list[dict[str, str]]]:
     """Rates of all contenders in one run, and who could not take part."""
     chosen = [
-        builder
-        for builder in gpu_contenders.builders(tuple(options.counts))
-        if options.only.lower() in builder[0].lower()
+        (name, tried(make))
+        for name, make in gpu_contenders.builders(tuple(options.counts))
+        if options.only.lower() in name.lower()
     ]
     contenders, missing = harness.build(chosen)
     measured = harness.measure(contenders, options.rounds, options.seconds)
@@ -109,6 +110,23 @@ def speeds(options: argparse.Namespace) -> tuple[list[dict[str, Any]], list[dict
             }
         )
     return rows, [{"name": m.name, "reason": m.reason} for m in missing]
+
+
+def tried(make: Callable[[], harness.Contender]) -> Callable[[], harness.Contender]:
+    """A contender that was run once; one that fails counts as missing, and says why.
+
+    The time of a GPU is dear: the others are to be measured all the same.
+    """
+
+    def made() -> harness.Contender:
+        try:
+            contender = make()
+            contender.run(1)
+        except Exception as error:
+            raise ImportError(f"{type(error).__name__}: {error}") from error
+        return contender
+
+    return made
 
 
 def trainings() -> list[dict[str, Any]]:

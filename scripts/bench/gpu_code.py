@@ -108,7 +108,7 @@ def _run(program: str, *arguments: object) -> str:
 
 def read(sass: str) -> tuple[list[str], list[tuple[int, int]]]:
     """Instructions in their order, and loops (first and last instruction), by jumps backwards."""
-    found = re.findall(r"/\*([0-9a-f]{4,5})\*/\s+(.*?);", sass)
+    found = re.findall(r"/\*([0-9a-f]{4,5})\*/\s+(.*?)\s*;", sass)
     place = {int(address, 16): i for i, (address, _) in enumerate(found)}
     loops = set()
     for i, (_, text) in enumerate(found):

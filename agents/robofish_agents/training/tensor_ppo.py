@@ -52,9 +52,10 @@ class Recipe:
         return replace(self, iterations=iterations)
 
 
-HOLD = Recipe()
-"""Learns `hold` in still water, with HOLD_FISH fish."""
-HOLD_FISH = 1024
+HOLD = Recipe(minibatches=4, learning_rate=3e-3)
+"""Learns `hold` in still water, with HOLD_FISH fish, in few gradient steps: on a GPU, a minibatch
+takes about as long whatever its size."""
+HOLD_FISH = 2048
 
 
 class ActorCritic(nn.Module):

@@ -151,7 +151,7 @@ def located(name: str | Path, folder: Path | None = None) -> Path:
         ) from None
     except (ValueError, OSError) as error:
         why = error.strerror if isinstance(error, OSError) else "a character no path can hold"
-        raise Unreadable(f"{shown(str(name))} is no path ({why})", "correct it") from None
+        raise Unreadable(f"{shown(str(name))} is not a path ({why})", "correct it") from None
 
 
 def read_bytes(path: Path, most: int = MOST_TEXT_BYTES) -> bytes:
@@ -263,7 +263,7 @@ class Loader(yaml.SafeLoader):
             if not isinstance(key_node, yaml.ScalarNode):
                 self._refuse(key_node, "a key must be a word or a number")
             if key_node.value in seen:
-                self._refuse(key_node, f"the key '{short(key_node.value)}' is there twice")
+                self._refuse(key_node, f"the key '{short(key_node.value)}' occurs twice")
             seen.add(key_node.value)
         return super().construct_mapping(node, deep=True)
 

@@ -300,7 +300,7 @@ class Simulator:
         if beyond.size:
             warnings.warn(
                 f"{self.fish.name}: block displacement {beyond[0]:g} m is beyond the crank's reach "
-                f"of {low:.4f} to {high:.4f} m; simulated as asked",
+                f"of {low:.4f} to {high:.4f} m; simulated as commanded",
                 stacklevel=3,
             )
 

@@ -36,12 +36,13 @@ gym.make("fish_env:RoboticFish3D-v0", effects={"added_mass": {"surge": 0.2, "swa
 ```
 
 In the equations, *xi* is the tail angle and *cmd* the commanded angle. *V_rel* is the velocity
-through the water and *omega* the angular velocity, both in the body frame. "Plausible" is the range
-that a robotic fish of 29 cm and 2 kg may show, and "possible" the range that is accepted. Effects
-of one section that act on the same quantity act in the order of this page. You can add [your own
+through the water and *omega* the angular velocity, both in the body frame. The column "plausible"
+has the range that a robotic fish of 29 cm and 2 kg may show. The column "possible" has the range
+that is accepted. Effects of one section that act on the same quantity act in the order of this
+page. You can add [your own
 effect](your-own.md#your-own-effect) in a Python file.
 
-The first line of each entry says what one observes.
+The first line of each entry says what can be observed.
 """
 UNSEARCHED = "It can be simulated, and fitted on demand. `robofish diagnose` does not test it."
 

@@ -49,8 +49,9 @@ def speed(folder: Path = RESULTS) -> str:
     own = [row for row in record["measured"] if row["name"].startswith(OURS)]
     return "\n".join(
         [
-            f"* Speed, in control steps of 0.1 s: {', '.join(map(_speed_words, own))} "
-            f"({machine['cores']} cores of {machine['cpu']}, {record['date']}).",
+            f"* Speed, in control steps of 0.1 s ({machine['cores']} cores of {machine['cpu']}, "
+            f"{record['date']}):",
+            *(f"    * {_speed_words(row)}" for row in own),
             *(f"* {_verdict(verdict)}" for verdict in record["verdicts"]),
         ]
     )
@@ -74,7 +75,7 @@ def _verdict(verdict: Mapping[str, Any]) -> str:
 
 
 def diagnosis(folder: Path = DIAGNOSIS) -> str:
-    """How often the latest full run of the hidden-effect suite was right, in one line."""
+    """How often the latest full run of the hidden-effect suite was right, as a list."""
     files = sorted(folder.glob("diagnosis-[0-9]*.json"))
     if not files:
         return (
@@ -83,8 +84,8 @@ def diagnosis(folder: Path = DIAGNOSIS) -> str:
         )
     record = json.loads(files[-1].read_text(encoding="utf-8"))
     rates = {title: record["overall"][key] for key, title in HEADLINES.items()}
-    known = [f"{title} in {_share(rate)}" for title, rate in rates.items() if rate]
-    return f"* Diagnosis of {record['cases']} hidden cases, {record['date']}: {', '.join(known)}."
+    known = [f"    * {title} in {_share(rate)}" for title, rate in rates.items() if rate]
+    return "\n".join([f"* Diagnosis of {record['cases']} hidden cases, {record['date']}:", *known])
 
 
 HEADLINES = {
@@ -103,9 +104,9 @@ def _share(rate: Mapping[str, float]) -> str:
 def statements(page: Path = STATEMENTS) -> str:
     """How many of the paper's statements are held, in one line."""
     text = page.read_text(encoding="utf-8").partition("\n## ")[0]
-    total = re.search(r"(\d+) of (\d+) statements are held", text)
+    total = re.search(r"reproduces (\d+) of (\d+) statements", text)
     if total is None:
-        raise ValueError(f"{page}: no sentence 'N of M statements are held'")
+        raise ValueError(f"{page}: no sentence 'reproduces N of M statements'")
     motions: dict[str, list[bool]] = {}
     for line in text.splitlines():
         cells = [cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]]

@@ -70,11 +70,11 @@ def in_words(swims: list[Episode], config: EnvConfig) -> list[str]:
     limits = config.tree["success"]
     count = sum(episode.succeeded for episode in swims)
     return [
-        f"{count} of {len(swims)} swims from random starts ended with depth within "
+        f"{count} of {len(swims)} swims from random starts succeeded: depth within "
         f"{100 * limits['depth']:g} cm, heading within {np.degrees(limits['heading']):.3g} degrees "
         f"and speed within {100 * limits['speed']:g} % for {limits['time']:g} s.",
-        f"in the last {JUDGED_S:g} s the typical swim is off by at most "
-        f"{_errors(swims, np.median)}; the worst of all by {_errors(swims, np.max)}.",
+        f"largest errors in the last {JUDGED_S:g} s, median over the swims: "
+        f"{_errors(swims, np.median)}. Maximum over the swims: {_errors(swims, np.max)}.",
     ]
 
 
@@ -87,7 +87,7 @@ def _errors(swims: list[Episode], over: Callable[[list[float]], Any]) -> str:
     speed = float(over([end.worst("speed_error") / end.worst("goal_speed") for end in ends]))
     return (
         f"{100 * depth:.1f} cm, {np.degrees(heading):.1f} degrees over a tail beat "
-        f"({np.degrees(instant):.1f} at an instant) and {100 * speed:.0f} % of the speed"
+        f"({np.degrees(instant):.1f} instantaneous) and {100 * speed:.0f} % of the speed"
     )
 
 

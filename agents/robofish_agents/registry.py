@@ -55,8 +55,8 @@ def _policies(name: str, task: str) -> list[Agent]:
     paths = policies.shipped(task) if name == "pretrained" else _files(Path(name))
     if not paths:
         raise ConfigError(
-            f"agent '{name}': none of pid, mppi, pretrained, and no policy file or folder with "
-            f"any; `robofish train` makes one"
+            f"agent '{name}': give pid, mppi, pretrained, a policy file, or a folder with policy "
+            "files; `robofish train` writes one"
         )
     return [policies.PretrainedPolicy.load(path) for path in paths]
 

@@ -157,13 +157,13 @@ def _in_words(episode: Episode, follower: PathFollower | None) -> str:
     verdict = "A success" if episode.succeeded else "No success"
     if end.worst("place_error") > 0:
         distance = 100 * end.worst("place_error")
-        return f"{verdict}: over the last 10 s it was at most {distance:.1f} cm from its place."
+        return f"{verdict}: over the last 10 s it was at most {distance:.1f} cm from the place."
     beside = 100 * end.worst("cross_track_error")
     return (
-        f"{verdict}: over the last 10 s it was off by at most "
+        f"{verdict}. Largest errors over the last 10 s: "
         f"{f'{beside:.1f} cm beside its path, ' if beside > 0 else ''}"
         f"{100 * end.worst('depth_error'):.1f} cm in depth, "
-        f"{np.degrees(end.worst('heading_error')):.1f} degrees over a tail beat and "
+        f"{np.degrees(end.worst('heading_error')):.1f} degrees over a tail beat, "
         f"{100 * end.worst('speed_error') / end.worst('goal_speed'):.0f} % of the speed."
     )
 

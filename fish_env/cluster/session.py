@@ -49,8 +49,8 @@ class ClusterSettings:
         """
         if self.address is not None and (self.cpus is not None or self.temp is not None):
             raise ConfigError(
-                "--address: --cpus and --temp belong to a cluster on this machine; leave them out, "
-                "the cluster at the address has its own"
+                "--address: --cpus and --temp apply only to a cluster on this machine; "
+                "leave them out"
             )
         if self.cpus is not None and self.cpus < 1:
             raise ConfigError(f"--cpus {self.cpus}: at least 1")

@@ -176,7 +176,7 @@ def _print_steady(console: Console, comparison: SteadyComparison) -> None:
 
 def _worst_table(comparison: SteadyComparison) -> Table:
     table = _table(
-        "Most wrong", "condition", "observation", "unit", "measured", "simulated", "error"
+        "Largest errors", "condition", "observation", "unit", "measured", "simulated", "error"
     )
     for name in comparison.observations:
         unit, factor = shown_unit(name)

@@ -40,8 +40,8 @@ def compare_with_a_real_fish(console: Console, out: Path) -> list[Path]:
     with console.status(f"simulating {len(measured.ids)} swims (the first time: compiling)"):
         comparison = compare_steady(measured, load_fish(measured.fish))
     console.print(
-        f"{len(measured.ids)} swims of a real robotic fish, against its simulation with starting "
-        "parameters that no data have corrected yet:"
+        f"{len(measured.ids)} swims of a real robotic fish, compared with a simulation whose "
+        "parameters were not fitted to them:"
     )
     for sentence in in_words(comparison):
         console.print(f"• {sentence}", highlight=False)
@@ -55,8 +55,8 @@ def diagnose_trials(console: Console, out: Path) -> list[Path]:
     from fish_env.diagnosis.pipeline import diagnose
 
     console.print(
-        "Six runs of 10 s from a stand-in for a robot. Its data are simulated, with noise, and it "
-        "has one fault that the simulation does not know. What is it?"
+        "Six runs of 10 s of a simulated robot, with sensor noise. It has one fault that the model "
+        "does not include. The diagnosis searches for it."
     )
     folder = out / ANSWER.parent
     with console.status("reading") as status:
@@ -69,7 +69,7 @@ def diagnose_trials(console: Console, out: Path) -> list[Path]:
 
 GROUP = "robofish.demo"
 PARTS: dict[str, Part] = {
-    "What does the simulation get wrong?": diagnose_trials,
+    "Diagnosis of a simulated robot": diagnose_trials,
     "A real fish and its simulation": compare_with_a_real_fish,
 }
 """Title -> what is done, in this order."""

@@ -89,7 +89,7 @@ def _check_inputs(measured: Dataset, fish: FishParams) -> None:
 
 
 def print_fit(console: Console, result: DatasetFit) -> None:
-    """Prints estimates (SI) beside what was believed before, noise, conditioning and errors."""
+    """Prints estimates (SI) beside the values before, noise, conditioning and errors."""
     table = Table(box=box.SIMPLE, title=result.dataset, padding=(0, 1, 0, 0))
     table.add_column("parameter", no_wrap=True)
     for heading in ("before", "found, 95 % interval", "moved"):
@@ -100,13 +100,13 @@ def print_fit(console: Console, result: DatasetFit) -> None:
     _print_noise(console, result)
     left = float(np.sqrt(np.mean(result.fit.linearised.residuals**2)))
     console.print(
-        f"prediction errors: {left:.2f} of what noise explains; "
+        f"prediction errors: {left:.2f} times the noise; "
         f"condition number {result.fit.condition:.2g}"
     )
     if result.fit.at_bounds:
         console.print(f"at a bound: {', '.join(map(str, result.fit.at_bounds))}")
     if result.unseen:
-        console.print(f"not fitted, as these runs do not show it: {', '.join(result.unseen)}")
+        console.print(f"not fitted, because these runs do not show it: {', '.join(result.unseen)}")
     for step in result.steps:
         verdict = "added" if step.added else "not added"
         console.print(

@@ -142,8 +142,8 @@ def import_logs(
     _draw(console, imported, out)
     if not yes:
         raise DatasetError(
-            f"{out}: no dataset is written, as the mapping above is guessed and nobody can confirm "
-            "it here. Give --yes to accept it, or --mapping with a mapping of your own."
+            f"{out}: no dataset was written, because the mapping above is a guess and there is no "
+            "terminal to confirm it. Give --yes to accept it, or --mapping with your own mapping."
         )
     return _write(console, plan, imported, out)
 
@@ -151,7 +151,7 @@ def import_logs(
 def _check_mapping(out: Path) -> None:
     if (out / MAPPING).exists():
         raise DatasetError(
-            f"{out / MAPPING}: a mapping is there already. Use it with --mapping {out / MAPPING}, "
+            f"{out / MAPPING}: this mapping already exists. Use it with --mapping {out / MAPPING}, "
             "or give --out another folder."
         )
 
@@ -162,7 +162,7 @@ def _build(
     for key, remedy in (("fish", "a fish's name or file"), ("frame", FRAMES)):
         if key not in content:
             raise DatasetError(
-                f"the logs do not tell the {key}: give --{key} {remedy}, or write `{key}:` in the "
+                f"the logs do not name the {key}: give --{key} {remedy}, or write `{key}:` in the "
                 "mapping."
             )
     plan = parse_plan(content, file or out / MAPPING)

@@ -35,7 +35,7 @@ def run_paper(console: Console, out: Path, json_file: Path | None = None) -> Non
     console.print(_table("The paper's statements", statements))
     console.print(_table("Turning with a lagging servo", with_servo_lag(study)))
     held = sum(s.held for s in statements)
-    console.print(f"{held} of {len(statements)} statements are held by the model without effects")
+    console.print(f"the model without effects reproduces {held} of {len(statements)} statements")
     console.print(f"written: {', '.join(str(path) for path in written)}", soft_wrap=True)
     console.print(f"pictures: {len(pictures)} in {out} (png and pdf)", soft_wrap=True)
     if json_file is not None:

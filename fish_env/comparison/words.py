@@ -38,7 +38,7 @@ def _steady_sentence(comparison: SteadyComparison, observation: ObservationCompa
     if worst:
         condition, _, measured, simulated = worst[0]
         words += (
-            f". Most wrong in {condition}: {factor * simulated:.3g} {unit} simulated, "
+            f". Largest error in {condition}: {factor * simulated:.3g} {unit} simulated, "
             f"{factor * measured:.3g} {unit} measured"
         )
     return f"{words}.{_trend(observation.trend)}"
@@ -91,5 +91,5 @@ def _channel_sentence(comparison: RunsComparison, name: str) -> str:
         f"{name}: RMSE {factor * overall['rmse']:.3g} {unit}, bias "
         f"{factor * overall['bias']:+.3g} {unit}"
         + (f", fit {fit:.0f} %" if fit is not None else "")
-        + f" on average; most wrong in {worst} ({factor * rmse(groups[worst]):.3g} {unit})."
+        + f" on average; largest in {worst} ({factor * rmse(groups[worst]):.3g} {unit})."
     )

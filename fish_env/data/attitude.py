@@ -67,7 +67,7 @@ def _check_order(quaternion: FloatArray, place: Place) -> None:
     scalar_last = 1.0 - 2.0 * np.sum(quaternion[:, 0:2] ** 2, axis=1)
     if np.nanmedian(declared) < TILTED and np.nanmedian(scalar_last) > UPRIGHT:
         raise place.at(column=",".join(QUATERNION)).refuse(
-            "as declared the fish swims on its side or back, and with the scalar as the last of "
-            "the four it swims upright",
+            "as declared the fish swims on its side or back; with the scalar as the last of the "
+            "four it swims upright",
             "Name the columns so that qw is the scalar; the order is qw, qx, qy, qz",
         )

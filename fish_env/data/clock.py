@@ -75,7 +75,7 @@ def _date(begins: float, table: Table) -> str:
         return datetime.fromtimestamp(begins, UTC).isoformat(timespec="milliseconds")
     except (ValueError, OverflowError, OSError):
         raise table.at(TIME, table.rows[0]).refuse(
-            f"{begins:.4g} s is no date", "Correct the time or its unit"
+            f"{begins:.4g} s is not a date", "Correct the time or its unit"
         ) from None
 
 
@@ -87,7 +87,7 @@ def _from_text(table: Table) -> FloatArray:
     kinds = {stamp[1] for stamp in stamps}
     if len(kinds) > 1:
         raise table.at(TIME).refuse(
-            f"some stamps have {' and some '.join(sorted(kinds))}", "Write all of them alike"
+            f"some stamps have {' and some '.join(sorted(kinds))}", "Write all stamps alike"
         )
     return np.array([(stamp - stamps[0][0]).total_seconds() for stamp, _ in stamps])
 
@@ -119,7 +119,7 @@ def _since_midnight(cell: str, place: Place) -> timedelta:
         of_day = time_of_day.fromisoformat(cell)
     except ValueError:
         raise place.refuse(
-            f"'{cell}' is no time in ISO 8601", "Write it as 2026-05-01T12:00:00.040"
+            f"'{cell}' is not a time in ISO 8601", "Write it as 2026-05-01T12:00:00.040"
         ) from None
     midnight = datetime.min.replace(tzinfo=of_day.tzinfo)
     return datetime.combine(midnight, of_day) - midnight

@@ -93,7 +93,7 @@ def parse_clock(top: Section) -> Clock:
         return Clock(TIME, unit, declared=True)
     if isinstance(column := top.content["time"], str):
         raise top.at("time").refuse(
-            f"'{short(column)}' alone does not tell the unit",
+            f"'{short(column)}' alone does not give the unit",
             f"Write it as {{column: {short(column)}, unit: s}}, with the unit of your clock",
         )
     section = top.section("time")
@@ -118,6 +118,6 @@ def check_columns(columns: dict[str, Column], clock: Clock, top: Section) -> Non
         if column.name in read:
             raise top.place.refuse(
                 f"{name} and {read[column.name]} are both read from the column '{column.name}'",
-                "Give each a column of its own",
+                "Give each its own column",
             )
         read[column.name] = name

@@ -217,7 +217,8 @@ def _parse_noise(section: Section, channels: Mapping[str, Unit]) -> dict[str, fl
         value = section.number(name)
         if value <= 0.0:
             raise section.at(name).refuse(
-                f"{value} is no one-sigma value", "Give a positive one, or leave it to the data"
+                f"{value} is not a standard deviation",
+                "Give a positive one, or leave it out to estimate it",
             )
         if units[name].name == "rad" and value > 1.0:
             raise section.at(name).refuse(
@@ -236,7 +237,7 @@ def _parse_runs(top: Section) -> tuple[RunEntry, ...]:
         twice = [value for value, count in Counter(values).items() if count > 1]
         if twice:
             raise top.at("runs").refuse(
-                f"two runs have the {what} '{twice[0]}'", f"Give each run a {what} of its own"
+                f"two runs have the {what} '{twice[0]}'", f"Give each run its own {what}"
             )
     return tuple(entries)
 

@@ -95,7 +95,7 @@ def check_turning(
     if wound.size:
         turns = abs(angle[wound[0]]) / (2.0 * math.pi)
         reason = f"{angle[wound[0]]:.6g} rad is {turns:.1f} turns, more than a fish makes by then"
-        remedy = ", or take off the whole turns it had made before the run"
+        remedy = ", or subtract the whole turns it had made before the run"
         raise _refuse_degrees(reason, unit, place.at(rows[measured[wound[0]]]), remedy)
     rate, first = _turning_rate(time, angle)
     check_rate(rate, unit, [rows[index] for index in measured[first]], place)

@@ -61,7 +61,7 @@ def _check_fractions(fractions: tuple[float, float, float]) -> FloatArray:
     possible = shares.shape == (3,) and bool((shares >= 0.0).all())
     if not possible or not np.isclose(shares.sum(), 1.0):
         raise DatasetError(
-            f"fractions {fractions} are no shares of fit, select and final; "
+            f"fractions {fractions} are not shares of fit, select and final; "
             "give three numbers of at least 0 that sum to 1."
         )
     return shares

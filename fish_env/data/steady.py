@@ -58,7 +58,7 @@ def _read_ids(table: Table) -> tuple[str, ...]:
     for row, id in zip(table.rows, ids, strict=True):
         if ids.count(id) > 1:
             raise table.place.at(row, ID).refuse(
-                f"two rows have the id '{id}'", "Give each row an id of its own"
+                f"two rows have the id '{id}'", "Give each row its own id"
             )
     return ids
 

@@ -80,7 +80,7 @@ def parse_unit(name: str, quantity: Quantity, place: Place) -> Unit:
     remedy = f"Use one of: {', '.join(fitting)}, or another spelling of such a unit"
     if name.lower() in _PIXELS:
         raise place.refuse(
-            "a pixel has no size of its own",
+            "a pixel has no fixed size",
             f"Give the size of one as `scale`, with the unit '{next(iter(fitting))}'",
         )
     if _GRAD.fullmatch(name):

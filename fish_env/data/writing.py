@@ -97,7 +97,7 @@ def check_free(folder: Path, names: Iterable[str]) -> None:
     for name in names:
         if (folder / name).exists():
             raise DatasetError(
-                f"{folder / name} is there already and would be lost; give another folder."
+                f"{folder / name} already exists and would be overwritten; give another folder."
             )
 
 

@@ -160,7 +160,7 @@ def budget_entry(budget: Budget | None) -> Plain | None:
 
 
 def residual_entry(model: ResidualModel | None) -> Plain | None:
-    """An empirical model of what is left: wrench = coefficient * function / function_rms."""
+    """An empirical model of the residual: wrench = coefficient * function / function_rms."""
     if model is None:
         return None
     judged = model.judged
@@ -190,7 +190,7 @@ def _term(term: Term) -> Plain:
 
 
 def disturbance_entry(noise: NoiseModel) -> Plain:
-    """The random push that a fit needs."""
+    """The disturbance that a fit needs."""
     return {
         "force_sd": noise.force_sd,
         "moment_sd": noise.moment_sd,
@@ -213,7 +213,7 @@ def precondition_entry(p: Precondition) -> Plain:
 
 
 def experiment_entry(proposal: Proposal | None) -> Plain:
-    """The manoeuvre to fly next, if there is one."""
+    """The manoeuvre to record next, if there is one."""
     if proposal is None:
         return {"schedule": [], "separates": []}
     return {

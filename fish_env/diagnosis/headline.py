@@ -134,8 +134,8 @@ def _next_step(answer: Answer) -> str:
     if proposal.get("schedule"):
         aims = list(proposal.get("separates", ()))
         swim = (
-            f"swim “{proposal.get('manoeuvre', 'the schedule')}” ({EXPERIMENT_FILE}), add the run "
-            "to the dataset and diagnose again"
+            f"record a run of “{proposal.get('manoeuvre', 'the schedule')}” ({EXPERIMENT_FILE}), "
+            "add it to the dataset and diagnose again"
         )
         if aims:
             seen = "it separates the explanations" if verdict == "ambiguous" else "it would show "
@@ -148,7 +148,7 @@ def _next_step(answer: Answer) -> str:
         written = "; ".join(f"`{fix}`" for fix in fixes)
         if len(written) > LONGEST_FIX:
             written = "`fix` under `inputs` in diagnosis.json"
-        return f"write {written or 'what is right'} into dataset.yaml and diagnose again."
+        return f"write {written or 'the correct values'} into dataset.yaml and diagnose again."
     if answer.get("quick") and verdict in ("outside_library", "partial"):
         return "diagnose again without --quick."
     if verdict == "ambiguous":
@@ -158,7 +158,7 @@ def _next_step(answer: Answer) -> str:
     if verdict in ("cause", "parameters", "partial"):
         return "simulate and train with extended.yaml, a fish file with what was found."
     if verdict == "outside_library":
-        return "read “Location of the misfit”, then add an effect of your own from a Python file."
+        return "read “Location of the misfit”, then add your own effect from a Python file."
     return swim or "use the refitted coefficients; nothing needs to be added."
 
 
@@ -167,7 +167,7 @@ def _caveats(answer: Answer) -> str:
     if answer.get("quick"):
         found.append("quick mode: rival causes are not compared and weak causes may be missed")
     if _doubtful(answer):
-        found.append("held-out predictions hardly improve with what is named")
+        found.append("the named causes hardly improve held-out predictions")
     gain = answer.get("gain")
     if gain and gain["final_runs"] and not enough_runs(len(gain["final_runs"])):
         noun = _noun(answer)

@@ -35,7 +35,7 @@ def load_runs(folder: str | Path) -> Dataset:
     if not isinstance(dataset, Dataset):
         raise DatasetError(
             f"{folder}: a table of steady motion; this needs runs over time, "
-            "use `robofish compare` or `robofish diagnose` with it instead"
+            "use `robofish compare` or `robofish diagnose` for tables"
         )
     return dataset
 
@@ -61,8 +61,8 @@ def check_runs(dataset: Dataset) -> None:
         )
     for first, second in identical_runs(dataset.runs):
         raise DatasetError(
-            f"{dataset.name}: runs {first} and {second} have the same samples, which repeats never "
-            "have; remove one, it would count twice"
+            f"{dataset.name}: runs {first} and {second} have the same samples, unlike real "
+            "repeats; remove one of them, because it would count twice"
         )
     check_seconds(dataset)
     for run in dataset.runs:
@@ -78,7 +78,7 @@ def _check_run(name: str, run: Run) -> None:
         present = values[np.isfinite(values)]
         if len(present) >= 10 and np.ptp(present) == 0.0:
             raise DatasetError(
-                f"{place}: {channel} is {present[0]:g} in every sample, as of a broken sensor; "
+                f"{place}: {channel} is {present[0]:g} in every sample, like a broken sensor; "
                 "leave its cells empty in this run, or leave out the run"
             )
         check_stuck(place, read, channel)
@@ -102,7 +102,7 @@ def _check_clock(place: str, run: Run) -> None:
     if gaps[longest] > LONGEST_GAP_S:
         raise DatasetError(
             f"{place}: the clock jumps by {gaps[longest]:.4g} s at t = {run.time_s[longest]:.4g} s;"
-            " times are in seconds: correct it, or make two runs of it"
+            " times are in seconds: correct the clock, or split the run"
         )
 
 

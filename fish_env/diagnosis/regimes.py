@@ -165,11 +165,11 @@ class Localisation:
         place = self.sits_in
         if place is None:
             return f"{said} The misfit is spread evenly over all regimes."
+        there, overall = np.sqrt(place.energy), np.sqrt(self.overall[place.channel])
         return (
-            f"{said} It depends most on the regime in {place.channel} at "
-            f"{place.regime.replace('_', ' ')} {place.bin}: {np.sqrt(place.energy):.2f} times the "
-            f"noise, against {np.sqrt(self.overall[place.channel]):.2f} in {place.channel} overall "
-            f"(p = {place.p:.2g} over the whole table)."
+            f"{said} The regime with the largest excess is {place.regime.replace('_', ' ')} "
+            f"{place.bin}. There the misfit in {place.channel} is {there:.2f} times the noise, "
+            f"against {overall:.2f} overall (p = {place.p:.2g} over the whole table)."
         )
 
     def _place(self, c: int, regime: Regime, b: int) -> Place:

@@ -63,7 +63,7 @@ def real_actions(actions: npt.ArrayLike, shape: tuple[int, ...]) -> npt.NDArray[
         raise ConfigError(f"actions must be numbers in shape {shape}: {error}") from None
     if given.dtype.kind not in "fiub":
         raise ConfigError(
-            f"actions of type {given.dtype} are no real numbers; give shape {shape}, float32"
+            f"actions of type {given.dtype} are not real numbers; give shape {shape}, float32"
         )
     if given.shape != shape:
         raise ConfigError(f"actions have shape {shape}, not {given.shape}")

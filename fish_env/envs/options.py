@@ -170,8 +170,8 @@ def _check_effects(wanted: EffectValues, model: ExtendedModel) -> None:
     idle = [e.name for e in model.measurement if e.name in wanted and not e.acts_on_motion]
     if idle:
         raise ConfigError(
-            f"effects {idle} change recordings, not the motion: for what the agent sees there are "
-            "observation_noise and observation_delay_s"
+            f"effects {idle} change recordings, not the motion; for the observations of an agent "
+            "use observation_noise and observation_delay_s"
         )
 
 

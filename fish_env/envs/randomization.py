@@ -266,7 +266,7 @@ def _correlated(
     except np.linalg.LinAlgError:
         raise ConfigError(
             "randomization: the covariance of the fish's posterior is singular beyond rounding; "
-            "use 'prior', or fit the fish anew"
+            "use 'prior', or fit the fish again"
         ) from None
     centre = np.asarray(mean, float)
     return Randomization(paths, np.zeros(count, bool), centre, sd, factor, lower, upper)

@@ -104,8 +104,8 @@ class EpisodeRecorder(gym.Wrapper[Any, Any, Any, Any]):
         while isinstance(inner, gym.Wrapper):
             if not isinstance(inner, PLAIN_WRAPPERS):
                 raise ConfigError(
-                    f"EpisodeRecorder: {type(inner).__name__} lies inside and may change what is "
-                    "recorded; put it around the recorder"
+                    f"EpisodeRecorder: {type(inner).__name__} is inside the recorder and may "
+                    "change what is recorded; wrap the recorder in it instead"
                 )
             inner = inner.env
         if not isinstance(inner, RoboticFish3DEnv) or env.spec is None:
@@ -205,8 +205,8 @@ def read_episode(path: str | Path) -> Episode:
         raise ConfigError(f"{file}: {error}") from None
     except UNREADABLE as error:
         raise ConfigError(
-            f"{file}: not a readable episode ({short(str(error))}); it is truncated, damaged or "
-            "foreign; record it again"
+            f"{file}: not a readable episode ({short(str(error))}); it is truncated or "
+            "damaged; record it again"
         ) from None
 
 
@@ -288,7 +288,7 @@ def _check_named(file: Path, about: Mapping[str, Any]) -> None:
     if about.get("environment") != ENV_ID:
         raise ConfigError(
             f"{file}: recorded in {short(str(about.get('environment')))}, and this is {ENV_ID}, "
-            "which behaves otherwise; install the version of robotic-fish that has it"
+            "which behaves differently; install the version of robotic-fish that has it"
         )
     if not isinstance(about.get("options"), dict) or not isinstance(about.get("reset"), dict):
         raise ConfigError(f"{file}: it has no options or no reset; record it again")

@@ -42,7 +42,7 @@ class RoboticFish3DEnv(Watched, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.
 
     One servo swings a rigid tail. Inside, a weight block slides fore and aft and swings sideways.
     Inertial frame: x north, y east, z down (depth). Body frame: x forward, y starboard, z down.
-    Actions come at 10 Hz, the physics runs at 100 Hz (RK4); both can be set.
+    The control rate is 10 Hz and the physics rate 100 Hz (RK4). Both can be set.
 
     ## Action space
 
@@ -92,8 +92,9 @@ class RoboticFish3DEnv(Watched, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.
     Every task gives its goal as depth, heading and speed, so an agent of one task runs on all.
 
     * ``hold``: constant depth and heading. ``track``: signals that step, ramp or oscillate.
-    * ``path``: a helix, legs between waypoints, or a figure of eight seen from the side: a circle
-      on which the depth oscillates twice a turn. A vertical loop would make the fish tumble.
+    * ``path``: a helix, legs between waypoints, or a figure of eight seen from the side. The
+      figure is a circle on which the depth oscillates twice a turn. A vertical loop would make
+      the fish tumble.
       Line-of-sight guidance computes depth, heading and their rates from path and position. It
       does not know the current; its integral removes the error that a current causes.
     * ``station``: a place to keep. The fish cannot stop, because it coasts for a metre. In a
@@ -123,18 +124,32 @@ class RoboticFish3DEnv(Watched, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.
 
     ## End
 
-    An episode is terminated if the fish leaves the tank (surface, bottom, walls if set), if it
-    tumbles by more than 80 degrees, or if the simulation diverges. ``info["failure"]`` says which
-    (:class:`fish_env.envs.layout.Failure`). It is truncated only by the time limit (400 steps).
+    An episode is terminated if one of these conditions holds:
+
+    * the fish leaves the tank (surface, bottom, walls if set);
+    * it tumbles by more than 80 degrees;
+    * the simulation diverges.
+
+    ``info["failure"]`` says which (:class:`fish_env.envs.layout.Failure`). An episode is truncated
+    only by the time limit (400 steps).
 
     ## Info
 
-    ``reward_*`` and ``cost_*`` terms; ``depth_error`` (m), ``heading_error`` (rad, over the last
-    beat), ``heading_error_instant`` (rad), ``speed_error`` (m/s), ``depth, north, east`` (m),
-    ``heading`` (rad, over the last beat), ``speed`` (m/s), ``goal_depth``, ``goal_heading``,
-    ``goal_speed``, ``power`` (W), ``within_tolerance_s``: for how long depth, heading and speed
-    have been within 5 cm, 5 degrees and 20 %, ``is_success``: 1 once that is 10 s, ``failure``,
-    ``time_s``.
+    | key | meaning |
+    | --- | --- |
+    | ``reward_*``, ``cost_*`` | terms of the reward |
+    | ``depth_error`` | m |
+    | ``heading_error`` | rad, over the last beat |
+    | ``heading_error_instant`` | rad |
+    | ``speed_error`` | m/s |
+    | ``depth``, ``north``, ``east`` | m |
+    | ``heading`` | rad, over the last beat |
+    | ``speed`` | m/s |
+    | ``goal_depth``, ``goal_heading``, ``goal_speed`` | the goal |
+    | ``power`` | W |
+    | ``within_tolerance_s`` | s for which depth, heading, speed are within 5 cm, 5 degrees, 20 % |
+    | ``is_success`` | 1 as soon as ``within_tolerance_s`` is 10 s |
+    | ``failure``, ``time_s`` | why the episode terminated; time (s) |
 
     The task ``path`` adds ``cross_track_error`` (m, to starboard of the path, seen from above) and
     ``path_progress`` (0 to 1, the completed share of the path). The task ``station`` adds
@@ -153,9 +168,9 @@ class RoboticFish3DEnv(Watched, gym.Env[npt.NDArray[np.float32], npt.NDArray[np.
       ``angular_velocity_body`` (rad/s), ``tail_phase`` (rad);
     * ``goal``: ``depth`` (m), ``heading`` (rad), ``cruise_speed`` (m/s) or any field of
       :data:`fish_env.envs.layout.GOAL`;
-    * ``goal`` of a path: 2 to 32 ``waypoints`` (n, 3): north, east, depth (m); or ``path_radius``
-      (m, negative to port) with ``path_pitch`` (m deeper in a turn), ``path_swing`` and
-      ``path_length`` (m);
+    * ``goal`` of a path through points: 2 to 32 ``waypoints`` (n, 3): north, east, depth (m);
+    * ``goal`` of a round path: ``path_radius`` (m, negative to port) with ``path_pitch`` (m deeper
+      in a turn), ``path_swing`` and ``path_length`` (m);
     * ``goal`` of a place, or the start of a path: ``north`` and ``east`` (m);
     * ``parameters``: values by path, as in the fish file.
 

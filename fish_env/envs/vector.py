@@ -56,9 +56,9 @@ class RoboticFish3DVectorEnv(Watched, VectorEnv[Float32Array, Float32Array, npt.
         max_episode_steps: control steps until truncation. A fish that fails at its last step is
             terminated, not truncated.
         autoreset_mode: NEXT_STEP (default): the step after an end returns the reset observation
-            and zero reward; SAME_STEP: the step that ends an episode returns the first
-            observation of the next, with the last one in ``info["final_obs"]`` and its info in
-            ``info["final_info"]``; DISABLED: the caller resets with
+            and zero reward. SAME_STEP: the step that ends an episode returns the first
+            observation of the next. ``info["final_obs"]`` has the last observation, and
+            ``info["final_info"]`` its info. DISABLED: the caller resets with
             ``options={"reset_mask": mask}``.
         threads: threads for a step; default: all cores of this process.
         render_mode: None, ``"rgb_array"`` (a picture of every fish, as Gymnasium's wrappers for

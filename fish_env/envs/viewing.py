@@ -196,7 +196,7 @@ class Viewer:
             self._window.show(scenes)
         except ConfigError as error:
             self._unseen = True
-            gym.logger.warn(f"{error}; the fish swims on unseen")
+            gym.logger.warn(f"{error}; the simulation continues without a window")
 
     def frames(self, batch: FishBatch) -> list[Frame]:
         """A picture of each fish."""

@@ -335,6 +335,10 @@ class SeriesProblem(Problem):
         corners, keep = self.refines_steps(point.effects), keep_slopes or bool(noise.spread.any())
         return self.filter_for(point.effects).run(*self.lane(point), noise, keep, corners)
 
+    def lasting(self, filtered: Sequence[Filtered]) -> list[Filtered]:
+        """The filtered runs without the slopes of their filters, a third of what a fit holds."""
+        return [replace(run, slopes=None) for run in filtered]
+
     def without_refinement(self) -> SeriesProblem:
         """The same problem without finer steps for effects that make the tail's rate jump."""
         return self._but(unrefined=True)

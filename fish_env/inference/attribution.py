@@ -156,7 +156,7 @@ def settled(found: Attribution, thoroughly: bool, report: Callable[[str], None])
     """
     if found.accepted.causes:
         report("dropping causes that are not needed")
-    current = backward_elimination(found.accepted)
+    current, unnecessary = backward_elimination(found.accepted)
     failed = found.failed if current.causes == found.accepted.causes else frozenset()
     # What else is missing moves estimates by more than a few steps more would.
     if current.causes and thoroughly and not disturbance_at_limit(current.fit):
@@ -164,7 +164,8 @@ def settled(found: Attribution, thoroughly: bool, report: Callable[[str], None])
         final = reached(lambda: to_publish(current.fit))
         current = Explanation(current.causes, final) if final else current
     # A rival that contains the accepted causes is no rival once a cause is dropped.
-    rivals = tuple(e for e in found.rivals if not set(current.causes) <= set(e.causes))
+    others = (e for e in found.rivals if not set(current.causes) <= set(e.causes))
+    rivals = (*others, *unnecessary)
     return replace(found, accepted=current, rivals=rivals, failed=failed)
 
 

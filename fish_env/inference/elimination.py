@@ -8,42 +8,74 @@ import numpy as np
 from scipy.special import chdtri
 
 from fish_env.arrays import FloatArray
+from fish_env.inference.estimate.coarse_fit import CoarseFitter
 from fish_env.inference.estimate.fit import Fit
-from fish_env.inference.explanation import Explanation
-from fish_env.inference.hypotheses import CauseId, Coefficient, EffectParameterId, ParameterId
+from fish_env.inference.explanation import Explanation, reached
+from fish_env.inference.hypotheses import (
+    CauseId,
+    Coefficient,
+    EffectParameterId,
+    ParameterId,
+    of_effects,
+)
 from fish_env.inference.policy import POLICY
+from fish_env.inference.problem import Point
+from fish_env.inference.rivals import rivals_of
 from fish_env.inference.substitution import without
 from fish_env.inference.tails import chi2_log_tail
 
 
-def backward_elimination(current: Explanation) -> Explanation:
-    """The explanation without causes that later ones made unnecessary.
+def backward_elimination(current: Explanation) -> tuple[Explanation, tuple[Explanation, ...]]:
+    """The explanation without causes that later ones made unnecessary, and its rivals.
 
     Also without any cause whose interval, beside the others, contains its neutral value: the
     evidence takes the residuals for white, the interval does not. Of a single cause that is the
     only question, for its evidence has just been found enough. Where a fit without the cause loses
     more than such an interval allows, the cause acts: what the interval follows from, a linear
     model, then does not hold as far as neutral.
+
+    Two look-alikes make each other unnecessary. Rivals go without the other of them.
     """
-    while (smaller := _smaller(current)) is not None:
-        current = smaller
-    return current
+    rivals: tuple[Explanation, ...] = ()
+    while smaller := _smaller(current):
+        current, *others = smaller
+        rivals = rivals_of(current, others)
+    return current, rivals
 
 
-def _smaller(current: Explanation) -> Explanation | None:
-    """The explanation without the first cause that it can do without; None where it needs all."""
+def _smaller(current: Explanation) -> list[Explanation]:
+    """Explanations without one of the causes that do as well, best first."""
     alone = len(current.causes) == 1
+    found = []
+    fitter = CoarseFitter(current.fit)
     for cause in current.causes:
         if not alone and surely_acts(current.fit, cause):
             continue
         doubtful = may_not_act(current.fit, cause)
         if alone and not doubtful:
-            return None
-        smaller = without(current, (cause,))
+            continue
         least = POLICY.evidence_doubt + (allowed_loss(current.fit, cause) if doubtful else 0.0)
+        smaller = None if _is_needed(fitter, cause, least) else without(current, (cause,))
         if smaller and smaller.score < current.score + least:
-            return smaller
-    return None
+            found.append(smaller)
+    return sorted(found, key=lambda e: e.score)
+
+
+def _is_needed(fitter: CoarseFitter, cause: CauseId, least: float) -> bool:
+    """Whether a coarse fit without a cause loses so much that no full one need tell.
+
+    Args:
+        fitter: of the fit with all causes.
+        cause: the cause.
+        least: growth of -2 log likelihood at which it is needed.
+    """
+    own = fitter.fit
+    effects = tuple(e for e in own.effects if e != cause)
+    released = tuple(c for c in own.released if c != cause)
+    begin = Point(own.point.z, of_effects(own.point.effects, effects))
+    enough = fitter.base + least + POLICY.coarse_fit_leeway
+    left = reached(lambda: fitter.coarse_fit(effects, released, [begin], enough))
+    return left is None or left.objective > enough
 
 
 def allowed_loss(fit: Fit, cause: CauseId, level: float = 0.05) -> float:

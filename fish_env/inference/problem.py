@@ -131,6 +131,14 @@ class Problem(Protocol):
         """
         ...
 
+    def lasting(self, filtered: Sequence[Any]) -> Sequence[Any]:
+        """What a finished fit keeps of its evaluation: not what only its next step would ask for.
+
+        Args:
+            filtered: evaluation of every run.
+        """
+        return filtered
+
     @property
     def run_ids(self) -> tuple[str, ...]:
         """What the runs are called."""

@@ -27,7 +27,6 @@ from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point
 from fish_env.inference.projection import Projector, Signal
 from fish_env.inference.screening import Screen
-from fish_env.inference.search import is_off
 from fish_env.inference.starts import linear_estimate, probed, starts
 from fish_env.inference.tails import chi2_log_tail
 
@@ -190,7 +189,7 @@ def _needed(
         return current
     found = Explanation((*current.causes, *causes), fitted)
     # Beside so many others an effect of implausible size stands in for something else.
-    wild: list[CauseId] = [name for name in causes if _is_wild(fitted, name)]
+    wild: list[CauseId] = [name for name in causes if beyond_plausible(fitted, name)]
     sober = [name for name in found.causes if name not in wild]
     idle = (*wild, *insignificant(fitted, sober, shown.threshold))
     if not set(causes) - set(idle):
@@ -205,11 +204,6 @@ def _needed(
         found = whole.varied(beside_misfit=True, dropped=wild)
     better = found.score < current.score - POLICY.evidence_doubt
     return found if better and not implausible_estimates(found.fit) else current
-
-
-def _is_wild(fitted: Fit, name: EffectName) -> bool:
-    """Whether an effect has an implausible size, or does nothing."""
-    return beyond_plausible(fitted, name) or is_off(fitted.problem, fitted.point, name)
 
 
 def _confusable(current: Explanation, cause: CauseId) -> tuple[str, ...]:

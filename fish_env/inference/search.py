@@ -152,13 +152,9 @@ def _coarse_fits(
 
 
 def is_off(problem: Problem, point: Point, name: str) -> bool:
-    """Whether an effect does nothing at a point, or so little that no simulation follows it."""
-    largest = {freedom.id: freedom.upper for freedom in problem.freedoms([name])}
-    off = {EffectParameterId(name, p.name): p.neutral for p in problem.known[name].switching}
-    return all(
-        point.effects[id] >= largest[id] if np.isinf(value) else point.effects[id] == value
-        for id, value in off.items()
-    )
+    """Whether an effect does nothing at a point."""
+    switching = problem.known[name].switching
+    return all(point.effects[EffectParameterId(name, p.name)] == p.neutral for p in switching)
 
 
 def _finalists(

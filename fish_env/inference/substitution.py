@@ -73,9 +73,8 @@ def substituted(
     for _, causes, coarse in sorted(found, key=lambda f: f[0])[:most]:
         report(f"fitting {listed(causes, ' and ')}")
         fitted = at_noise(own.problem, coarse, own.noise, 4, give_up_above)
-        if fitted is None or any(is_off(own.problem, fitted.point, e) for e in fitted.effects):
-            continue
-        others.append(Explanation(causes, fitted))
+        if fitted is not None:
+            others.append(Explanation(causes, fitted))
     found_all = [current, *others]
     if beside_misfit and others:
         report("fitting what the runs differ in")

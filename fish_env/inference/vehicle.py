@@ -119,7 +119,7 @@ def most_followed(effect: Effect, parameter: EffectParameter, step: float) -> fl
     """Largest value of a parameter that is off at infinity which RK4 steps (s) follow.
 
     Infinity where they follow any, or none that is plausible, and for all other parameters. Beyond
-    it an effect is too quick to be simulated, and does hardly anything.
+    it predictions and extended models would diverge.
     """
     low, far = parameter.plausible[0], BEYOND * parameter.plausible[1]
 

@@ -51,7 +51,7 @@ def check_installed() -> None:
         raise missing_extra("Drawing the fish", "pygame-ce", "render") from None
     if not getattr(pygame, "IS_CE", False):
         raise MissingExtraError(
-            "Drawing the fish needs 'pygame-ce', and its relative 'pygame' is in its place. "
+            "Drawing the fish needs 'pygame-ce', but 'pygame' is installed instead. "
             "Replace it with: pip uninstall pygame; pip install --force-reinstall pygame-ce"
         )
 

@@ -78,7 +78,7 @@ def read_replay_file(
             f"`robofish compare {file} --replay page.html`"
         )
     if not file.is_file():
-        what = "no file but a pipe or a device" if file.exists() else "there is no such file"
+        what = "a pipe or a device, not a file" if file.exists() else "there is no such file"
         raise DatasetError(f"{file}: {what}; name a .csv or .parquet file")
     found = _dataset_run(file)
     if found is not None:
@@ -163,7 +163,7 @@ def _numbers(file: Path, table: pd.DataFrame, name: object) -> FloatArray:
     if bad.size:
         cell = short(str(cells.iloc[bad[0]]))
         raise DatasetError(
-            f"{file}: row {bad[0] + 2}, column {name}: '{cell}' is no finite number; correct it"
+            f"{file}: row {bad[0] + 2}, column {name}: '{cell}' is not a finite number; correct it"
         )
     return np.asarray(values)
 

@@ -40,14 +40,14 @@ NEEDS: dict[str, tuple[tuple[str, ...], ...]] = {
 
 NEVER = {
     "clock_skew": "without the commands it looks like a clock_scale",
-    "sensor_delay": "all channels share the delay, so only the commands can tell it",
-    "depth_bias": "a shifted depth is a depth like any other",
+    "sensor_delay": "all channels share the delay, so only the commands can show it",
+    "depth_bias": "no other channel contradicts a shifted depth",
 }
 LATER = ("camera_tilt", "gyro_scale", "marker_offset", "refraction", "soft_iron")
 """Effects that this test has no setting for; fits of the motion look for them."""
 LOOKS_ALIKE = {
     "clock_scale": "`clock_skew`, or a gyro with a wrong gain (`gyro_scale`)",
-    "attitude_misalignment": "a gyro that is mounted askew",
+    "attitude_misalignment": "a misaligned gyro",
     "position_scale": "velocities with a wrong gain",
 }
 """What the catalogue does not know and kinematics cannot tell from its effects."""
@@ -231,7 +231,7 @@ def _words(
     if effect in LATER:
         return f"{effect}: not tested here; fits of the motion look for it."
     if not parameters and needs:
-        return f"{effect}: not to be seen without {', '.join(needs)}."
+        return f"{effect}: not detectable without {', '.join(needs)}."
     if not parameters:
         return f"{effect}: the runs are too short, or have too many gaps, to test it."
     if found:
@@ -262,7 +262,7 @@ def sentences(consistency: Consistency) -> list[str]:
         if agree:
             said.append(f"{', '.join(relation.channels)} agree with each other.")
         if relation.level:
-            said.append("Roll and pitch are not measured; the fish is taken to swim level.")
+            said.append("Roll and pitch are not measured; the fish is assumed to be level.")
     said += [s.words for s in consistency.effects if not s.found and (s.testable or s.needs)]
     return said
 
@@ -283,8 +283,8 @@ def _nothing_to_compare(consistency: Consistency) -> str:
             f"fewer than {FEWEST_WINDOWS} windows of {short[0].window_s:g} s."
         )
     return (
-        f"No kinematic relation ties {', '.join(consistency.channels)} to each other, so a sensor "
-        "that is biased, scaled or late cannot be told by them alone."
+        f"No kinematic relation connects {', '.join(consistency.channels)}, so these channels "
+        "alone cannot show a biased, scaled or late sensor."
     )
 
 

@@ -353,7 +353,7 @@ def sentences(floors: tuple[Floor, ...]) -> list[str]:
     said = []
     for floor in floors:
         if floor.white is None:
-            said.append(f"{floor.channel} has too few samples to tell its noise.")
+            said.append(f"{floor.channel} has too few samples to estimate its noise.")
         elif floor.contradicts:
             low, high = floor.white.ci95
             said.append(
@@ -365,6 +365,6 @@ def sentences(floors: tuple[Floor, ...]) -> list[str]:
     if bounds:
         said.append(
             f"The noise of {', '.join(bounds)} cannot be separated from the motion at this "
-            "sampling rate; what is given is an upper bound."
+            "sampling rate; the given value is an upper bound."
         )
     return said

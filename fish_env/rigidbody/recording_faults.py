@@ -56,9 +56,8 @@ def check_stuck(place: str, run: RecordedRun, channel: str) -> None:
     if not beside or max(np.abs(beside)) < LEAP * np.median(moving):
         return
     raise DatasetError(
-        f"{place}: {channel} is {values[begin]:g} in {rows} samples in a row, from t = "
-        f"{time[begin]:.4g} s to {time[begin + length]:.4g} s, as if it were stuck; leave its "
-        "cells empty where it was not measured"
+        f"{place}: {channel} is stuck at {values[begin]:g} for {rows} samples in a row, from t = "
+        f"{time[begin]:.4g} s to {time[begin + length]:.4g} s; leave its cells empty there"
     )
 
 
@@ -92,8 +91,8 @@ def check_clock_jumps(place: str, run: RecordedRun) -> None:
         known = [v for v in verdicts if v is not None]
         if len(known) >= 2 and all(fits for fits, _ in known) and any(moved for _, moved in known):
             raise DatasetError(
-                f"{place}: the clock jumps by {span:.4g} s at t = {times[index]:.4g} s, and the "
-                "motion goes on as if no time had passed; correct the clock, or make two runs of it"
+                f"{place}: the clock jumps by {span:.4g} s at t = {times[index]:.4g} s, but the "
+                "motion continues as if no time had passed; correct the clock, or split the run"
             )
 
 

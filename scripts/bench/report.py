@@ -149,7 +149,7 @@ def markdown(
         *(_row(m) for m in measured),
         *(f"| {m.name} | | missing: {' '.join(m.reason.split())} | | | |" for m in missing),
         "",
-        "## Judged",
+        "## Targets",
         "",
         *(_sentence(v) for v in judge(measured)),
     ]

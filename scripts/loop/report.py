@@ -91,7 +91,7 @@ def markdown(record: dict[str, Any], declared: Declaration, rows: Sequence[Score
     primary = scores_of(rows, declared.tasks[0], declared.metrics[0])
     label = LABELS[declared.metrics[0]][0]
     parts = [
-        "### What was hidden and what was found",
+        "### Hidden and found effects",
         _fish_table(record["fish"]),
         f"### Each fish: {label} on `{declared.tasks[0]}`",
         "Cells show the mean over the seeds, with the standard deviation in brackets. Differences "

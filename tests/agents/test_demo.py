@@ -36,8 +36,9 @@ def test_the_words_count_and_measure():
     first, second = demo.in_words(swims, CONFIG)
     assert first.startswith("2 of 3 swims")
     assert "depth within 5 cm, heading within 5 degrees and speed within 20 % for 10 s" in first
-    assert "at most 2.0 cm, 2.0 degrees over a tail beat (4.0 at an instant) and 5 %" in second
-    assert "the worst of all by 30.0 cm" in second
+    assert "median over the swims: 2.0 cm, 2.0 degrees over a tail beat (4.0 instant" in second
+    assert "instantaneous) and 5 % of the speed" in second
+    assert "Maximum over the swims: 30.0 cm" in second
 
 
 def test_the_end_of_an_episode_leaves_its_beginning_out():

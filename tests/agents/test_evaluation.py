@@ -44,7 +44,7 @@ def test_every_task_has_suites_and_a_suite_says_which_tasks_it_has():
 
 def test_a_suite_that_begins_otherwise_is_refused():
     other = replace(CALM, seed=CALM.seed + 1)
-    with pytest.raises(ConfigError, match="suite calm version 1, task hold: its episodes begin"):
+    with pytest.raises(ConfigError, match="suite calm version 1, task hold: its episodes differ"):
         other.check("hold")
 
 
@@ -152,7 +152,7 @@ def test_the_command_measures_paths_and_places(tmp_path):
 
 
 def test_an_unknown_agent_says_which_there_are(tmp_path):
-    with pytest.raises(ConfigError, match="none of pid, mppi, pretrained"):
+    with pytest.raises(ConfigError, match="give pid, mppi, pretrained"):
         load_agents(str(tmp_path / "none.npz"), "hold")
 
 

@@ -120,8 +120,8 @@ def test_a_camera_alone_says_little_and_says_so():
     assert found.tested == ()
     assert found.found == ()
     said = " ".join(sentences(found))
-    assert "No kinematic relation ties x, y, z, yaw" in said
-    assert "gyro_bias: not to be seen without roll, pitch, p, q, r." in said
+    assert "No kinematic relation connects x, y, z, yaw" in said
+    assert "gyro_bias: not detectable without roll, pitch, p, q, r." in said
 
 
 def test_short_runs_are_not_tested():
@@ -133,7 +133,7 @@ def test_short_runs_are_not_tested():
 def test_a_film_from_above_is_taken_to_be_level_and_says_so():
     found = checked(channels=("x", "y", "yaw", "r"), runs=2)
     assert set(estimates(found)) == {"attitude.bias_r", "attitude.scale"}
-    assert any("taken to swim level" in s for s in sentences(found))
+    assert any("assumed to be level" in s for s in sentences(found))
 
 
 def test_runs_that_do_not_begin_at_rest_though_declared_so():

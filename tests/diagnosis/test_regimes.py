@@ -43,7 +43,7 @@ def test_misfit_at_speed_is_found_in_its_channel_and_bin():
     assert found.sits_in.bin == "0.15 to 0.2 m/s"
     assert found.sits_in.energy == pytest.approx(4.0, rel=0.3)
     assert found.sits_in.p == pytest.approx(1 / 200)
-    assert "r at speed 0.15 to 0.2 m/s" in found.words()
+    assert "largest excess is speed 0.15 to 0.2 m/s. There the misfit in r is" in found.words()
 
 
 def test_false_alarms_stay_within_the_level_even_when_residuals_are_coloured():

@@ -5,11 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fish_env.inference.effects import DeclaredEffect, EffectParameter
 from fish_env.inference.estimate.coarse_fit import CoarseFitter
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.explanation import Explanation
-from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
 from fish_env.inference.substitution import substituted
 from tests.inference.stated import Stated, cause_of, effect, signal_of, size_of
@@ -51,36 +49,6 @@ def test_a_better_look_alike_takes_the_place(acting, size, fitted):
     assert len(others) == fitted
     # Nothing of the effect that was taken out is left.
     assert best.fit.point.effects.keys() == {size_of(acting), size_of(CURRENT)}
-
-
-STIFFNESS = EffectParameterId("stiff_tail", "stiffness")
-
-
-class Stiff(DeclaredEffect):
-    """A tail that bends the less the stiffer it is, and that steps follow up to a stiffness."""
-
-    def __init__(self, followed):
-        stiffness = EffectParameter("stiffness", "Hz", np.inf, 0.1, np.inf, (1.0, 10.0))
-        super().__init__("stiff_tail", (stiffness,))
-        object.__setattr__(self, "followed", followed)
-
-    def is_followed(self, values, step):
-        return values["stiffness"] <= self.followed
-
-
-@pytest.mark.parametrize(("followed", "others"), [(30.0, 0), (300.0, 1)])
-def test_one_that_steps_cannot_follow_takes_no_place(followed, others):
-    """At the end of what they follow it explains nearly as much, and would do nothing beyond."""
-    stiff = Stiff(followed)
-
-    def residuals(z, effects):
-        late = effects[size_of(LAG)] + 1.0 / effects[STIFFNESS]
-        return np.tile(z[0] + 100.0 * (late - 0.03) * SHAPES[0], (3, 1))
-
-    own = fit(Stated(residuals, [KNOWN[LAG], stiff]), (LAG,), refit_noise=False)
-    pair = (LAG, signal_of(cause_of(stiff), 50.0))
-    found = substituted(Explanation((LAG,), own), [pair], 1, lambda step: None)
-    assert len(found) == 1 + others
 
 
 def astray(size):

@@ -151,7 +151,8 @@ def test_the_speed_headline_takes_the_latest_measurement(tmp_path):
     (tmp_path / "speed-2026-01-01.json").write_text("{}")
     (tmp_path / "speed-2026-01-02.json").write_text(json.dumps(record))
     lines = update_readme.speed(tmp_path)
-    assert "120k/s for 1 fish on 1 thread, 2M/s for 64 fish on 2 threads (2 cores of a" in lines
+    assert "* Speed, in control steps of 0.1 s (2 cores of a CPU, 2026-01-02):" in lines
+    assert "    * 120k/s for 1 fish on 1 thread\n    * 2M/s for 64 fish on 2 threads\n" in lines
     assert "* One: at least 4 times as fast (target); measured 5.2 times: met." in lines
     assert "* Two: at least 6 times as fast (target); not measured." in lines
     assert "not measured" in update_readme.speed(tmp_path / "none")
@@ -164,7 +165,8 @@ def test_the_headline_of_the_diagnosis_gives_rates_with_intervals(tmp_path):
     (tmp_path / "diagnosis-2026-01-02.json").write_text(json.dumps(record))
     (tmp_path / "diagnosis-quick-2026-01-03.json").write_text("{}")
     assert update_readme.diagnosis(tmp_path) == (
-        "* Diagnosis of 10 hidden cases, 2026-01-02: verdict and name right in 9 of 10 "
-        "(56 to 100 %), a wrong single name in 0 of 10 (56 to 100 %)."
+        "* Diagnosis of 10 hidden cases, 2026-01-02:\n"
+        "    * verdict and name right in 9 of 10 (56 to 100 %)\n"
+        "    * a wrong single name in 0 of 10 (56 to 100 %)"
     )
     assert "no full run" in update_readme.diagnosis(tmp_path / "none")

@@ -81,7 +81,7 @@ def test_frames_become_a_dataset_and_must_say_what_they_are():
     for data in ([FRAME], 3, None):
         with pytest.raises(DatasetError, match=r"data of type .* frames by run"):
             as_dataset(data, "zheng-2021-a", DESCRIBED)
-    with pytest.raises(DatasetError, match="run1: of type list, which is no pandas frame"):
+    with pytest.raises(DatasetError, match="run1: of type list, which is not a pandas frame"):
         as_dataset({"run1": [FRAME]}, "zheng-2021-a", DESCRIBED)
     assert as_dataset(FRAME, load_fish("zheng-2021-b"), DESCRIBED)
 

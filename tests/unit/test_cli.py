@@ -118,7 +118,7 @@ def test_compare_writes_json_and_pictures(
     numbers = json.loads(target.read_text())
     assert numbers["kind"] == "steady"
     assert len(numbers["observations"]["yaw_rate"]["simulated"]) == 29
-    assert "Most wrong in" in " ".join(out.split())
+    assert "Largest error in" in " ".join(out.split())
     assert (tmp_path / "agreement.png").is_file()
     assert (tmp_path / "over_commands.pdf").is_file()
 

@@ -167,7 +167,7 @@ def test_ctrl_c_says_what_was_kept(capsys, monkeypatch):
     monkeypatch.setattr("robofish_agents.training.command.train", stopped)
     status, _, err = run(capsys, "train", "ppo-hold", "--out", "out/none")
     assert status == 130
-    assert "start anew: robofish train ppo-hold --out out/none" in " ".join(err.split())
+    assert "start again: robofish train ppo-hold --out out/none" in " ".join(err.split())
 
 
 def test_compare_leads_with_its_findings_and_names_diagnose(tmp_path, capsys):

@@ -129,7 +129,7 @@ def test_an_address_goes_with_no_option_of_this_machine(capsys, option):
     line = ("campaign", DEMO, "--out", "x", "--address", "auto", *option)
     status, _, err = run(capsys, *line)
     assert status == 2
-    assert "--cpus and --temp belong to a cluster on this machine" in err
+    assert "--cpus and --temp apply only to a cluster on this machine" in err
 
 
 MISSING = """

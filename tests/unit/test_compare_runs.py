@@ -142,7 +142,7 @@ def test_conditions_gather_repeats_and_words_name_the_worst() -> None:
     result = compare_runs(dataset(*runs), FISH)
     assert {name: len(group) for name, group in result.by_condition().items()} == {"A": 2, "b": 1}
     words = in_words(result)
-    assert any(sentence.startswith("x:") and "most wrong in b" in sentence for sentence in words)
+    assert any(sentence.startswith("x:") and "largest in b" in sentence for sentence in words)
     numbers = result.as_dict()
     assert numbers["conditions"]["A"]["channels"]["x"]["rmse"] < 1e-9
     assert numbers["overall"]["runs"] == 3

@@ -65,7 +65,7 @@ def test_the_worst_condition_and_the_trend_are_found(table: SteadyDataset) -> No
     assert trend[0] == "tail_offset"
     assert trend[1] < -0.9
     assert result.observations["yaw_rate"].repeat_sd == pytest.approx(0.02 / np.sqrt(2), rel=1e-3)
-    assert any("Most wrong in E" in words for words in in_words(result))
+    assert any("Largest error in E" in words for words in in_words(result))
 
 
 def test_a_value_that_the_model_does_not_have_is_left_out_and_counted(

@@ -242,7 +242,7 @@ def test_missing_run_keys(tmp_path, key):
         ({"commands": {"tail_offset": "rad"}}, ["not declared", "constant_commands", "tail_amp"]),
         ({"constant_commands": {"tail_offset": 0.0}}, ["key constant_commands.tail_offset"]),
         ({"noise": {"y": 0.1}}, ["key noise.y", "unknown channel"]),
-        ({"noise": {"x": -0.1}}, ["key noise.x", "one-sigma"]),
+        ({"noise": {"x": -0.1}}, ["key noise.x", "standard deviation"]),
         ({"noise": {"x": "low"}}, ["key noise.x", "'low'"]),
         ({"noise": {"yaw": 3.0}}, ["key noise.yaw", "degrees"]),
         ({"runs": []}, ["key runs", "list"]),
@@ -271,7 +271,7 @@ def test_bad_descriptions(tmp_path, changes, expected):
         ("a: [1", "not valid YAML"),
         ("- a\n- b\n", "key: value"),
         ("? [a]\n: b\n", "not valid YAML"),
-        (yaml.safe_dump(DESCRIPTION) + "\nname: again\n", "the key 'name' is there twice"),
+        (yaml.safe_dump(DESCRIPTION) + "\nname: again\n", "the key 'name' occurs twice"),
     ],
 )
 def test_unreadable_descriptions(tmp_path, text, expected):

@@ -146,7 +146,7 @@ def test_what_cannot_be_guessed_is_asked_for_and_the_rest_kept(tmp_path, capsys,
     (out / "import.yaml").write_text("mine")
     status, _, err = run(capsys, *arguments)
     assert (status, (out / "import.yaml").read_text()) == (2, "mine")
-    assert "a mapping is there already" in err
+    assert "this mapping already exists" in err
 
 
 def test_no_file_is_ever_written_over(tmp_path, capsys):
@@ -156,7 +156,7 @@ def test_no_file_is_ever_written_over(tmp_path, capsys):
     told = ("--fish", "zheng-2021-a", "--frame", "ned", "--yes")
     status, _, err = run(capsys, "import", str(log), "--out", str(tmp_path), *told)
     assert status == 2
-    assert "swim.csv is there already" in err
+    assert "swim.csv already exists" in err
     assert log.read_bytes() == before
     assert not (tmp_path / "dataset.yaml").exists()
 

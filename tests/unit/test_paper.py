@@ -99,7 +99,7 @@ def test_a_broken_motion_fails_its_statement(
 def test_a_straight_swim_is_no_spiral(study: Study) -> None:
     straight = study.straight_series[(20.0, 3.0)]
     found = verdicts(dataclasses.replace(study, spiral_series=straight))
-    for statement in ("V_Ix and V_Iy are sine-like", "yaw winds on"):
+    for statement in ("V_Ix and V_Iy are sine-like", "yaw grows steadily"):
         assert not found[statement]
 
 

@@ -171,7 +171,7 @@ def test_central_inertia_of_a_neutral_fish_matches_the_parallel_axis_theorem():
         ("name: [", "not valid YAML"),
         ("- a\n- b\n", "no 'key: value' sections"),
         ("", "no 'key: value' sections"),
-        ("name: a\nname: b\n", "line 2: the key 'name' is there twice"),
+        ("name: a\nname: b\n", "line 2: the key 'name' occurs twice"),
         ("? [a]\n: b\n", "not valid YAML"),
     ],
 )

@@ -27,7 +27,7 @@ LABELS: dict[str, tuple[str, float]] = {
     "heading_overshoot": ("heading overshoot (%)", 100.0),
     "cross_track_rmse_m": ("cross-track RMSE (cm)", 100.0),
     "cross_track_late_rmse_m": ("cross-track, last 10 s (cm)", 100.0),
-    "path_progress": ("share of the path swum (%)", 100.0),
+    "path_progress": ("completed share of the path (%)", 100.0),
     "place_rmse_m": ("place RMSE (cm)", 100.0),
     "place_late_rmse_m": ("place, last 10 s (cm)", 100.0),
 }

@@ -87,8 +87,8 @@ class Suite:
         now = self.fingerprint_of(task)
         if abs(now - self.fingerprint[task]) > FINGERPRINT_TOLERANCE:
             raise ConfigError(
-                f"suite {self.name} version {self.version}, task {task}: its episodes begin "
-                f"otherwise than when it was frozen ({now:.6f}, not {self.fingerprint[task]:.6f}); "
+                f"suite {self.name} version {self.version}, task {task}: its episodes differ "
+                f"from the frozen ones ({now:.6f}, not {self.fingerprint[task]:.6f}); "
                 "use the release that it belongs to, or make a new version of the suite"
             )
 

@@ -114,7 +114,7 @@ def _unpack(file: Path) -> dict[str, npt.NDArray[Any]]:
         raise ConfigError(f"{file}: {error}") from None
     except UNREADABLE as error:
         raise ConfigError(
-            f"{file}: not a readable policy file ({error}); it is truncated, damaged or foreign"
+            f"{file}: not a readable policy file ({error}); it is truncated or damaged"
         ) from None
 
 
@@ -129,7 +129,7 @@ def _check_environment(file: Path, about: Mapping[str, Any]) -> None:
     if about.get("environment") != ENV_ID:
         raise ConfigError(
             f"{file}: trained in {short(str(about.get('environment')))}, and this is {ENV_ID}, "
-            "which behaves otherwise; train it again, or install the version of the package that "
+            "which behaves differently; train it again, or install the version of the package that "
             "it belongs to"
         )
     sizes = (about.get("observation"), about.get("actions"))

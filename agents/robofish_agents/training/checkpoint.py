@@ -98,7 +98,7 @@ def load_checkpoint(
     except (*UNREADABLE, TypeError, AttributeError, IndexError) as error:
         reason = _earlier(path) or f"not a readable checkpoint ({error})"
         raise ConfigError(
-            f"{path}: {reason}; move it away to start afresh, or train into another folder"
+            f"{path}: {reason}; move it away to start again, or train into another folder"
         ) from None
     return progress
 
@@ -112,7 +112,7 @@ def _earlier(path: Path) -> str | None:
         return None
     if first != b"robofish-checkpoint-1":
         return None
-    return "written by an earlier version in a form that could run code, which is not read"
+    return "written by an earlier version in a form that could run code; such files are refused"
 
 
 def _check_same(path: Path, saved: dict[str, Any], now: dict[str, Any]) -> None:

@@ -105,7 +105,9 @@ def _stopped(source: str, folder: Path, config: TrainConfig) -> str:
     if config.engine != DEFAULT_ENGINE:
         options += f" --engine {config.engine}"
     if not (folder / CHECKPOINT).exists():
-        return f"stopped before the first checkpoint; start anew: robofish train {source} {options}"
+        return (
+            f"stopped before the first checkpoint; start again: robofish train {source} {options}"
+        )
     return (
         f"stopped; {folder / CHECKPOINT} keeps the training up to the last checkpoint. "
         f"Continue with: robofish train {source} {options} --resume"

@@ -122,7 +122,7 @@ def _guessed(
             "start and tail_phase: estimated from each run, unless start='rest' is given"
         )
     warnings.warn(
-        "from_frames guesses what the columns mean; give `channels` to tell it. Assumed: "
+        "from_frames guesses the meaning of columns; give `channels` to declare it. Assumed: "
         f"{'; '.join(assumed)}",
         stacklevel=3,
     )
@@ -163,8 +163,8 @@ def frame_source(frame: pd.DataFrame, run: str, part: str) -> Source:
     """
     if not (hasattr(frame, "columns") and hasattr(frame, "index")):
         raise DatasetError(
-            f"from_frames: {run}: of type {type(frame).__name__}, which is no pandas frame. Give a "
-            "frame, or frames by run: {'run1': frame}."
+            f"from_frames: {run}: of type {type(frame).__name__}, which is not a pandas frame. "
+            "Give a frame, or frames by run: {'run1': frame}."
         )
     dated = frame.index.dtype.kind in "mM"
     index = str(frame.index.name or "time")

@@ -96,8 +96,8 @@ def _found(tables: Mapping[str, list[Source]], name: str) -> list[RunInput]:
             return [RunInput(safe_id(id), {n: keys[n][id] for n in tables}) for id in ids]
     counts = ", ".join(f"{len(found)} of {source}" for source, found in tables.items())
     raise DatasetError(
-        f"the names of the files do not tell which belong to one run ({counts}). Say it in the "
-        "mapping: runs: [{id: r1, files: [pose1.csv, servo1.csv]}, ...]."
+        f"the names of the files do not show which belong to one run ({counts}). Write it "
+        "into the mapping: runs: [{id: r1, files: [pose1.csv, servo1.csv]}, ...]."
     )
 
 

@@ -293,7 +293,7 @@ def _guess_run_column(kinds: Sequence[Kind], said: list[str]) -> str | None:
     for column in kinds[0].first.columns if kinds else ():
         everywhere = all(column in table.columns for kind in kinds for table in kind.tables)
         if RUN_NAMES.fullmatch(take_apart(column).bare) and everywhere:
-            said.append(f"column '{column}' tells the runs apart")
+            said.append(f"column '{column}' separates the runs")
             return column
     return None
 

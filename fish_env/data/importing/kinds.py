@@ -127,7 +127,7 @@ def without_time(kind: Kind) -> DatasetError:
         if TIME_NAMES.fullmatch(take_apart(column).bare) and not source.is_numeric(column):
             cell = next((str(cell) for cell in source.columns[column] if str(cell)), "")
             return source.place(column).refuse(
-                f"'{short(cell)}' is no time that can be read",
+                f"'{short(cell)}' cannot be read as a time",
                 "Write times in ISO 8601, such as 2026-05-01T12:00:00.040, or as numbers in any "
                 "unit of time",
             )

@@ -142,7 +142,7 @@ def _sources(file: Path, tree: Tree, path: str, notes: list[str]) -> Iterator[So
             continue
         found = _columns(name, value)
         if found is None:
-            notes.append(f"{here} left out: it is no vector or narrow matrix of numbers")
+            notes.append(f"{here} left out: it is not a vector or narrow matrix of numbers")
         for column, values in (found or {}).items():
             columns.setdefault(len(values), {})[column] = values
     for length, group in sorted(columns.items()):

@@ -78,7 +78,7 @@ def read_stamps(source: Source, time: TimeColumn) -> Stamps:
         raise source.place(time.column, int(rows[backward[0] + 1])).refuse(
             "time does not increase",
             "Sort the rows; if several runs follow each other, name the "
-            "column that tells them apart: --run-column",
+            "column that separates them: --run-column",
         )
     if backward.size:
         notes.append(f"{source.name}: {backward.size} messages put in the order of their stamps")
@@ -115,7 +115,7 @@ def _to_ns(source: Source, time: TimeColumn) -> tuple[Nanoseconds, BoolArray]:
     part = np.where(missing, 0.0, numbers) - whole
     if np.abs(whole).max(initial=0.0) * factor > 9e18:
         raise place.refuse(
-            f"{numbers[np.argmax(np.abs(whole))]:.6g} {time.unit} is no time of this age",
+            f"{numbers[np.argmax(np.abs(whole))]:.6g} {time.unit} is not a plausible date",
             "Correct the unit of time",
         )
     if factor >= 1.0 and float(factor).is_integer():
@@ -145,7 +145,7 @@ def _from_text(source: Source, column: str) -> tuple[Nanoseconds, BoolArray]:
         ns[index] = round(since.total_seconds() * 1e6) * 1000
     if len(kinds) > 1:
         raise source.place(column).refuse(
-            f"some stamps have {' and some '.join(sorted(kinds))}", "Write all of them alike"
+            f"some stamps have {' and some '.join(sorted(kinds))}", "Write all stamps alike"
         )
     return ns, present
 

@@ -215,7 +215,7 @@ def draw_confusability(names: Sequence[str], cosines: FloatArray, album: Album) 
         ax.grid(False)
         ax.set_xticks(range(len(names)), names, rotation=90, fontsize=7)
         ax.set_yticks(range(len(names)), names, fontsize=7)
-        figure.colorbar(image, ax=ax, shrink=0.7).set_label("likeness (1: the same signal)")
+        figure.colorbar(image, ax=ax, shrink=0.7).set_label("similarity (1: the same signal)")
         return saved(figure, album, "confusability")
 
 

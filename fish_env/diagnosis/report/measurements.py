@@ -1,4 +1,4 @@
-"""Section of the report: what the channels say before any model of forces is asked."""
+"""Section of the report: what the channels show without a model of forces."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def input_checks(answer: Answer, series: ReportSeries | SteadySeries | None, alb
         )
         for fault in faults if fault["fix"]
     ]  # fmt: skip
-    written = table(("what", "write into dataset.yaml", "standing"), lines)
+    written = table(("what", "write into dataset.yaml", "status"), lines)
     return section(
         "Input checks", f"<ul>{sentences}</ul>", folded("Lines to write", written), key="inputs"
     )

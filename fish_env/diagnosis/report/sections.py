@@ -76,7 +76,7 @@ def cause_values(answer: Answer, series: Series, album: Album) -> str:
     """What was found, and its rivals, with intervals."""
     rows = []
     sets = [("accepted", answer.get("causes", []))]
-    sets += [(f"or else {i}", rival) for i, rival in enumerate(answer.get("alternatives", []), 1)]
+    sets += [(f"rival {i}", rival) for i, rival in enumerate(answer.get("alternatives", []), 1)]
     for word, causes in sets:
         for cause in causes:
             name = text(short_name(cause["name"]))
@@ -85,7 +85,7 @@ def cause_values(answer: Answer, series: Series, album: Album) -> str:
                 interval = f"{number(low)} to {number(high)}"
                 shown = (text(key), number(p["estimate"]), interval, text(p["unit"]))
                 rows.append((name, *shown, word))
-    heads = ("cause", "parameter", "estimate", "95 % interval", "unit", "standing")
+    heads = ("cause", "parameter", "estimate", "95 % interval", "unit", "status")
     return section("Causes", table(heads, rows))
 
 
@@ -181,7 +181,7 @@ def gain(answer: Answer, series: Series, album: Album) -> str:
         caption = "Fit of each held-out run, mean over its channels."
         parts.append(figure(draw.draw_gain(runs, album), caption))
         rows = [(text(run), number(a), number(b), number(b - a)) for run, (a, b) in runs.items()]
-        heads = ("held-out run", "baseline fit (%)", "extended fit (%)", "gained")
+        heads = ("held-out run", "baseline fit (%)", "extended fit (%)", "gain (%)")
         parts.append(table(heads, rows))
     parts.append(_errors(found))
     return section("Gain on held-out data", *parts, key="gain")
@@ -243,8 +243,9 @@ def where(answer: Answer, series: Series, album: Album) -> str:
             parts.append(
                 figure(
                     draw.draw_regimes(found, album),
-                    "Error of the refitted baseline in each channel and regime. Framed: larger "
-                    "than chance would produce in any cell. Hatched: no run visited it.",
+                    "Error of the refitted baseline in each channel and regime. Framed cells: the "
+                    "error is larger than chance would produce in any cell. Hatched cells: no run "
+                    "visited them.",
                 )
             )
         by_regime: dict[str, list[str]] = {}
@@ -280,7 +281,7 @@ def ranking(answer: Answer, series: Series, album: Album) -> str:
 
 
 def experiment(answer: Answer, series: Series, album: Album) -> str:
-    """The next experiment as a schedule to fly."""
+    """The next experiment as a schedule of commands."""
     proposal = answer.get("next_experiment") or {}
     schedule = proposal.get("schedule")
     if not schedule:
@@ -297,8 +298,8 @@ def experiment(answer: Answer, series: Series, album: Album) -> str:
     return section(
         "Next experiment",
         paragraph(
-            f"Fly “{name}” from rest{goal}. {EXPERIMENT_FILE} holds it in SI units (rad, Hz, m); "
-            "each row holds until the next."
+            f"Record a run of “{name}” from rest{goal}. {EXPERIMENT_FILE} has the commands in SI "
+            "units (rad, Hz, m)."
         ),
         figure(draw.draw_schedule(schedule, album), f"Commands of “{name}”."),
         table(heads, rows, "Each row holds until the next"),

@@ -220,7 +220,7 @@ def _series(
             role: Role = "extended" if name == "extended" else "baseline"
             motions.append(_whole_run(simulator, run, steps, states[name], role, measured))
         except SimulationDiverged as error:
-            notes.append(f"{name}: swimming alone over the whole run, {error}")
+            notes.append(f"{name}: simulated over the whole run, {error}")
     extended = predicted["extended"].channels if "extended" in predicted else {}
     fits = {name: own.fit_percent for name, own in predicted.items()}
     with suppress(SimulationDiverged):

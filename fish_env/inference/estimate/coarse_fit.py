@@ -74,8 +74,14 @@ class CoarseFitter:
         return problem.subset(runs)
 
     def _problem_for(self, effects: Sequence[str]) -> Problem:
-        """In long steps, but for effects that make the motion's rate jump."""
-        return self._usual if self.fit.problem.is_nonsmooth(effects) else self._long
+        """In long steps, but for effects that make the motion's rate jump, and further lags.
+
+        A lag that the usual steps follow may diverge in long ones; those of the fit itself do not.
+        """
+        problem = self.fit.problem
+        further = problem.freedoms([name for name in effects if name not in self.fit.effects])
+        quick = any(freedom.least > -np.inf for freedom in further)
+        return self._usual if quick or problem.is_nonsmooth(effects) else self._long
 
     @cached_property
     def base(self) -> float:

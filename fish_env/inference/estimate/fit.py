@@ -349,5 +349,5 @@ def _finish(
     return Fit(
         problem, effects, released, point, noise, free.ids, estimates, physical,
         float(sum(r.log_likelihood for r in filtered)), value, bounds,
-        free.bounds.active(hessian, pull, vector), condition, filtered, lin,
+        free.bounds.active(hessian, pull, vector), condition, problem.lasting(filtered), lin,
     )  # fmt: skip

@@ -105,6 +105,6 @@ def evaluated(problem: P, point: Point, noise: Any) -> tuple[P, Sequence[Any]]:
         settled, _ = predicted_variation(settled, point, noise)
         if np.all(np.abs(settled.variation - before) < NEAR * spreads):
             break
-    filtered = settled.filtered(point, noise)
+    filtered = settled.lasting(settled.filtered(point, noise))
     remembered.append((point, noise, None if settled is problem else settled, filtered))
     return cast(P, settled), filtered

@@ -31,7 +31,7 @@ def statements_markdown(study: Study) -> str:
             "# The paper's statements and this model",
             "",
             "Written by `robofish paper`. "
-            f"{held} of {len(statements)} statements are held by the model without effects. "
+            f"The model without effects reproduces {held} of {len(statements)} statements. "
             "No parameter was tuned to make a statement hold.",
             "",
             "Means and amplitudes are over whole tail beats after the transient. An amplitude is "

@@ -206,7 +206,7 @@ def turning_rates(turning_map: Map, name: str) -> list[Statement]:
     why = (
         ""
         if lagging
-        else "a servo that loses amplitude with frequency would explain the print; see below"
+        else "a servo that loses amplitude with frequency would explain the paper; see below"
     )
     grows = (
         ""
@@ -282,7 +282,7 @@ def spiral(study: Study) -> list[Statement]:
     return [
         Statement(
             "spiral",
-            "yaw winds on",
+            "yaw grows steadily",
             "mean yaw per beat is monotone after the first 10 s",
             f"{turns:.2f} turns in {trajectory.time_s[-1]:.0f} s",
             bool(np.all(np.diff(yaw[int(10 * frequency) :]) * np.sign(rate[0]) > 0)),

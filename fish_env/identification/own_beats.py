@@ -84,13 +84,10 @@ def own_beats(problem: SeriesProblem, differ: bool = False) -> OwnBeats:
     free = problem.with_runs([_with_free_phase(run) for run in problem.runs])
     if len(free.runs) < FEWEST or "frequency_scale" in free.model.effects:
         return OwnBeats()
-    coarse = _left(free.until(BEGINNING_S), {SCALE: COARSE})
-    if coarse is None:
+    best = _comb(free)
+    if best is None:
         return OwnBeats()
-    comb = COARSE[int(np.argmin(coarse.sum(axis=1)))] + COMB
-    left = _left(free, {SCALE: comb})
-    if left is None:
-        return OwnBeats()
+    comb, left = best
     total = left.sum(axis=1)
     common = int(np.argmin(total))
     if not 0 < common < len(comb) - 1:
@@ -111,6 +108,26 @@ def own_beats(problem: SeriesProblem, differ: bool = False) -> OwnBeats:
         # What runs differ by may look like a law of their beats.
         return own_beats(problem.with_drive(TailDrive()), differ=True)
     return replace(_sagging(free.with_drive(replace(drive, uneven=True)), found), gains=gains)
+
+
+def _comb(problem: SeriesProblem) -> tuple[FloatArray, FloatArray] | None:
+    """A comb of frequencies (n,), and what it leaves in whole runs (n, R); None if nothing can be.
+
+    It is about the frequency that leaves least in the beginnings of runs. Where much is missing
+    that may be a wrong one, so that another comb is tried about the commanded frequency.
+
+    Args:
+        problem: the runs, their starting phases being free.
+    """
+    coarse = _left(problem.until(BEGINNING_S), {SCALE: COARSE})
+    if coarse is None:
+        return None
+    begun = float(COARSE[int(np.argmin(coarse.sum(axis=1)))])
+    centres = {begun, 1.0} if abs(begun - 1.0) > 0.5 * COMB[-1] else {begun}
+    combs = [centre + COMB for centre in sorted(centres)]
+    tried = [(comb, _left(problem, {SCALE: comb})) for comb in combs]
+    usable = [(comb, left) for comb, left in tried if left is not None]
+    return min(usable, key=lambda pair: float(np.log(pair[1].min(axis=0)).sum()), default=None)
 
 
 def _differ(gains: Iterable[float]) -> bool:

@@ -135,3 +135,14 @@ def test_a_doubtful_law_of_the_beat_is_left_to_the_runs(dataset, certain):
     law = tail_drive({EffectParameterId("beat_load", "load"): 1e-4, SCALE: 1.0}, certain)
     beats = own_beats(problem.with_drive(law))
     assert ("beat_load" in beats.drive.effects) == certain
+
+
+def test_beginnings_that_mislead_do_not_decide(dataset):
+    """A comb about their frequency would end before that of most of the time."""
+    runs = []
+    for run in told(dataset, [0.93] * 5).runs:
+        late, values = run.commands.times_s >= 8.0, run.commands.values.copy()
+        values[late, FREQUENCY] *= 0.93
+        runs.append(replace(run, commands=CommandSteps(run.commands.times_s, values)))
+    beats = own_beats(SeriesProblem(replace(dataset, runs=tuple(runs))))
+    assert beats.drive.scale == pytest.approx(1.0, abs=0.015)

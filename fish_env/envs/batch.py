@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -70,7 +70,7 @@ def real_actions(actions: npt.ArrayLike, shape: tuple[int, ...]) -> npt.NDArray[
     return given
 
 
-def _step_kernels(options: EnvOptions) -> Kernels:
+def step_kernels(options: EnvOptions) -> Kernels:
     """The physics of these options with the environment step behind it."""
     composition = options.model.kernels.composition
     return kernels(replace(composition, templates=(*composition.templates, STEP_TEMPLATE)))
@@ -78,7 +78,43 @@ def _step_kernels(options: EnvOptions) -> Kernels:
 
 def physics_of(options: EnvOptions) -> str:
     """What a step of these options computes with: a hash of all kernel sources and of numba."""
-    return cache_folder(_step_kernels(options).composition).name
+    return cache_folder(step_kernels(options).composition).name
+
+
+@dataclass(frozen=True)
+class BatchShape:
+    """Sizes of the arrays that a batch steps in, whatever device they are on.
+
+    Attributes:
+        data_rows: numbers of a fish that last through an episode.
+        queue_slots: control steps whose targets are kept.
+        grid: physics steps of a control step.
+        ring_slots: physics steps whose samples are kept.
+        ring_rows: numbers of a sample.
+        trace_row: first state row of a sample.
+    """
+
+    data_rows: int
+    queue_slots: int
+    grid: Grid
+    ring_slots: int
+    ring_rows: int
+    trace_row: int
+
+    @classmethod
+    def of(cls, options: EnvOptions) -> BatchShape:
+        """The sizes that these options need."""
+        config, lag = options.config, options.observation_lag
+        beat = int(np.ceil(MAX_BEAT_S / config.dt)) + 2
+        return cls(
+            step_kernels(options).module.DATA_ROWS
+            + (len(WAYPOINTS) if options.task == "path" else 0),
+            options.action_lag // config.substeps + 2,
+            _control_step(options),
+            max(beat + lag, config.substeps) + 1,
+            len(options.model.kernels.state_names) if lag else 3,
+            0 if lag else INTEGRAL_ROW,
+        )
 
 
 def _control_step(options: EnvOptions) -> Grid:
@@ -107,20 +143,15 @@ class FishBatch:
         self.options = options
         self.count = count
         self.threads = threads or default_threads()
-        config = options.config
-        rows = _step_kernels(options).module.DATA_ROWS
-        rows += len(WAYPOINTS) if options.task == "path" else 0
-        self._data = np.zeros((rows, count))
+        config, shape = options.config, BatchShape.of(options)
+        self._data = np.zeros((shape.data_rows, count))
         self._actions = np.zeros((count, 5), np.float32)
         self._substeps = config.substeps
-        self._queue = np.zeros((options.action_lag // config.substeps + 2, 5, count))
+        self._queue = np.zeros((shape.queue_slots, 5, count))
         self._queue_at = 0
-        self._grid = _control_step(options)
-        self._trace_row = 0 if options.observation_lag else INTEGRAL_ROW
-        beat = int(np.ceil(MAX_BEAT_S / config.dt)) + 2
-        slots = max(beat + options.observation_lag, config.substeps) + 1
-        traced = len(options.model.kernels.state_names) if options.observation_lag else 3
-        self._ring = np.zeros((slots, traced, count))
+        self._grid = shape.grid
+        self._trace_row = shape.trace_row
+        self._ring = np.zeros((shape.ring_slots, shape.ring_rows, count))
         self._ring_at = 0
         self._history = np.zeros((0, count))
         self._setup = config.setup(options.task)
@@ -138,7 +169,7 @@ class FishBatch:
     def _bind(self) -> None:
         """Compiled code and views of the data, which are not part of a pickle."""
         self._base = self.options.model.kernels
-        self._kernels = _step_kernels(self.options)
+        self._kernels = step_kernels(self.options)
         self._rows = rows = self._kernels.module
         self.reward = self._data[rows.ROW_REWARD]
         self.outputs = self._data[rows.ROW_OUTPUT : rows.ROW_OUTPUT + len(OUTPUTS)]

@@ -25,6 +25,7 @@ OPEN_TO_AGENTS = {
     "trajectory",
     "simulator",
     "envs",
+    "gpu",
     "plotting",
     "rendering",
     "replay",

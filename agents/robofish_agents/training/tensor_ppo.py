@@ -1,0 +1,310 @@
+"""PPO over tensors: rollouts and updates stay on the device of the environment.
+
+For :class:`fish_env.gpu.vector.RoboticFish3DDeviceEnv`, whose tensors are the memory of the GPU, so
+that nothing goes through the host. On the CPU :class:`HostEnv` gives the same interface, with which
+recipes can be tried without a GPU.
+
+Schulman et al., "Proximal Policy Optimization Algorithms", arXiv:1707.06347; advantages by
+"High-Dimensional Continuous Control Using Generalized Advantage Estimation", arXiv:1506.02438.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import torch
+from torch import Tensor, nn
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What a training does.
+
+    Attributes:
+        iterations: rollouts, each followed by an update.
+        steps: control steps of each fish in a rollout.
+        epochs: passes of an update over its rollout.
+        minibatches: gradient steps of a pass.
+        learning_rate: at the start; falls linearly to zero.
+        gamma: discount of a control step.
+        trace: decay lambda of the advantages.
+        clip: largest change of the ratio of probabilities that is rewarded.
+        layers: widths of hidden layers, of policy and value each.
+        log_std: logarithm of the deviation of actions at the start.
+    """
+
+    iterations: int = 40
+    steps: int = 32
+    epochs: int = 5
+    minibatches: int = 8
+    learning_rate: float = 2e-3
+    gamma: float = 0.98
+    trace: float = 0.95
+    clip: float = 0.2
+    layers: tuple[int, ...] = (64, 64)
+    log_std: float = -0.5
+
+    def shortened(self, iterations: int) -> Recipe:
+        """The same with fewer iterations."""
+        return replace(self, iterations=iterations)
+
+
+HOLD = Recipe(minibatches=4, learning_rate=3e-3)
+"""Learns `hold` in still water, with HOLD_FISH fish, in few gradient steps: on a GPU, a minibatch
+takes about as long whatever its size."""
+HOLD_FISH = 2048
+
+
+class ActorCritic(nn.Module):
+    """A normal policy of actions, and the value of an observation."""
+
+    def __init__(self, observed: int, actions: int, recipe: Recipe) -> None:
+        """Draw the weights.
+
+        Args:
+            observed: numbers of an observation.
+            actions: numbers of an action.
+            recipe: layers and deviation.
+        """
+        super().__init__()
+        self.mean = _perceptron(observed, recipe.layers, actions, 0.01)
+        self.value = _perceptron(observed, recipe.layers, 1, 1.0)
+        self.log_std = nn.Parameter(torch.full((actions,), recipe.log_std))
+
+    def log_probability(self, observed: Tensor, actions: Tensor) -> Tensor:
+        """Logarithm of the density (N,) of actions (N, actions)."""
+        scaled = (actions - self.mean(observed)) * torch.exp(-self.log_std)
+        constant = actions.shape[-1] * 0.5 * math.log(2.0 * math.pi)
+        density: Tensor = -0.5 * (scaled * scaled).sum(-1) - self.log_std.sum() - constant
+        return density
+
+    def act(self, observed: Tensor) -> tuple[Tensor, Tensor]:
+        """Drawn actions (N, actions) and the logarithm of their density (N,)."""
+        mean = self.mean(observed)
+        noise = torch.randn_like(mean)
+        constant = noise.shape[-1] * 0.5 * math.log(2.0 * math.pi)
+        density = -0.5 * (noise * noise).sum(-1) - self.log_std.sum() - constant
+        return mean + noise * torch.exp(self.log_std), density
+
+
+def _perceptron(inputs: int, widths: tuple[int, ...], outputs: int, gain: float) -> nn.Sequential:
+    layers: list[nn.Module] = []
+    for width in widths:
+        layers += [_linear(inputs, width, math.sqrt(2.0)), nn.Tanh()]
+        inputs = width
+    return nn.Sequential(*layers, _linear(inputs, outputs, gain))
+
+
+def _linear(inputs: int, outputs: int, gain: float) -> nn.Linear:
+    layer = nn.Linear(inputs, outputs)
+    nn.init.orthogonal_(layer.weight, gain)
+    nn.init.zeros_(layer.bias)
+    return layer
+
+
+class Rollout(NamedTuple):
+    """A rollout, (steps, N, ...) each; ``observed`` has the observations behind it too."""
+
+    observed: Tensor
+    actions: Tensor
+    log_probability: Tensor
+    reward: Tensor
+    terminated: Tensor
+    truncated: Tensor
+    final: Tensor
+
+
+class Trained(NamedTuple):
+    """A policy, and how it came about.
+
+    Attributes:
+        policy: the policy.
+        seconds: time of training (s).
+        steps: control steps of all fish together.
+        updates: gradient steps.
+    """
+
+    policy: ActorCritic
+    seconds: float
+    steps: int
+    updates: int
+
+
+def collect(env: Any, policy: ActorCritic, observed: Tensor, recipe: Recipe) -> Rollout:
+    """Take the steps of one rollout; ``observed`` is the environment's own tensor."""
+    steps, device = recipe.steps, observed.device
+    count, actions = observed.shape[0], env.single_action_space.shape[0]
+
+    def rows(*shape: int) -> Tensor:
+        return torch.empty(shape, device=device)
+
+    taken = Rollout(
+        rows(steps + 1, *observed.shape),
+        rows(steps, count, actions),
+        rows(steps, count),
+        rows(steps, count),
+        rows(steps, count),
+        rows(steps, count),
+        rows(steps, *observed.shape),
+    )
+    with torch.no_grad():
+        for step in range(steps):
+            taken.observed[step] = observed
+            taken.actions[step], taken.log_probability[step] = policy.act(observed)
+            _, reward, terminated, truncated, infos = env.step(taken.actions[step])
+            taken.reward[step] = reward
+            taken.terminated[step], taken.truncated[step] = terminated, truncated
+            taken.final[step] = infos["final_obs"]
+        taken.observed[steps] = observed
+    return taken
+
+
+def advantages(policy: ActorCritic, taken: Rollout, recipe: Recipe) -> tuple[Tensor, Tensor]:
+    """Generalised advantages and returns, (steps, N) each.
+
+    A truncated episode would have gone on: the value of where it was cut off counts.
+
+    Args:
+        policy: gives the values.
+        taken: the rollout.
+        recipe: discount and decay.
+    """
+    with torch.no_grad():
+        value = policy.value(taken.observed).squeeze(-1)
+        cut_off = policy.value(taken.final).squeeze(-1)
+    goes_on = 1.0 - torch.maximum(taken.terminated, taken.truncated)
+    following = torch.where(taken.truncated > 0.0, cut_off, goes_on * value[1:])
+    surprise = taken.reward + recipe.gamma * following - value[:-1]
+    found, ahead = torch.empty_like(surprise), torch.zeros_like(surprise[0])
+    decay = recipe.gamma * recipe.trace * goes_on
+    for step in reversed(range(len(found))):
+        ahead = surprise[step] + decay[step] * ahead
+        found[step] = ahead
+    return found, found + value[:-1]
+
+
+def loss_of(policy: ActorCritic, batch: list[Tensor], recipe: Recipe) -> Tensor:
+    """Loss of a minibatch: observations, actions, their densities, advantages and returns."""
+    observed, actions, before, advantage, returns = batch
+    advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
+    ratio = torch.exp(policy.log_probability(observed, actions) - before)
+    clipped = torch.clamp(ratio, 1.0 - recipe.clip, 1.0 + recipe.clip)
+    gain = torch.minimum(ratio * advantage, clipped * advantage).mean()
+    error = policy.value(observed).squeeze(-1) - returns
+    loss: Tensor = 0.5 * (error * error).mean() - gain
+    return loss
+
+
+def update(
+    policy: ActorCritic, optimiser: torch.optim.Optimizer, taken: Rollout, recipe: Recipe
+) -> None:
+    """Improve policy and values by one rollout."""
+    advantage, returns = advantages(policy, taken, recipe)
+    whole = (taken.observed[:-1], taken.actions, taken.log_probability, advantage, returns)
+    flat = [rows.flatten(0, 1) for rows in whole]
+    size = len(flat[0]) // recipe.minibatches
+    for _ in range(recipe.epochs):
+        order = torch.randperm(len(flat[0]), device=returns.device)
+        for first in range(0, size * recipe.minibatches, size):
+            chosen = order[first : first + size]
+            optimiser.zero_grad(set_to_none=True)
+            loss = loss_of(policy, [rows[chosen] for rows in flat], recipe)
+            torch.autograd.backward(loss)
+            nn.utils.clip_grad_norm_(policy.parameters(), 0.5)
+            optimiser.step()
+
+
+def train(env: Any, recipe: Recipe, seed: int) -> Trained:
+    """Train a policy.
+
+    Args:
+        env: an environment of tensors that restarts episodes within a step.
+        recipe: what to do.
+        seed: of weights, actions and fish.
+    """
+    torch.manual_seed(seed)
+    observed, _ = env.reset(seed=seed)
+    _wait(observed)
+    started = time.perf_counter()
+    sizes = observed.shape[1], env.single_action_space.shape[0]
+    policy = ActorCritic(*sizes, recipe).to(observed.device)
+    optimiser = torch.optim.Adam(policy.parameters(), recipe.learning_rate, eps=1e-5)
+    for iteration in range(recipe.iterations):
+        for group in optimiser.param_groups:
+            group["lr"] = recipe.learning_rate * (1.0 - iteration / recipe.iterations)
+        update(policy, optimiser, collect(env, policy, observed, recipe), recipe)
+    _wait(observed)
+    return Trained(
+        policy,
+        time.perf_counter() - started,
+        recipe.iterations * recipe.steps * len(observed),
+        recipe.iterations * recipe.epochs * recipe.minibatches,
+    )
+
+
+def success_rate(env: Any, policy: ActorCritic, seed: int) -> float:
+    """Share of fish that succeed in their first episode with the policy's mean actions.
+
+    Args:
+        env: an environment of tensors that restarts episodes within a step.
+        policy: what acts.
+        seed: of the fish.
+    """
+    observed, _ = env.reset(seed=seed)
+    waiting = torch.ones(len(observed), dtype=torch.bool, device=observed.device)
+    succeeded = torch.zeros_like(waiting)
+    with torch.no_grad():
+        while bool(waiting.any()):
+            observed, _, terminated, truncated, infos = env.step(policy.mean(observed))
+            ended = (terminated | truncated) & waiting
+            held = infos["final_info"]["is_success"] > 0.0
+            succeeded |= ended & held & ~terminated
+            waiting &= ~ended
+    return float(succeeded.float().mean())
+
+
+def _wait(tensor: Tensor) -> None:
+    """Wait for the device of a tensor."""
+    if tensor.is_cuda:
+        torch.cuda.synchronize()
+
+
+class HostEnv:
+    """A vector environment on the CPU, with tensors in place of arrays.
+
+    Args:
+        envs: a ``RoboticFish3DVectorEnv`` with ``autoreset_mode="SameStep"``.
+    """
+
+    def __init__(self, envs: Any) -> None:
+        self._envs = envs
+        self.single_action_space = envs.single_action_space
+        self.num_envs = envs.num_envs
+        self._observed = torch.zeros(self.num_envs, envs.single_observation_space.shape[0])
+        self._final = torch.zeros_like(self._observed)
+        self._succeeded = torch.zeros(self.num_envs)
+
+    def reset(self, *, seed: int | None = None) -> tuple[Tensor, dict[str, Any]]:
+        """As of a vector environment."""
+        observed, infos = self._envs.reset(seed=seed)
+        self._observed.copy_(torch.from_numpy(observed))
+        return self._observed, infos
+
+    def step(self, actions: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor, dict[str, Any]]:
+        """As of a vector environment; ``final_obs`` and ``final_info`` hold for ended episodes."""
+        observed, reward, terminated, truncated, infos = self._envs.step(actions.numpy())
+        self._observed.copy_(torch.from_numpy(observed))
+        for lane in (terminated | truncated).nonzero()[0]:
+            self._final[lane] = torch.from_numpy(infos["final_obs"][lane])
+            self._succeeded[lane] = infos["final_info"]["is_success"][lane]
+        left = {"final_obs": self._final, "final_info": {"is_success": self._succeeded}}
+        return (
+            self._observed,
+            torch.from_numpy(reward).float(),
+            torch.from_numpy(terminated),
+            torch.from_numpy(truncated),
+            left,
+        )

@@ -1,0 +1,113 @@
+"""The CUDA kernels of one environment, or of rollouts of one composition."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Mapping
+from functools import cache
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from fish_env.envs.batch import BatchShape, step_kernels
+from fish_env.envs.options import EnvOptions
+from fish_env.envs.start import FLOW
+from fish_env.errors import ConfigError
+from fish_env.gpu import loops
+from fish_env.gpu.arithmetic import FLOAT32
+from fish_env.gpu.arrays import available
+from fish_env.gpu.goals import TASK_NUMBERS
+from fish_env.gpu.target import SIMULATED, Target
+from fish_env.model.runtime import Kernels
+
+# Of a few fish there is nothing else to launch.
+warnings.filterwarnings("ignore", message="Grid size .* under-utilization")
+THREADS = 128
+"""Threads of a block."""
+REGISTERS = 255
+"""A fish in registers needs nearly all that a thread can have."""
+
+
+def real_type(precision: str) -> type[Any]:
+    """The type of the numbers.
+
+    Raises:
+        ConfigError: another name than ``"float32"`` and ``"float64"``.
+    """
+    if precision not in ("float32", "float64"):
+        raise ConfigError(f"precision '{precision}': 'float32' or 'float64'")
+    return np.float32 if precision == "float32" else np.float64
+
+
+def check_device() -> None:
+    """Make sure that there is a device.
+
+    Raises:
+        ConfigError: there is none; says what to do.
+    """
+    if not available():
+        raise ConfigError(
+            "no CUDA GPU can be used: install the extra with `pip install robotic-fish[gpu]` on a "
+            "machine with an NVIDIA GPU and its driver, or use gymnasium.make_vec on the CPU"
+        )
+
+
+def blocks_for(count: int) -> int:
+    """Blocks of threads for so many fish."""
+    return -(-count // threads_for(count))
+
+
+def threads_for(count: int) -> int:
+    """Threads of a block; the simulator starts each thread of a block, however many are needed."""
+    return min(THREADS, count) if SIMULATED else THREADS
+
+
+def _target(module: ModuleType, real: type[Any], further: Mapping[str, Any]) -> Target:
+    replacements: dict[Any, Any] = {module.advance_block: loops.advance_fish}
+    if real is np.float32:
+        replacements |= FLOAT32
+    return Target(real, replacements, vars(module) | {"REAL": real} | dict(further))
+
+
+class EnvironmentKernels:
+    """CUDA kernels of an environment: reset, step, what follows a step, and the counters.
+
+    Attributes:
+        module: the composed module, which says where rows are.
+    """
+
+    def __init__(self, options: EnvOptions, real: type[Any], mode: int) -> None:
+        """Prepare the kernels; each is compiled at its first launch.
+
+        Args:
+            options: the environment.
+            real: type of its numbers.
+            mode: when episodes are started anew (see :mod:`fish_env.gpu.loops`).
+        """
+        self.module = step_kernels(options).module
+        shape = BatchShape.of(options)
+        flow = [options.model.row_of(path) for path in FLOW]
+        constants = {
+            "BACK": options.observation_lag,
+            "FLOW_EAST_ROW": -1 if flow[1] is None else flow[1],
+            "FLOW_NORTH_ROW": -1 if flow[0] is None else flow[0],
+            "MODE": mode,
+            "SUBSTEPS": options.config.substeps,
+            "TASK": TASK_NUMBERS[options.task],
+            "TRACE_ROW": shape.trace_row,
+            "TRACE_ROWS": shape.ring_rows,
+        }
+        target = _target(self.module, real, constants)
+        self.step = target.launched(loops.step, max_registers=REGISTERS)
+        self.finish = target.launched(loops.finish)
+        self.reset = target.launched(loops.reset)
+        self.count_step = target.launched(loops.count_step)
+
+
+@cache
+def rollout_kernel(kernels: Kernels, precision: str, trace_row: int, trace_rows: int) -> Any:
+    """The CUDA kernel of rollouts that store these rows of the state."""
+    constants = {"TRACE_ROW": trace_row, "TRACE_ROWS": trace_rows}
+    target = _target(kernels.module, real_type(precision), constants)
+    return target.launched(loops.rollout, max_registers=REGISTERS)

@@ -13,14 +13,14 @@ from fish_env.arrays import FloatArray
 from fish_env.inference.adequacy import disturbance_at_limit, implausible_estimates
 from fish_env.inference.drive import beside_drive, drifting, measured, under_relaxed_noise
 from fish_env.inference.effort import FULL, Effort
-from fish_env.inference.elimination import backward_elimination
+from fish_env.inference.elimination import allowed_loss, backward_elimination, may_not_act
 from fish_env.inference.estimate.again import to_publish
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.hypotheses import CauseId, Coefficient
 from fish_env.inference.left_out import left_out_scores
 from fish_env.inference.many_causes import challenged, pursue
-from fish_env.inference.parallel import both
+from fish_env.inference.parallel import both, side_by_side
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause
 from fish_env.inference.problem import Problem
@@ -29,6 +29,7 @@ from fish_env.inference.rivals import agreed, explained_away, rivals_of, tied
 from fish_env.inference.screening import Screen, screen
 from fish_env.inference.search import refits, restart_from_winner
 from fish_env.inference.shortlist import like, newly_shown, shortlisted
+from fish_env.inference.substitution import without
 from fish_env.inference.trials import tried_out
 
 
@@ -160,13 +161,38 @@ def settled(found: Attribution, thoroughly: bool, report: Callable[[str], None])
     failed = found.failed if current.causes == found.accepted.causes else frozenset()
     # What else is missing moves estimates by more than a few steps more would.
     if current.causes and thoroughly and not disturbance_at_limit(current.fit):
-        report("iterating the estimates to convergence")
-        final = reached(lambda: to_publish(current.fit))
-        current = Explanation(current.causes, final) if final else current
+        current = _published(current, report)
+    rivals = (*found.rivals, *unnecessary)
+    if thoroughly and rivals:
+        rivals = tuple(side_by_side([partial(_acting, e) for e in rivals]))
     # A rival that contains the accepted causes is no rival once a cause is dropped.
-    others = (e for e in found.rivals if not set(current.causes) <= set(e.causes))
-    rivals = (*others, *unnecessary)
+    rivals = tuple(e for e in rivals if not set(current.causes) <= set(e.causes))
     return replace(found, accepted=current, rivals=rivals, failed=failed)
+
+
+def _published(current: Explanation, report: Callable[[str], None]) -> Explanation:
+    """The explanation with converged estimates, and without causes that then may not act."""
+    while current.causes:
+        report("iterating the estimates to convergence")
+        final = reached(partial(to_publish, current.fit))
+        if final is None:
+            break
+        current = Explanation(current.causes, final)
+        if not any(may_not_act(final, cause) for cause in current.causes):
+            break
+        smaller, _ = backward_elimination(current)
+        if smaller.causes == current.causes:
+            break
+        current = smaller
+    return current
+
+
+def _acting(rival: Explanation) -> Explanation:
+    """A rival without the causes that may not act in it, if one fit can do without all of these."""
+    idle = [cause for cause in rival.causes if may_not_act(rival.fit, cause)]
+    smaller = without(rival, idle) if 0 < len(idle) < len(rival.causes) else None
+    least = POLICY.evidence_doubt + sum(allowed_loss(rival.fit, cause) for cause in idle)
+    return smaller if smaller and smaller.score < rival.score + least else rival
 
 
 @dataclass(frozen=True, eq=False)

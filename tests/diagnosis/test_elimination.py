@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fish_env.effects import catalogue
+from fish_env.inference.attribution import Attribution, settled
 from fish_env.inference.elimination import allowed_loss, backward_elimination, may_not_act
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.explanation import Explanation
@@ -114,3 +115,30 @@ def test_one_of_two_look_alikes_goes_and_may_be_a_rival(apart_by, kept, rivals):
     best, others = backward_elimination(found)
     assert {*best.causes} == kept
     assert [{*other.causes} for other in others] == rivals
+
+
+def attribution_of(accepted, rivals=()):
+    """What a search has found; of the screens nothing counts here."""
+    return Attribution(accepted, None, None, accepted, tuple(rivals), (), 0.0)
+
+
+def test_nothing_is_published_whose_converged_interval_holds_its_absence():
+    problem = Stated(
+        apart({"current": [9.0] * 3, "scale": [0.3] * 3}), [effect("current"), effect("scale")]
+    )
+    far = Point(np.zeros(1), {size_of("current"): 9.0, size_of("scale"): 30.0})
+    begun = fit(problem, ("current", "scale"), far, refit_noise=False, iterations=0)
+    both = Explanation(("current", "scale"), begun)
+    assert not may_not_act(begun, "scale")
+    assert settled(attribution_of(both), False, print).accepted.causes == ("current", "scale")
+    assert settled(attribution_of(both), True, print).accepted.causes == ("current",)
+
+
+def test_nor_is_it_given_with_a_rival():
+    targets = {"current": [9.0] * 3, "other": [9.0] * 3, "scale": [0.3] * 3}
+    problem = Stated(apart(targets), [effect(name) for name in targets])
+    best = Explanation(("other",), fit(problem, ("other",), refit_noise=False))
+    names = ("current", "scale")
+    rival = Explanation(names, fit(problem, names, refit_noise=False))
+    found = settled(attribution_of(best, [rival]), True, print)
+    assert [other.causes for other in found.rivals] == [("current",)]

@@ -48,8 +48,8 @@ def check_device() -> None:
     """
     if not available():
         raise ConfigError(
-            "no CUDA GPU can be used: install the extra with `pip install robotic-fish[gpu]` on a "
-            "machine with an NVIDIA GPU and its driver, or use gymnasium.make_vec on the CPU"
+            "no CUDA GPU can be used: on a machine with an NVIDIA GPU and its driver, run "
+            '`pip install ".[gpu]"` in the clone; on the CPU use gymnasium.make_vec'
         )
 
 

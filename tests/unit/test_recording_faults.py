@@ -28,7 +28,7 @@ def test_coarse_digits_of_a_body_at_rest_are_no_fault():
 
 
 def test_the_same_row_is_a_fault_while_something_drives_the_body():
-    with pytest.raises(DatasetError, match=r"r is -?0 in 3\d samples in a row"):
+    with pytest.raises(DatasetError, match=r"r is stuck at -?0 for 3\d samples in a row"):
         check_stuck("pool: run r1", turning(DIGIT, 0.2), "r")
 
 

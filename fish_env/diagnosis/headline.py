@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +12,7 @@ from fish_env.inference.policy import POLICY
 Answer = Mapping[str, Any]
 EXPERIMENT_FILE = "next_experiment.csv"
 MOST_NAMED = 3
+"""Causes that are told with their values, and values of one cause."""
 LONGEST_FIX = 160
 """Longest lines to write that the next step quotes, in characters."""
 
@@ -70,18 +71,34 @@ def _verdict(answer: Answer) -> str:
         told = " ".join(fault["words"].partition(" Write ")[0] for fault in faults)
         rest = _verdict({**answer, "verdict": answer.get("verdict_once_corrected", "no_misfit")})
         return f"{told or 'The data or their description are wrong.'} Once corrected: {rest}"
-    named = _joined(map(_cause, answer["causes"]), "and")
-    others = _joined((_joined(map(_cause, o), "and") for o in answer["alternatives"]), "or")
+    named = _named(answer["causes"])
     said = {
         "no_misfit": "No model error is detectable in these data.",
         "not_excited": "No model error is detectable, but these data could not show most effects.",
         "parameters": f"The structure of the model holds, but its numbers are wrong: {named}.",
         "cause": f"The simulation lacks {named}.",
-        "ambiguous": f"The simulation lacks {named}, or instead {others}.",
+        "ambiguous": f"The simulation lacks {_either(answer['causes'], answer['alternatives'])}.",
         "partial": f"The simulation lacks {named}, and something that no known effect explains.",
         "outside_library": "Something is missing that no known effect explains.",
     }[answer["verdict"]]
     return f"Doubtful: {said[0].lower()}{said[1:]}" if _doubtful(answer) else said
+
+
+def _named(causes: Sequence[Answer]) -> str:
+    """Causes with their values, or of many the names: a table below has the values."""
+    few = len(causes) <= MOST_NAMED
+    return _joined([_cause(c) if few else short_name(c["name"]) for c in causes], "and")
+
+
+def _either(causes: Sequence[Answer], alternatives: Sequence[Sequence[Answer]]) -> str:
+    """Explanations that the data cannot tell apart: what they share, and then where they differ."""
+    every = [causes, *alternatives]
+    common = set.intersection(*({cause["name"] for cause in one} for one in every))
+    own = [[cause for cause in one if cause["name"] not in common] for one in every]
+    shared = [cause for cause in causes if cause["name"] in common]
+    if not shared or not all(own):
+        return f"{_named(causes)}, or instead {_joined(map(_named, alternatives), 'or')}"
+    return f"{_named(shared)}, and either {_joined(map(_named, own), 'or')}"
 
 
 def _cause(cause: Answer) -> str:

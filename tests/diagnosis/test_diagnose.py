@@ -135,6 +135,24 @@ def test_every_verdict_has_words(verdict):
     assert all(line in console.file.getvalue() for line in said.lines)
 
 
+def test_what_alternatives_share_is_told_once_and_many_causes_without_values():
+    wave, drag, lag, delay = ({**CAUSE, "name": n} for n in ("wave", "drag", "lag", "delay"))
+    two = headline(ambiguous([wave, lag], [wave, delay])).verdict
+    assert two.startswith("The simulation lacks wave (north 0.04 m/s), and either lag (")
+    assert " or delay (" in two
+    many = headline(ambiguous([CAUSE, wave, drag, lag], [CAUSE, wave, drag, delay])).verdict
+    assert "lacks current (north 0.04 m/s), wave (north 0.04 m/s) and drag (" in many
+    every = [CAUSE, wave, drag, lag]
+    told = headline({"verdict": "cause", "causes": every, "alternatives": []}).verdict
+    assert told == "The simulation lacks current, wave, drag and lag."
+    contained = headline(ambiguous([wave, lag], [wave])).verdict
+    assert contained.endswith(", or instead wave (north 0.04 m/s).")
+
+
+def ambiguous(causes, *alternatives):
+    return {"verdict": "ambiguous", "causes": causes, "alternatives": list(alternatives)}
+
+
 def test_an_answer_that_closes_hardly_any_gap_says_so_first():
     answer = {"verdict": "cause", "causes": [CAUSE], "alternatives": []}
     for share, doubtful in ((0.05, True), (0.5, False)):

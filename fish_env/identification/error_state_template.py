@@ -41,10 +41,11 @@ WRENCH = PAR + N_PARAMETERS - 6
 DIVERGED = 1e4
 MOST_SWING = 1.2  # swing of a soft tail over the told one, below its resonance
 TOLD_PHASE = 1 + HEARD.index("phase")  # its row in a slot of a history
-STEP_S = 0.01
-SETTLING_STEPS = 100
+STEP_S = 0.005
+SETTLING_STEPS = 200
 SETTLING_S = STEP_S * SETTLING_STEPS
-"""A tail that was beating before its run has done so for this long: what rings has died away."""
+"""A tail that was beating before its run has done so for this long: what rings has died away. Steps
+are as long as those of motion with corners: a lag that these follow diverges in longer ones."""
 
 
 @kernel

@@ -16,7 +16,7 @@ from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
 from fish_env.params import load_fish
 from fish_env.simulator import Simulator
-from tests.identification.synthetic import ALL, FISH, Setup, simulate
+from tests.identification.synthetic import ALL, FISH, PATHS, Setup, simulate
 from tests.inference.stated import fit_of
 
 
@@ -173,3 +173,21 @@ def test_a_model_that_diverges_on_final_runs_loses_by_a_finite_amount():
 )
 def test_a_model_no_better_than_the_mean_is_useless(percent, useless):
     assert Gain((), Pair(-5.0, percent), {}, {}, None, None).is_useless is useless
+
+
+def test_a_window_begins_where_a_quick_lag_beside_corners_has_settled():
+    """Steps before the window are as short as within it: in longer ones such a lag diverges."""
+    setup = Setup(runs=1)
+    problem = SeriesProblem(simulate(setup), paths=PATHS)
+    quick = {
+        EffectParameterId("servo_lag", "time_constant"): 0.003,
+        EffectParameterId("servo_rate_limit", "rate"): 50.0,
+    }
+    point = Point(np.zeros(len(PATHS)), quick)
+    (filtered,) = problem.filtered(point, setup.noise)
+    cut = problem.with_runs(open_loop.windows(problem.runs[0], filtered, 3.0, problem.channels))
+    gyro = problem.channels.index("r")
+    assert len(cut.runs) > 1
+    for run, error in zip(cut.runs, open_loop.errors(cut, point, setup.noise), strict=True):
+        seen = np.isfinite(run.measured[:, gyro])
+        assert np.abs(error[seen, gyro]).max() < 10.0  # where it diverges it is no number

@@ -166,7 +166,7 @@ def settled(found: Attribution, thoroughly: bool, report: Callable[[str], None])
     if thoroughly and rivals:
         rivals = tuple(side_by_side([partial(_acting, e) for e in rivals]))
     # A rival that contains the accepted causes is no rival once a cause is dropped.
-    rivals = tuple(e for e in rivals if not set(current.causes) <= set(e.causes))
+    rivals = tuple(e for e in rivals if e.causes and not set(current.causes) <= set(e.causes))
     return replace(found, accepted=current, rivals=rivals, failed=failed)
 
 
@@ -180,19 +180,21 @@ def _published(current: Explanation, report: Callable[[str], None]) -> Explanati
         current = Explanation(current.causes, final)
         if not any(may_not_act(final, cause) for cause in current.causes):
             break
-        smaller, _ = backward_elimination(current)
+        smaller = _acting(current)
+        if smaller is current:  # one of them may act
+            smaller, _ = backward_elimination(current)
         if smaller.causes == current.causes:
             break
         current = smaller
     return current
 
 
-def _acting(rival: Explanation) -> Explanation:
-    """A rival without the causes that may not act in it, if one fit can do without all of these."""
-    idle = [cause for cause in rival.causes if may_not_act(rival.fit, cause)]
-    smaller = without(rival, idle) if 0 < len(idle) < len(rival.causes) else None
-    least = POLICY.evidence_doubt + sum(allowed_loss(rival.fit, cause) for cause in idle)
-    return smaller if smaller and smaller.score < rival.score + least else rival
+def _acting(found: Explanation) -> Explanation:
+    """The explanation without causes that may not act, if one fit can do without all of these."""
+    idle = [cause for cause in found.causes if may_not_act(found.fit, cause)]
+    smaller = without(found, idle) if idle else None
+    least = POLICY.evidence_doubt + sum(allowed_loss(found.fit, cause) for cause in idle)
+    return smaller if smaller and smaller.score < found.score + least else found
 
 
 @dataclass(frozen=True, eq=False)

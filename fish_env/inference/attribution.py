@@ -172,21 +172,9 @@ def settled(found: Attribution, thoroughly: bool, report: Callable[[str], None])
 
 def _published(current: Explanation, report: Callable[[str], None]) -> Explanation:
     """The explanation with converged estimates, and without causes that then may not act."""
-    while current.causes:
-        report("iterating the estimates to convergence")
-        final = reached(partial(to_publish, current.fit))
-        if final is None:
-            break
-        current = Explanation(current.causes, final)
-        if not any(may_not_act(final, cause) for cause in current.causes):
-            break
-        smaller = _acting(current)
-        if smaller is current:  # one of them may act
-            smaller, _ = backward_elimination(current)
-        if smaller.causes == current.causes:
-            break
-        current = smaller
-    return current
+    report("iterating the estimates to convergence")
+    final = reached(partial(to_publish, current.fit))
+    return current if final is None else _acting(Explanation(current.causes, final))
 
 
 def _acting(found: Explanation) -> Explanation:

@@ -9,6 +9,18 @@ from __future__ import annotations
 
 import math
 
+from fish_env.envs.guides import (
+    CRUISE,
+    EAST,
+    HEADING,
+    KIND,
+    LENGTH,
+    NORTH,
+    PITCH,
+    POINTS,
+    RADIUS,
+    SWING,
+)
 from fish_env.envs.layout import GOAL, WAYPOINTS, GoalKind
 from fish_env.envs.tasks.path import (
     DRAWN_LEGS,
@@ -33,16 +45,6 @@ DISTANCE, WALLED, WALLS_NORTH = at("station_distance"), at("walled"), at("walls_
 WALLS_EAST, SHAPE_ENDS = at("walls_east"), at("shape_ends")
 
 N_GOAL, N_POINTS = len(GOAL), len(WAYPOINTS)
-HEADING = GOAL.index("heading_base")
-CRUISE = GOAL.index("cruise_speed")
-KIND = GOAL.index("kind")
-NORTH = GOAL.index("place_north")
-EAST = GOAL.index("place_east")
-RADIUS = GOAL.index("path_radius")
-PITCH = GOAL.index("path_pitch")
-SWING = GOAL.index("path_swing")
-LENGTH = GOAL.index("path_length")
-POINTS = GOAL.index("path_points")
 CIRCLE, LEGS, PLACE = float(GoalKind.CIRCLE), float(GoalKind.LEGS), float(GoalKind.PLACE)
 PI = math.pi
 

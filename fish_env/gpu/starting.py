@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import ndtr
 
+from fish_env.envs.guides import HEADING
 from fish_env.envs.layout import GOAL, Setup
 from fish_env.envs.randomization import TRUNCATE
 from fish_env.envs.start import POSE_DRAWS
 from fish_env.envs.tasks import GOAL_DRAWS
 from fish_env.gpu.goals import (
-    HEADING,
     N_POINTS,
     TASK_PATH,
     TASK_STATION,

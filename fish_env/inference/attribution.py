@@ -13,7 +13,7 @@ from fish_env.arrays import FloatArray
 from fish_env.inference.adequacy import disturbance_at_limit, implausible_estimates
 from fish_env.inference.drive import beside_drive, drifting, measured, under_relaxed_noise
 from fish_env.inference.effort import FULL, Effort
-from fish_env.inference.elimination import allowed_loss, backward_elimination, may_not_act
+from fish_env.inference.elimination import backward_elimination, without_idle
 from fish_env.inference.estimate.again import to_publish
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.explanation import Explanation, reached
@@ -29,7 +29,6 @@ from fish_env.inference.rivals import agreed, explained_away, rivals_of, tied
 from fish_env.inference.screening import Screen, screen
 from fish_env.inference.search import refits, restart_from_winner
 from fish_env.inference.shortlist import like, newly_shown, shortlisted
-from fish_env.inference.substitution import without
 from fish_env.inference.trials import tried_out
 
 
@@ -164,7 +163,7 @@ def settled(found: Attribution, thoroughly: bool, report: Callable[[str], None])
         current = _published(current, report)
     rivals = (*found.rivals, *unnecessary)
     if thoroughly and rivals:
-        rivals = tuple(side_by_side([partial(_acting, e) for e in rivals]))
+        rivals = tuple(side_by_side([partial(without_idle, e) for e in rivals]))
     # A rival that contains the accepted causes is no rival once a cause is dropped.
     rivals = tuple(e for e in rivals if e.causes and not set(current.causes) <= set(e.causes))
     return replace(found, accepted=current, rivals=rivals, failed=failed)
@@ -174,15 +173,7 @@ def _published(current: Explanation, report: Callable[[str], None]) -> Explanati
     """The explanation with converged estimates, and without causes that then may not act."""
     report("iterating the estimates to convergence")
     final = reached(partial(to_publish, current.fit))
-    return current if final is None else _acting(Explanation(current.causes, final))
-
-
-def _acting(found: Explanation) -> Explanation:
-    """The explanation without causes that may not act, if one fit can do without all of these."""
-    idle = [cause for cause in found.causes if may_not_act(found.fit, cause)]
-    smaller = without(found, idle) if idle else None
-    least = POLICY.evidence_doubt + sum(allowed_loss(found.fit, cause) for cause in idle)
-    return smaller if smaller and smaller.score < found.score + least else found
+    return current if final is None else without_idle(Explanation(current.causes, final))
 
 
 @dataclass(frozen=True, eq=False)

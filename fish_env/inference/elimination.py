@@ -10,18 +10,16 @@ from scipy.special import chdtri
 from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.coarse_fit import CoarseFitter
 from fish_env.inference.estimate.fit import Fit
-from fish_env.inference.explanation import Explanation, reached
+from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import (
     CauseId,
     Coefficient,
     EffectParameterId,
     ParameterId,
-    of_effects,
 )
 from fish_env.inference.policy import POLICY
-from fish_env.inference.problem import Point
 from fish_env.inference.rivals import rivals_of
-from fish_env.inference.substitution import without
+from fish_env.inference.substitution import coarse_without, without
 from fish_env.inference.tails import chi2_log_tail
 
 
@@ -69,13 +67,17 @@ def _is_needed(fitter: CoarseFitter, cause: CauseId, least: float) -> bool:
         cause: the cause.
         least: growth of -2 log likelihood at which it is needed.
     """
-    own = fitter.fit
-    effects = tuple(e for e in own.effects if e != cause)
-    released = tuple(c for c in own.released if c != cause)
-    begin = Point(own.point.z, of_effects(own.point.effects, effects))
     enough = fitter.base + least + POLICY.coarse_fit_leeway
-    left = reached(lambda: fitter.coarse_fit(effects, released, [begin], enough))
+    left = coarse_without(fitter, cause, enough)
     return left is None or left.objective > enough
+
+
+def without_idle(found: Explanation) -> Explanation:
+    """The explanation without causes that may not act, if one fit can do without all of these."""
+    idle = [cause for cause in found.causes if may_not_act(found.fit, cause)]
+    smaller = without(found, idle) if idle else None
+    least = POLICY.evidence_doubt + sum(allowed_loss(found.fit, cause) for cause in idle)
+    return smaller if smaller and smaller.score < found.score + least else found
 
 
 def allowed_loss(fit: Fit, cause: CauseId, level: float = 0.05) -> float:

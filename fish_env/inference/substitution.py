@@ -56,7 +56,7 @@ def substituted(
     fitter = CoarseFitter(own)
     leeway = dict.fromkeys((name for name, _ in pairs), POLICY.coarse_fit_leeway)
     if beside_misfit:
-        leeway = {name: max(least, _part(fitter, own, name)) for name, least in leeway.items()}
+        leeway = {name: max(least, _part(fitter, name)) for name, least in leeway.items()}
     found: list[tuple[float, tuple[CauseId, ...], CoarseFit]] = []
     for name, signal in pairs:
         report(f"trying {signal.cause.effect} instead of {name_of(name)}")
@@ -82,11 +82,9 @@ def substituted(
     return sorted(found_all, key=lambda e: e.score)
 
 
-def _part(fitter: CoarseFitter, own: Fit, name: CauseId) -> float:
+def _part(fitter: CoarseFitter, name: CauseId) -> float:
     """The part of what a cause explains in a coarse fit that a finalist may lack."""
-    effects = tuple(e for e in own.effects if e != name)
-    begin = [Point(own.point.z, of_effects(own.point.effects, effects))]
-    left = reached(partial(fitter.coarse_fit, effects, own.released, begin))
+    left = coarse_without(fitter, name)
     return np.inf if left is None else POLICY.coarse_fit_behind * (left.objective - fitter.base)
 
 
@@ -173,9 +171,7 @@ def without(current: Explanation, dropped: Collection[CauseId]) -> Explanation |
     None where the simulation diverges without them.
     """
     own = current.fit
-    effects = tuple(e for e in own.effects if e not in dropped)
-    released = tuple(c for c in own.released if c not in dropped)
-    begin = Point(own.point.z, of_effects(own.point.effects, effects))
+    effects, released, begin = _dropped(own, dropped)
     smaller = reached(
         lambda: fit(
             own.problem, effects, begin, own.noise, released, refit_noise=False, iterations=4
@@ -184,3 +180,26 @@ def without(current: Explanation, dropped: Collection[CauseId]) -> Explanation |
     if smaller is None:
         return None
     return Explanation(tuple(c for c in current.causes if c not in dropped), smaller)
+
+
+def coarse_without(
+    fitter: CoarseFitter, cause: CauseId, give_up_above: float = np.inf
+) -> CoarseFit | None:
+    """The coarse fit without one of the causes; None where the simulation diverges without it.
+
+    Args:
+        fitter: of the fit with all causes.
+        cause: the cause.
+        give_up_above: stop early where the objective will not get below this.
+    """
+    effects, released, begin = _dropped(fitter.fit, (cause,))
+    return reached(partial(fitter.coarse_fit, effects, released, [begin], give_up_above))
+
+
+def _dropped(
+    own: Fit, dropped: Collection[CauseId]
+) -> tuple[tuple[str, ...], tuple[Coefficient, ...], Point]:
+    """Effects, released coefficients and start of a fit without some of its causes."""
+    effects = tuple(e for e in own.effects if e not in dropped)
+    released = tuple(c for c in own.released if c not in dropped)
+    return effects, released, Point(own.point.z, of_effects(own.point.effects, effects))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -115,6 +116,11 @@ def freedoms(effect: Effect, step: float) -> tuple[EffectFreedom, ...]:
     )
 
 
+def _is_followed(effect: Effect, parameter: EffectParameter, step: float, value: float) -> bool:
+    """Whether RK4 steps (s) follow an effect of which one parameter has a value."""
+    return effect.is_followed({**effect.neutral, parameter.name: value}, step)
+
+
 def most_followed(effect: Effect, parameter: EffectParameter, step: float) -> float:
     """Largest value of a parameter that is off at infinity which RK4 steps (s) follow.
 
@@ -123,9 +129,7 @@ def most_followed(effect: Effect, parameter: EffectParameter, step: float) -> fl
     """
     low, far = parameter.plausible[0], BEYOND * parameter.plausible[1]
 
-    def is_followed(value: float) -> bool:
-        return effect.is_followed({**effect.neutral, parameter.name: value}, step)
-
+    is_followed = partial(_is_followed, effect, parameter, step)
     if np.isfinite(parameter.neutral) or is_followed(far) or not is_followed(low):
         return np.inf
     return float(bisect(lambda value: is_followed(value) - 0.5, low, far))
@@ -137,10 +141,7 @@ def least_followed(effect: Effect, parameter: EffectParameter, step: float) -> f
     Minus infinity where they follow any, and where the effect is as quick at every size: it then
     has short steps of its own.
     """
-
-    def is_followed(value: float) -> bool:
-        return effect.is_followed({**effect.neutral, parameter.name: value}, step)
-
+    is_followed = partial(_is_followed, effect, parameter, step)
     neutral, far = parameter.neutral, parameter.plausible[1]
     near = neutral + 1e-9 * (far - neutral)
     if not np.isfinite(neutral) or is_followed(near) or not is_followed(far):

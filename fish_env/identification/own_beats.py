@@ -54,6 +54,8 @@ away: beside a misfit it is less than where nothing else is wrong. In short runs
 hardly known, it is a hundredth. No set of runs with one beat has two such runs, where beats differ
 as servos do all have (`scripts/calibrate_own_beats.py`)."""
 FEWEST = 3
+AT_ONCE = 64
+"""Teeth of a comb that are evaluated together: what each leaves of every sample takes memory."""
 
 
 @dataclass(frozen=True)
@@ -267,13 +269,18 @@ def _left(
         filtered = settled.filtered(begin, noise)
     except np.linalg.LinAlgError:
         return None
+    known = begin.effects.get(RATE, 0.0)
+    at = {id: known + values if id == RATE else values for id, values in comb.items()}
     count = len(next(iter(comb.values())))
-    z = np.repeat(begin.z[:, None], count, axis=1)
-    held = {id: np.full(count, value) for id, value in begin.effects.items()}
-    if RATE in comb:
-        comb = {**comb, RATE: held[RATE] + comb[RATE]}
-    rows = settled.innovations(z, {**held, **comb}, noise, filtered)
-    return squares_by_run(rows, settled.runs)
+    squares = []
+    for first in range(0, count, AT_ONCE):
+        part = {id: values[first : first + AT_ONCE] for id, values in at.items()}
+        size = min(AT_ONCE, count - first)
+        z = np.repeat(begin.z[:, None], size, axis=1)
+        held = {id: np.full(size, value) for id, value in begin.effects.items()}
+        rows = settled.innovations(z, {**held, **part}, noise, filtered)
+        squares.append(squares_by_run(rows, settled.runs))
+    return np.vstack(squares)
 
 
 def _between(left: FloatArray, comb: FloatArray, at: int) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 
 from fish_env.arrays import FloatArray
 from fish_env.inference.adequacy import disturbance_at_limit
-from fish_env.inference.estimate.again import with_run_variation
+from fish_env.inference.estimate.again import search_steps, with_run_variation
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.estimate.information import information, prior_precision
 from fish_env.inference.hypotheses import CauseId
@@ -149,4 +149,9 @@ def fitted_again(problem: Problem, at: Fit, noise: Any, rounds: int = 2) -> Fit 
         noise: noise model to begin from.
         rounds: most alternations between parameters and disturbance.
     """
-    return reached(lambda: fit(problem, at.effects, at.point, noise, at.released, rounds=rounds))
+    return reached(
+        lambda: fit(
+            problem, at.effects, at.point, noise, at.released,
+            rounds=rounds, iterations=search_steps(problem),
+        )
+    )  # fmt: skip

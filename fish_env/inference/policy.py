@@ -60,6 +60,7 @@ class DecisionPolicy:
         noisier_than_declared: median ratio of found to declared noise that replaces the declared.
         fewest_runs_for_spread: smallest number of runs for a spread over runs.
         fewest_runs_for_interval: smallest number of runs for an interval over runs.
+        run_errors_level: share of parameters whose interval runs widen by chance.
         beyond_usual: spread over runs, over the usual one, from which it is a finding.
         visible_misfit: misfit over noise below which the error budget has no shares.
         smallest_gap: gap from baseline to noise below which no share of it is reported.
@@ -111,6 +112,7 @@ class DecisionPolicy:
     noisier_than_declared: float = _number(1.1, 1.0, 2.0, "scripts/calibrate_declared_noise.py")
     fewest_runs_for_spread: int = _number(3, 2, 10, "two degrees of freedom")
     fewest_runs_for_interval: int = _number(3, 2, 10, "two degrees of freedom")
+    run_errors_level: float = _number(0.05, 1e-4, 0.5, "convention (Fisher, 1925)")
     beyond_usual: float = _number(3.0, 1.0, 10.0, BY_HAND)
     visible_misfit: float = _number(0.01, 0.0, 1.0, BY_HAND)
     smallest_gap: float = _number(0.01, 0.0, 1.0, BY_HAND)

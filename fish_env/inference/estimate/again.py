@@ -14,10 +14,12 @@ from fish_env.inference.estimate.information import gradient, information
 from fish_env.inference.estimate.spread import Likelihood, Spread, fit_spread
 from fish_env.inference.hypotheses import CauseId, of_effects
 from fish_env.inference.policy import POLICY
-from fish_env.inference.problem import Point
+from fish_env.inference.problem import Point, Problem
 
 MORE = 3
 """Most fits until one is converged."""
+FEWER, USUAL = 3, 5
+"""Most steps in a round of a fit that compares causes."""
 
 
 def finished(own: Fit) -> Fit:
@@ -52,7 +54,7 @@ def refined(own: Fit, rounds: int = 1) -> Fit:
     if not own.problem.is_coarse(own.point.effects):
         return own
     problem, start = own.problem.with_refinement(), (own.point, own.noise, own.released)
-    return fit(problem, own.effects, *start, rounds=rounds, iterations=3)
+    return fit(problem, own.effects, *start, rounds=rounds, iterations=FEWER)
 
 
 def to_publish(own: Fit) -> Fit:
@@ -63,6 +65,15 @@ def to_publish(own: Fit) -> Fit:
     varied = bool(spread_of(own.problem, own.noise).any())
     finer = refined(own, rounds=2 if varied else 1)
     return finer if varied and finer is not own else finished(finer)
+
+
+def search_steps(problem: Problem) -> int:
+    """Most Gauss-Newton steps in a round of a fit that only compares causes.
+
+    Where each run has a drive of its own a step moves its numbers too, which takes several times as
+    long, and what is still missing moves estimates by more than further steps would.
+    """
+    return FEWER if problem.drive.uneven else USUAL
 
 
 def run_variation(own: Fit) -> Spread:
@@ -109,4 +120,5 @@ def with_run_variation(own: Fit, dropped: Collection[CauseId] = ()) -> Fit:
         return own
     effects = [name for name in own.effects if name not in dropped]
     start = Point(own.point.z, of_effects(own.point.effects, effects))
-    return fit(problem, effects, start, noise, own.released, rounds=2)
+    steps = search_steps(problem)
+    return fit(problem, effects, start, noise, own.released, rounds=2, iterations=steps)

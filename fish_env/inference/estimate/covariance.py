@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.special import chdtri, ndtri, stdtrit
 
 from fish_env.arrays import FloatArray, IntArray
 from fish_env.inference.estimate.free import Linearised
 from fish_env.inference.estimate.information import block_index, sums_over
+from fish_env.inference.policy import POLICY
 
 
 def sandwich(
@@ -15,7 +17,11 @@ def sandwich(
     """Covariance corrected for residuals that are still coloured (Morelli and Klein, 1995).
 
     Scores are summed over clusters that err independently; where their spread exceeds what white
-    residuals give, the covariance grows by that much. It never shrinks.
+    residuals give, the covariance grows by that much. It never shrinks. What is wrong for a whole
+    run stays so over all its clusters: where the sums over runs spread by more than those over
+    clusters say, and by more than chance makes them, they count, with the quantile of Student's t
+    for so few. Source: Cameron and Miller (2015), "A practitioner's guide to cluster-robust
+    inference", Journal of Human Resources 50, sections II and VI.
 
     Args:
         lin: residuals and slopes at the estimates.
@@ -24,9 +30,23 @@ def sandwich(
         clusters: (D,) number of the cluster of each residual; default: blocks of time.
     """
     index = block_index(lin.run_of, lin.time_of) if clusters is None else clusters
+    widened = np.maximum(_widened(lin, inverse, prior, index), 1.0)
+    count = len(np.unique(lin.run_of))
+    if count >= POLICY.fewest_runs_for_interval:
+        by_run = _widened(lin, inverse, prior, lin.run_of)
+        by_chance = chdtri(count - 1, POLICY.run_errors_level) / (count - 1)
+        few = float(stdtrit(count - 1, 0.975) / ndtri(0.975)) ** 2
+        widened = np.where(by_run > by_chance * widened, few * by_run, widened)
+    inflation = np.sqrt(widened)
+    return np.asarray(inverse * np.outer(inflation, inflation))
+
+
+def _widened(
+    lin: Linearised, inverse: FloatArray, prior: FloatArray, index: IntArray
+) -> FloatArray:
+    """Variance (n,) over that in white residuals, by sums of scores over an index (D,)."""
     sums = sums_over(index, lin.slopes * lin.residuals[:, None])
     sums -= sums.mean(axis=0)
     meat = sums.T @ sums * len(sums) / max(len(sums) - 1, 1)
     robust = inverse @ (meat + np.diag(prior)) @ inverse
-    inflation = np.sqrt(np.maximum(np.diag(robust) / np.diag(inverse), 1.0))
-    return np.asarray(inverse * np.outer(inflation, inflation))
+    return np.asarray(np.diag(robust) / np.diag(inverse))

@@ -28,7 +28,7 @@ from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause
 from fish_env.inference.tails import chi2_log_tail
 
-AT_ONCE = 64
+AT_ONCE = 16
 """Signals that are projected together: a tall product costs little more than a slim one."""
 SINGLE_PRECISION = 1e-6
 """Relative error of a sum of products in 32 bits, with room."""

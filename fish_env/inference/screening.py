@@ -80,24 +80,46 @@ def zoomed(fit: Fit, signal: Signal) -> Signal:
 
 
 def _effect_signals(fit: Fit, projector: Projector, causes: Sequence[Cause]) -> list[Signal]:
-    jobs = [
-        (cause, index, probe)
-        for cause in causes
-        if cause.is_effect
-        for index, alternative in enumerate(cause.probes)
-        for probe in alternative
+    tests = [
+        (cause, index) for cause in causes if cause.is_effect for index in range(len(cause.probes))
     ]
-    start = np.repeat(fit.point.z[:, None], len(jobs), axis=1)
-    columns = residual_changes(fit, [(cause.effect, probe) for cause, _, probe in jobs], start)
-    alternatives: dict[tuple[str, int], list[int]] = {}
-    for i, (cause, index, _) in enumerate(jobs):
-        alternatives.setdefault((cause.effect, index), []).append(i)
-
-    tests = [(jobs[own[0]][0], jobs[own[0]][1], own) for own in alternatives.values()]
-    found = projector.signals(tests, columns.T)
-    for i, (cause, index, own) in enumerate(tests):
-        found[i] = found[i] or of_visible(projector.signal, cause, index, columns[:, own])
+    found: list[Signal | None] = [None] * len(tests)
+    for part in _parts(fit, tests):
+        seen = _signals_together(fit, projector, [tests[i] for i in part])
+        for i, signal in zip(part, seen, strict=True):
+            found[i] = signal
     return [signal for signal in found if signal is not None]
+
+
+def _parts(fit: Fit, tests: Sequence[tuple[Cause, int]]) -> list[list[int]]:
+    """Tests in parts of which each is evaluated at once: their residuals take memory."""
+    count = [len(cause.probes[index]) for cause, index in tests]
+    parts: list[list[int]] = []
+    for alike in _kinds(fit, [cause.effect for cause, _ in tests], sum(count)):
+        room = 0
+        for i in alike:
+            if room < count[i]:
+                parts.append([])
+                room = SETTINGS_AT_ONCE
+            parts[-1].append(i)
+            room -= count[i]
+    return parts
+
+
+def _signals_together(
+    fit: Fit, projector: Projector, tests: Sequence[tuple[Cause, int]]
+) -> list[Signal | None]:
+    """Signals of alternatives of causes; None where the simulation diverges with one."""
+    jobs = [(cause.effect, probe) for cause, index in tests for probe in cause.probes[index]]
+    start = np.repeat(fit.point.z[:, None], len(jobs), axis=1)
+    columns = residual_changes(fit, jobs, start)
+    ends = np.cumsum([len(cause.probes[index]) for cause, index in tests]).tolist()
+    rows = [range(first, end) for first, end in zip([0, *ends], ends, strict=False)]
+    own = [(cause, index, mine) for (cause, index), mine in zip(tests, rows, strict=True)]
+    found = projector.signals(own, columns.T)
+    for i, (cause, index, mine) in enumerate(own):
+        found[i] = found[i] or of_visible(projector.signal, cause, index, columns[:, list(mine)])
+    return found
 
 
 def residual_changes(fit: Fit, jobs: Sequence[tuple[str, Probe]], z: FloatArray) -> FloatArray:
@@ -124,22 +146,22 @@ def _changes_of_kinds(
 ) -> FloatArray:
     """The changes (n, D) of all jobs, each computed by the quickest kernel that can."""
     rows = np.empty((len(jobs), len(fit.linearised.residuals)))
-    for alike in _kinds(fit, jobs):
+    for alike in _kinds(fit, [name for name, _ in jobs], len(jobs)):
         for first in range(0, len(alike), SETTINGS_AT_ONCE):
             part = alike[first : first + SETTINGS_AT_ONCE]
             rows[part] = _changes_at_once(fit, problem, [jobs[i] for i in part], z[:, part])
     return rows
 
 
-def _kinds(fit: Fit, jobs: Sequence[tuple[str, Probe]]) -> list[list[int]]:
-    """Jobs that one kernel computes, so that none pays for effects of another kind.
+def _kinds(fit: Fit, names: Sequence[str], settings: int) -> list[list[int]]:
+    """Numbers of effects that one kernel computes, so that none pays for effects of another kind.
 
-    A few jobs stay together: kernels take whole blocks of lanes, however few are filled.
+    A few settings stay together: kernels take whole blocks of lanes, however few are filled.
     """
-    if len(jobs) <= SETTINGS_AT_ONCE:
-        return [list(range(len(jobs)))]
+    if settings <= SETTINGS_AT_ONCE:
+        return [list(range(len(names)))]
     kinds: dict[object, list[int]] = {}
-    for i, (name, _) in enumerate(jobs):
+    for i, name in enumerate(names):
         key = fit.problem.batch_key([*effects_of(fit.point.effects), name])
         kinds.setdefault(key, []).append(i)
     return list(kinds.values())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 from scipy.special import chdtri
@@ -32,22 +32,30 @@ def backward_elimination(current: Explanation) -> tuple[Explanation, tuple[Expla
     more than such an interval allows, the cause acts: what the interval follows from, a linear
     model, then does not hold as far as neutral.
 
-    Two look-alikes make each other unnecessary. Rivals go without the other of them.
+    Two look-alikes make each other unnecessary. Rivals go without the other of them. What is needed
+    beside more causes is needed beside fewer.
     """
     rivals: tuple[Explanation, ...] = ()
-    while smaller := _smaller(current):
+    needed: set[CauseId] = set()
+    while smaller := _smaller(current, needed):
+        needed = set.intersection(*({*e.causes} for e in smaller))
         current, *others = smaller
         rivals = rivals_of(current, others)
     return current, rivals
 
 
-def _smaller(current: Explanation) -> list[Explanation]:
-    """Explanations without one of the causes that do as well, best first."""
+def _smaller(current: Explanation, needed: Collection[CauseId]) -> list[Explanation]:
+    """Explanations without one of the causes that do as well, best first.
+
+    Args:
+        current: all causes.
+        needed: those that are known to be.
+    """
     alone = len(current.causes) == 1
     found = []
     fitter = CoarseFitter(current.fit)
     for cause in current.causes:
-        if not alone and surely_acts(current.fit, cause):
+        if not alone and (cause in needed or surely_acts(current.fit, cause)):
             continue
         doubtful = may_not_act(current.fit, cause)
         if alone and not doubtful:

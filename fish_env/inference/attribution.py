@@ -170,10 +170,13 @@ def settled(found: Attribution, thoroughly: bool, report: Callable[[str], None])
 
 
 def _published(current: Explanation, report: Callable[[str], None]) -> Explanation:
-    """The explanation with converged estimates, and without causes that then may not act."""
+    """The explanation with converged estimates, and without causes that these do not need."""
     report("iterating the estimates to convergence")
     final = reached(partial(to_publish, current.fit))
-    return current if final is None else without_idle(Explanation(current.causes, final))
+    if final is None:
+        return current
+    report("removing unnecessary causes")
+    return backward_elimination(Explanation(current.causes, final))[0]
 
 
 @dataclass(frozen=True, eq=False)

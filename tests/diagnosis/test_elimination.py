@@ -122,9 +122,10 @@ def attribution_of(accepted, rivals=()):
     return Attribution(accepted, None, None, accepted, tuple(rivals), (), 0.0)
 
 
-def test_nothing_is_published_whose_converged_interval_holds_its_absence():
+@pytest.mark.parametrize("size", [0.3, 1.25], ids=["interval holds neutral", "evidence is weak"])
+def test_nothing_is_published_that_converged_estimates_do_not_need(size):
     problem = Stated(
-        apart({"current": [9.0] * 3, "scale": [0.3] * 3}), [effect("current"), effect("scale")]
+        apart({"current": [9.0] * 3, "scale": [size] * 3}), [effect("current"), effect("scale")]
     )
     far = Point(np.zeros(1), {size_of("current"): 9.0, size_of("scale"): 30.0})
     begun = fit(problem, ("current", "scale"), far, refit_noise=False, iterations=0)

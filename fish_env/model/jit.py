@@ -17,7 +17,7 @@ from typing import Any, TypeVar, cast
 import numba
 from numba.core.registry import CPUDispatcher
 
-from fish_env.model.kernel_cache import keep_machine_code
+from fish_env.model.kernel_cache import cache_root, keep_machine_code
 
 F = TypeVar("F", bound=Callable[..., Any])
 PACKAGE = Path(__file__).resolve().parent.parent
@@ -67,6 +67,15 @@ def entry_point(function: F) -> F:
     return _kept(function, _ENTRY)
 
 
+def entry_point_of_file(function: F) -> F:
+    """As :func:`entry_point`, for a function of an ordinary module, which no composition holds.
+
+    Its machine code is kept in a folder named by its file and all that this imports.
+    """
+    file = Path(py_function(function).__code__.co_filename)
+    return _kept(function, _ENTRY, cache_root() / _hash(sources_behind(file), ()))
+
+
 def lean_entry_point(function: F) -> F:
     """As :func:`entry_point`, for one that makes no arrays, nor does any kernel it calls.
 
@@ -75,10 +84,10 @@ def lean_entry_point(function: F) -> F:
     return _kept(function, _COUNTLESS)
 
 
-def _kept(function: F, options: dict[str, Any]) -> F:
+def _kept(function: F, options: dict[str, Any], folder: Path | None = None) -> F:
     compile_: Callable[[F], F] = numba.njit(**options)
     compiled = compile_(function)
-    keep_machine_code(compiled)
+    keep_machine_code(compiled, folder)
     return compiled
 
 

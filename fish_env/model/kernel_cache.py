@@ -106,16 +106,17 @@ def _remove(folder: Path, process: int) -> None:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def keep_machine_code(dispatcher: Any) -> None:
+def keep_machine_code(dispatcher: Any, folder: Path | None = None) -> None:
     """Keeps the machine code of a compiled function on disk, as numba's ``cache=True`` would.
 
     Args:
         dispatcher: What ``numba.njit`` returned; a plain function is left alone.
+        folder: Where to keep it; None: beside the source.
     """
     if not hasattr(dispatcher, "enable_caching"):
         return
     try:
-        dispatcher._cache = KernelCache(dispatcher.py_func)
+        dispatcher._cache = KernelCache(dispatcher.py_func, folder)
     except (OSError, RuntimeError) as error:
         _not_kept(str(error))
 
@@ -123,8 +124,11 @@ def keep_machine_code(dispatcher: Any) -> None:
 class KernelCache(FunctionCache):
     """Numba's cache of one function, which takes whatever goes wrong for an empty cache."""
 
-    def __init__(self, py_func: Callable[..., Any]) -> None:
+    def __init__(self, py_func: Callable[..., Any], folder: Path | None) -> None:
         super().__init__(py_func)
+        self._folder = folder
+        if folder is not None:
+            self._cache_path = str(folder)
         self._cache_file = CheckedFiles(
             cache_path=self._cache_path,
             filename_base=self._impl.filename_base,
@@ -141,6 +145,8 @@ class KernelCache(FunctionCache):
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keeps machine code, if the disk takes it."""
         try:
+            if self._folder is not None:
+                self._folder.mkdir(parents=True, exist_ok=True)
             super().save_overload(sig, data)
         except OSError as error:
             _not_kept(f"{self._cache_path}: {error.strerror or error}")

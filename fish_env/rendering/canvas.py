@@ -11,15 +11,17 @@ import numpy as np
 import numpy.typing as npt
 import pygame
 
-from fish_env.arrays import BoolArray, FloatArray, IntArray
+from fish_env.arrays import FloatArray, IntArray
 from fish_env.rendering.camera import NEAR, Camera
 from fish_env.rendering.faces import Faces
-from fish_env.rendering.light import clearness, hazed, lengths, water_colour
+from fish_env.rendering.light import clearness, fade, lengths
 from fish_env.rendering.mesh import OPAQUE
+from fish_env.rendering.raster import fill, numbers
+from fish_env.rendering.strokes import see_lines
 
 Colour = tuple[int, int, int]
-LARGEST = 20000.0
-"""Pixels beyond which a corner is held back: the drawing library counts in small integers."""
+WATER = (-1.0, -1.0, -1.0)
+"""In place of a ground: faint colours fade to that of the endless water."""
 
 
 class Canvas:
@@ -65,8 +67,7 @@ class Canvas:
         """A flat polygon (n, 3) in a colour as seen, without light or haze."""
         pixels, ahead = self.camera.project(points)
         if ahead.min() > NEAR:
-            shade = _whole(np.asarray(colour)).tolist()
-            pygame.draw.polygon(self.surface, shade, _held(pixels).tolist())
+            _fill(self.surface, pixels[None], _whole(np.asarray(colour))[None])
 
     def lines(
         self,
@@ -75,6 +76,7 @@ class Canvas:
         colours: FloatArray,
         widths: FloatArray,
         ground: npt.ArrayLike | None = None,
+        faintest: float = 0.0,
     ) -> None:
         """Straight lines in the water.
 
@@ -84,61 +86,29 @@ class Canvas:
             colours: (n, 3), or (n, 4) with the strength that is left of them, 0 to 1.
             widths: (n,) (m); at least a pixel is drawn.
             ground: (3,) colour that faint lines fade to; None: that of the water.
+            faintest: lines of which no more than this would be seen are left out, 0 to 1.
         """
-        if not len(starts):
-            return
-        starts, ends, kept, seen = self._clipped(starts, ends)
-        (first, near), (last, _) = (self.camera.pictured(points) for points in seen)
-        # What is behind the eye is not drawn, but must not divide by zero either.
-        pixels = self.camera.scale * widths / np.maximum(near, 0.5 * NEAR)
-        thick = np.maximum(np.rint(pixels), max(1.0, round(0.7 * self.unit)))
-        shown = np.flatnonzero(kept & self._touching(first, last, thick))
-        if not len(shown):
-            return
-        middles = 0.5 * (starts + ends)[shown]
-        mixed = _packed(self.surface, _whole(self.faded(colours[shown], middles, ground)))
-        columns = (rows[shown].tolist() for rows in (first, last, thick.astype(int)))
+        camera, count = self.camera, len(starts)
+        left = np.ones(count) if colours.shape[1] == 3 else colours[:, 3]
+        paint = np.column_stack([colours[:, :3], left, widths])
+        view = np.vstack([camera.eye, camera.axes])
+        least = max(1.0, round(0.7 * self.unit))
+        frame = np.array([camera.scale, camera.width, camera.height, least, faintest])
+        pixels, shades = np.empty((count, 5)), np.empty((count, 3), np.int64)
+        both = np.stack([starts, ends], axis=1)
+        shown = see_lines(both, paint, view, frame, _ground(ground), pixels, shades)
+        places = pixels[:shown]
+        mixed = _packed(self.surface, shades[:shown]).tolist()
+        columns = places[:, :2].tolist(), places[:, 2:4].tolist(), places[:, 4].astype(int).tolist()
         _each(pygame.draw.line, self.surface, mixed, *columns)
 
-    def _touching(self, first: FloatArray, last: FloatArray, thick: FloatArray) -> BoolArray:
-        """(n,) lines between pixels (n, 2) that are not altogether beside the picture."""
-        margin = thick[:, None] + 2.0
-        after = np.maximum(first, last) > -margin
-        before = np.minimum(first, last) < self.surface.get_size() + margin
-        return np.asarray((after & before).all(axis=1))
-
-    def faded(
-        self, colours: FloatArray, points: FloatArray, ground: npt.ArrayLike | None = None
-    ) -> FloatArray:
+    def faded(self, colours: FloatArray, points: FloatArray) -> FloatArray:
         """Colours (n, 3) at points seen through haze; a fourth column (n, 4) thins them."""
-        eye = self.camera.eye
-        if colours.shape[1] == 3:
-            return hazed(colours, points, eye)
-        own, left = colours[:, :3], colours[:, 3:]
-        if ground is not None:
-            return hazed(left * own + (1.0 - left) * np.asarray(ground), points, eye)
-        ray = points - eye
-        down = ray[:, 2] / lengths(ray)
-        return left * hazed(own, points, eye) + (1.0 - left) * water_colour(down)
-
-    def _clipped(
-        self, starts: FloatArray, ends: FloatArray
-    ) -> tuple[FloatArray, FloatArray, BoolArray, list[FloatArray]]:
-        """Lines cut off where they come too near to the eye, which are left, and as seen."""
-        seen = [self.camera.seen(points) for points in (starts, ends)]
-        ahead = seen[0][:, 0], seen[1][:, 0]
-        kept = np.maximum(*ahead) > NEAR
-        crossing = kept & (np.minimum(*ahead) < NEAR)
-        if not crossing.any():
-            return starts, ends, kept, seen
-        span = np.where(np.abs(ahead[1] - ahead[0]) > 1e-9, ahead[1] - ahead[0], 1.0)
-        share = ((NEAR - ahead[0]) / span)[:, None]
-        cut = starts + share * (ends - starts)
-        first, last = (
-            np.where((crossing & (far < NEAR))[:, None], cut, points)
-            for far, points in zip(ahead, (starts, ends), strict=True)
-        )
-        return first, last, kept, [self.camera.seen(points) for points in (first, last)]
+        whole = np.ones((len(colours), 4))
+        whole[:, : colours.shape[1]] = colours
+        out = np.empty((len(colours), 3))
+        fade(whole, np.ascontiguousarray(points), self.camera.eye, WATER, out)
+        return out
 
     def discs(self, points: FloatArray, radii: FloatArray, colours: FloatArray) -> None:
         """Small round things (n, 3) with radii (n,) (m) and colours (n, 3 or 4)."""
@@ -148,7 +118,7 @@ class Canvas:
         size = self.camera.scale * radii[inside] / ahead[inside]
         mixed = self.faded(colours[inside], points[inside])
         rims = np.maximum(size, 0.6 * self.unit).tolist()
-        shades = _packed(self.surface, _whole(mixed))
+        shades = _packed(self.surface, _whole(mixed)).tolist()
         _each(pygame.draw.circle, self.surface, shades, pixels[inside].tolist(), rims)
 
     def sheet(self, outline: FloatArray, colour: Colour, alpha: float) -> None:
@@ -172,18 +142,10 @@ class Canvas:
         self, outlines: FloatArray, middles: FloatArray, colour: Colour, alpha: float
     ) -> None:
         """Fill outlines (k, n, 2) on the picture, whose middles (k, 3) say how hazy they are."""
-        pixels, distances = _held(outlines), lengths(middles - self.camera.eye)
-        strengths = np.rint(255 * alpha * clearness(0.5 * distances)).astype(int).tolist()
-        size = self.surface.get_size()
-        lows = np.clip(np.floor(pixels.min(axis=1)) - 1, 0, size).astype(int)
-        highs = np.clip(np.ceil(pixels.max(axis=1)) + 2, 0, size).astype(int)
-        inside = (pixels - lows[:, None]).tolist()
-        corners = lows.tolist(), (highs - lows).tolist()
-        for low, room, points, strength in zip(*corners, inside, strengths, strict=True):
-            if min(room) > 0:
-                layer = pygame.Surface(room, pygame.SRCALPHA)
-                pygame.draw.polygon(layer, (*colour, strength), points)
-                self.surface.blit(layer, low)
+        distances = lengths(middles - self.camera.eye)
+        alphas = np.rint(255 * alpha * clearness(0.5 * distances)).astype(np.int64)
+        colours = _packed(self.surface, np.tile(np.array(colour), (len(outlines), 1)))
+        fill(numbers(self.surface), np.ascontiguousarray(outlines), colours, alphas)
 
     def _in_front(self, outline: FloatArray) -> FloatArray:
         """The outline without what is behind the eye (Sutherland and Hodgman)."""
@@ -201,13 +163,17 @@ class Canvas:
         return np.array(kept).reshape(-1, 3)
 
 
-def _fill(surface: pygame.Surface, pixels: FloatArray, rows: IntArray) -> None:
-    """Fill four-cornered faces (n, 4, 2) with colours and alphas (n, 4)."""
-    # Columns: a list for each face would keep the garbage collector busy.
-    columns = _held(pixels).reshape(-1, 8).T.tolist()
-    corners = (zip(*columns[i : i + 2], strict=True) for i in (0, 2, 4, 6))
-    faces = zip(*corners, strict=True)
-    _each(pygame.draw.polygon, surface, _packed(surface, rows), faces)
+def _fill(surface: pygame.Surface, outlines: FloatArray, colours: IntArray) -> None:
+    """Fill outlines (n, corners, 2) with colours and alphas (n, 4), which replace what is there."""
+    opaque = np.full(len(outlines), 255)
+    fill(numbers(surface), np.ascontiguousarray(outlines), _packed(surface, colours), opaque)
+
+
+def _ground(colour: npt.ArrayLike | None) -> tuple[float, float, float]:
+    if colour is None:
+        return WATER
+    red, green, blue = np.asarray(colour, float).tolist()
+    return red, green, blue
 
 
 def _each(draw: Callable[..., object], surface: pygame.Surface, *columns: Iterable[Any]) -> None:
@@ -215,23 +181,15 @@ def _each(draw: Callable[..., object], surface: pygame.Surface, *columns: Iterab
     deque(map(draw, repeat(surface), *columns), maxlen=0)
 
 
-def _packed(surface: pygame.Surface, colours: IntArray) -> list[int]:
-    """Colours (n, 3), or (n, 4) with alphas, as the numbers that a surface keeps of them.
-
-    The drawing library takes a number as it is; a tuple costs it as much as a small face.
-    """
+def _packed(surface: pygame.Surface, colours: IntArray) -> IntArray:
+    """Colours (n, 3), or (n, 4) with alphas, as the numbers (n,) that a surface keeps of them."""
     shifts = surface.get_shifts()
     rows = colours.T
-    numbers = (rows[0] << shifts[0]) | (rows[1] << shifts[1]) | (rows[2] << shifts[2])
+    packed: IntArray = (rows[0] << shifts[0]) | (rows[1] << shifts[1]) | (rows[2] << shifts[2])
     if surface.get_masks()[3]:
-        numbers |= (rows[3] if len(rows) == 4 else 255) << shifts[3]
-    packed: list[int] = numbers.tolist()
+        packed |= (rows[3] if len(rows) == 4 else 255) << shifts[3]
     return packed
 
 
 def _whole(colours: FloatArray) -> IntArray:
     return np.clip(colours, 0.0, 255.0).astype(np.int64)
-
-
-def _held(pixels: FloatArray) -> FloatArray:
-    return np.clip(pixels, -LARGEST, LARGEST)

@@ -174,7 +174,7 @@ def speed_dial(
     dial = _speed_face(full).copy()
 
     def angle(value: float) -> float:
-        return float(-SWEEP + 2.0 * SWEEP * np.clip(value / top, 0.0, 1.0))
+        return float(-SWEEP + 2.0 * SWEEP * min(max(value / top, 0.0), 1.0))
 
     if goal is not None:
         _mark_goal(dial, angle(goal))
@@ -194,7 +194,7 @@ def bar(
     """A value between its least and largest, filled from zero."""
     x, y, width, height = rect
     span = high - low if high > low else 1.0
-    zero, end = (np.clip((v - low) / span, 0.0, 1.0) for v in (0.0, value))
+    zero, end = (min(max((v - low) / span, 0.0), 1.0) for v in (0.0, value))
     pygame.draw.rect(surface, (32, 62, 80), (x, y, width, height), border_radius=round(height / 2))
     left, right = x + width * min(zero, end), x + width * max(zero, end)
     pygame.draw.rect(

@@ -55,7 +55,7 @@ class Instruments:
 
         def level(depth: float) -> float:
             share = (depth - tank.top) / (tank.bottom - tank.top)
-            return float(top + long * np.clip(share, 0.0, 1.0))
+            return top + long * min(max(share, 0.0), 1.0)
 
         pygame.draw.line(surface, DIM, (x, top), (x, bottom))
         for depth in _marks(tank.top, tank.bottom):

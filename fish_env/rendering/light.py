@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
 from fish_env.arrays import FloatArray
+from fish_env.model.jit import entry_point_of_file, kernel
 
-UP, LEVEL, DOWN = (
-    np.array(colour, float) for colour in ((88, 186, 200), (30, 112, 142), (7, 42, 74))
-)
+Colour = tuple[float, float, float]
+UP, LEVEL, DOWN = (88.0, 186.0, 200.0), (30.0, 112.0, 142.0), (7.0, 42.0, 74.0)
 """Colour of endless water seen upwards, level and downwards."""
 VISIBILITY, CLEAR = 3.0, 0.6
 """m. Distance over which contrast falls to 1/e, and up to which it does not fall at all."""
-SUN = np.array([0.25, -0.35, -0.90])
+SUN = (0.25, -0.35, -0.90)
 """Where light comes from (unit, inertial; up is -z)."""
 AMBIENT, SKY, DIRECT, SHINE = 0.46, 0.26, 0.46, 0.35
 
@@ -27,46 +29,121 @@ def lengths(vectors: FloatArray) -> FloatArray:
     return np.asarray(np.sqrt(x * x + y * y + z * z))
 
 
-def water_colour(down: npt.ArrayLike) -> FloatArray:
-    """Colours (..., 3) of water seen in directions whose downward part (...,) is -1 to 1."""
-    share = np.asarray(down, float)
-    up = share < 0.0
-    amount = np.minimum(np.abs(share), 1.0) ** np.where(up, 0.8, 0.6)
-    towards = np.where(up[..., None], UP - LEVEL, DOWN - LEVEL)
-    return np.asarray(LEVEL + towards * amount[..., None])
-
-
 def clearness(distance: npt.ArrayLike) -> FloatArray:
     """How much of an object's own colour is left at distances (...,) (m)."""
     hazy = np.maximum(np.asarray(distance) - CLEAR, 0.0)
     return np.asarray(np.exp(-hazy / VISIBILITY))
 
 
-def hazed(colours: FloatArray, points: FloatArray, eye: FloatArray) -> FloatArray:
-    """Colours (..., 3) of points (..., 3) seen through the water."""
-    ray = points - eye
-    distance = lengths(ray)
-    left = clearness(distance)[..., None]
-    return left * colours + (1.0 - left) * water_colour(ray[..., 2] / np.maximum(distance, 1e-9))
+@kernel
+def left_at(distance: float) -> float:
+    """As :func:`clearness`, of one distance."""
+    return math.exp(-max(distance - CLEAR, 0.0) / VISIBILITY)
 
 
+@kernel
+def endless(down: float) -> Colour:
+    """Colour of water seen in a direction whose downward part is -1 to 1."""
+    share = min(abs(down), 1.0) ** (0.8 if down < 0.0 else 0.6)
+    to_red = UP[0] if down < 0.0 else DOWN[0]
+    to_green = UP[1] if down < 0.0 else DOWN[1]
+    to_blue = UP[2] if down < 0.0 else DOWN[2]
+    return (
+        LEVEL[0] + (to_red - LEVEL[0]) * share,
+        LEVEL[1] + (to_green - LEVEL[1]) * share,
+        LEVEL[2] + (to_blue - LEVEL[2]) * share,
+    )
+
+
+@kernel
+def hazed(colour: Colour, ray: tuple[float, float, float]) -> Colour:
+    """A colour seen through the water, along a ray from the eye (m)."""
+    x, y, z = ray
+    distance = math.sqrt(x * x + y * y + z * z)
+    left = left_at(distance)
+    water = endless(z / max(distance, 1e-9))
+    return (
+        left * colour[0] + (1.0 - left) * water[0],
+        left * colour[1] + (1.0 - left) * water[1],
+        left * colour[2] + (1.0 - left) * water[2],
+    )
+
+
+@kernel
 def lit(
-    colours: FloatArray, points: FloatArray, normals: FloatArray, eye: FloatArray
-) -> FloatArray:
-    """Colours (n, 3) of faces: light of the sky from above, of the sun, and a wet shine.
+    colour: Colour, normal: tuple[float, float, float], to_eye: tuple[float, float, float]
+) -> Colour:
+    """A colour under the light of the sky from above, of the sun, and with a wet shine.
 
     Args:
-        colours: (n, 3) in white light.
-        points: (n, 3) middles of the faces (m).
-        normals: (n, 3) outward unit normals.
-        eye: (3,) m.
+        colour: in white light.
+        normal: outward unit normal.
+        to_eye: towards the eye, of any length.
     """
-    to_eye = eye - points
-    to_eye /= lengths(to_eye)[..., None]
-    half = to_eye + SUN
-    half /= lengths(half)[..., None]
-    sky = 0.5 - 0.5 * normals[:, 2]
-    direct = np.clip(normals @ SUN, 0.0, 1.0)
-    shine = np.clip(np.einsum("ij,ij->i", normals, half), 0.0, 1.0) ** 28
-    white = AMBIENT + SKY * sky + DIRECT * direct
-    return np.asarray(colours * white[:, None] + 255.0 * SHINE * shine[:, None]).clip(0.0, 255.0)
+    distance = math.sqrt(to_eye[0] ** 2 + to_eye[1] ** 2 + to_eye[2] ** 2)
+    x, y, z = to_eye[0] / distance + SUN[0], to_eye[1] / distance + SUN[1], to_eye[2] / distance
+    z += SUN[2]
+    half = math.sqrt(x * x + y * y + z * z)
+    shine = max(0.0, min(1.0, (normal[0] * x + normal[1] * y + normal[2] * z) / half))
+    direct = max(0.0, min(1.0, normal[0] * SUN[0] + normal[1] * SUN[1] + normal[2] * SUN[2]))
+    white = AMBIENT + SKY * (0.5 - 0.5 * normal[2]) + DIRECT * direct
+    gleam = 255.0 * SHINE * shine**28
+    return (
+        max(0.0, min(255.0, colour[0] * white + gleam)),
+        max(0.0, min(255.0, colour[1] * white + gleam)),
+        max(0.0, min(255.0, colour[2] * white + gleam)),
+    )
+
+
+@kernel
+def faded(colour: Colour, left: float, ground: Colour, ray: tuple[float, float, float]) -> Colour:
+    """A faint colour in the water as it is seen.
+
+    Args:
+        colour: its own.
+        left: how much of it is left, 0 to 1.
+        ground: what is behind it, before the haze; negative: the endless water.
+        ray: from the eye to it (m).
+    """
+    other = 1.0 - left
+    if ground[0] >= 0.0:
+        mixed = (
+            left * colour[0] + other * ground[0],
+            left * colour[1] + other * ground[1],
+            left * colour[2] + other * ground[2],
+        )
+        return hazed(mixed, ray)
+    near = hazed(colour, ray)
+    distance = math.sqrt(ray[0] ** 2 + ray[1] ** 2 + ray[2] ** 2)
+    water = endless(ray[2] / max(distance, 1e-9))
+    return (
+        left * near[0] + other * water[0],
+        left * near[1] + other * water[1],
+        left * near[2] + other * water[2],
+    )
+
+
+@entry_point_of_file
+def fade(
+    colours: FloatArray, points: FloatArray, eye: FloatArray, ground: Colour, out: FloatArray
+) -> None:
+    """Colours as they are seen, see :func:`faded`.
+
+    Args:
+        colours: (n, 4) with how much of them is left, 0 to 1.
+        points: (n, 3) m.
+        eye: (3,) m.
+        ground: what faint ones fade to; negative: the water.
+        out: (n, 3), filled in.
+    """
+    for i in range(len(points)):
+        ray = points[i, 0] - eye[0], points[i, 1] - eye[1], points[i, 2] - eye[2]
+        colour = colours[i, 0], colours[i, 1], colours[i, 2]
+        out[i, 0], out[i, 1], out[i, 2] = faded(colour, colours[i, 3], ground, ray)
+
+
+@entry_point_of_file
+def endless_rows(down: FloatArray, out: FloatArray) -> None:
+    """Colours (n, 3) of water seen in directions whose downward parts (n,) are -1 to 1."""
+    for i in range(len(down)):
+        out[i, 0], out[i, 1], out[i, 2] = endless(down[i])

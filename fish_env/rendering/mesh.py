@@ -9,7 +9,6 @@ import numpy as np
 import numpy.typing as npt
 
 from fish_env.arrays import BoolArray, FloatArray
-from fish_env.rendering.light import lengths
 
 OPAQUE = 255.0
 
@@ -46,30 +45,20 @@ class Mesh:
         """Some of the faces; which: (n,)."""
         return Mesh(self.corners[which], self.colours[which], self.alphas[which])
 
-    def facing(self, eye: FloatArray) -> BoolArray:
-        """(n,) which faces look at a point (3,)."""
-        # Not by way of the planes' distances: a sheet seen edge-on would then flicker.
-        return np.asarray(np.einsum("ij,ij->i", self.normals, eye - self.middles) > 0.0)
-
     def turned_over(self) -> Mesh:
         """The same faces seen from the other side."""
         return Mesh(self.corners[:, ::-1], self.colours, self.alphas)
+
+    @cached_property
+    def painted(self) -> FloatArray:
+        """(n, 4) colours with alphas."""
+        return np.column_stack([self.colours, self.alphas])
 
     @cached_property
     def middles(self) -> FloatArray:
         """(n, 3) middles of the faces (m)."""
         a, b, c, d = (self.corners[:, i] for i in range(4))
         return np.asarray((a + b + c + d) / 4.0)
-
-    @cached_property
-    def normals(self) -> FloatArray:
-        """(n, 3) outward unit normals, from the diagonals."""
-        corners = self.corners
-        # By columns: numpy's own cross product takes several times as long.
-        ax, ay, az = (corners[:, 2] - corners[:, 0]).T
-        bx, by, bz = (corners[:, 3] - corners[:, 1]).T
-        across = np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
-        return across / np.maximum(lengths(across), 1e-12)[:, None]
 
 
 def grid_mesh(points: FloatArray, colour: npt.ArrayLike, alpha: npt.ArrayLike = OPAQUE) -> Mesh:

@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from fish_env.arrays import FloatArray
 from fish_env.rendering.canvas import Canvas
-from fish_env.rendering.light import clearness
 from fish_env.rendering.scene import Tank
 from fish_env.rendering.water import SAND
 
@@ -18,6 +17,8 @@ Span = tuple[float, float]
 GRID_M = 0.25
 REACH_M = 5.0
 PIECE_M = 0.5
+FAINTEST = 0.06
+"""Lines of whose colour less than this is left are not drawn."""
 LINE, WALL = np.array([96.0, 104.0, 96.0]), np.array([170.0, 214.0, 220.0])
 SPECKS, CLOUD_M = 170, 2.4
 
@@ -28,14 +29,12 @@ class Lines(NamedTuple):
     Attributes:
         first: (n, 3) where they begin (m).
         last: (n, 3) where they end (m).
-        middles: (n, 3) between both (m).
         colours: (n, 4) with how much of the colour is left, 0 to 1.
         widths: (n,) (m).
     """
 
     first: FloatArray
     last: FloatArray
-    middles: FloatArray
     colours: FloatArray
     widths: FloatArray
 
@@ -93,7 +92,7 @@ def _lines(
     first, last = np.concatenate(starts), np.concatenate(ends)
     left, wide = (np.broadcast_to(np.asarray(v, float), len(first)) for v in (opacity, widths))
     colours = np.column_stack([np.tile(colour, (len(first), 1)), left])
-    return Lines(first, last, 0.5 * (first + last), colours, wide)
+    return Lines(first, last, colours, wide)
 
 
 def _extent(canvas: Canvas, tank: Tank) -> tuple[Span, Span]:
@@ -114,11 +113,7 @@ def _pieces(axis: int, value: float, other: Span, depth: float) -> FloatArray:
 
 def _draw(canvas: Canvas, lines: Lines, ground: npt.ArrayLike | None = None) -> None:
     """Lines over what is painted, so faint that they need no layer of their own."""
-    near = canvas.camera.seen(lines.middles)[:, 0]
-    opacity = lines.colours[:, 3]
-    kept = np.flatnonzero((near > -PIECE_M) & (opacity * clearness(np.abs(near)) > 0.06))
-    first, last, _, colours, widths = (rows[kept] for rows in lines)
-    canvas.lines(first, last, colours, widths, ground)
+    canvas.lines(*lines, ground, FAINTEST)
 
 
 @cache

@@ -12,8 +12,7 @@ from fish_env.model.jit import py_function
 from fish_env.rendering import markers
 from fish_env.rendering.body import EYE, PUPIL, Fish
 from fish_env.rendering.canvas import Canvas
-from fish_env.rendering.faces import Faces, seen
-from fish_env.rendering.light import hazed
+from fish_env.rendering.faces import Faces, Pose, seen
 from fish_env.rendering.mesh import Mesh
 from fish_env.rendering.scene import Scene
 from fish_env.rendering.shape import hull_profile
@@ -62,7 +61,7 @@ class Swimmer:
         block = fish.block(float(scene.actuators[3]), float(scene.actuators[4]))
         hull = [fish.lining, fish.rail, block, fish.window, fish.hull]
         parts = [*behind, *hull, *before]
-        faces = seen([self._placed(mesh) for mesh in parts], canvas.camera)
+        faces = seen(parts, Pose(self.rotation, scene.position), canvas.camera)
         covered = len(parts) - len(before)
         self._behind, self._before = faces[:covered], faces[covered:]
         self._wake = markers.wake_points(
@@ -72,9 +71,6 @@ class Swimmer:
     def at(self, body: FloatArray) -> FloatArray:
         """Inertial points (..., 3) of body points."""
         return np.asarray(body @ self.rotation.T + self.scene.position)
-
-    def _placed(self, mesh: Mesh) -> Mesh:
-        return mesh.chosen(mesh.facing(self.eye)).placed(self.rotation, self.scene.position)
 
     def _outer_parts(self, fish: Fish) -> tuple[list[Mesh], list[Mesh]]:
         """Tail and fins: those that the hull may cover, and those that may cover it."""
@@ -114,8 +110,8 @@ class Swimmer:
             at = self.at(middle)
             if (self.eye - middle) @ outward < 0.0 or (side and not side.holds(at[None])[0]):
                 continue
-            for colour, size in ((EYE, 1.0), (PUPIL, 0.62)):
-                shade = hazed(colour, at, self.canvas.camera.eye)
+            shades = self.canvas.faded(np.array([EYE, PUPIL]), np.stack([at, at]))
+            for shade, size in zip(shades, (1.0, 0.62), strict=True):
                 self.canvas.polygon(self.at(middle + size * circle @ axes), shade)
 
     def outline(self) -> FloatArray:

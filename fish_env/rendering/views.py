@@ -13,6 +13,7 @@ from fish_env.rendering.body import Fish
 from fish_env.rendering.camera import Follower
 from fish_env.rendering.canvas import Canvas
 from fish_env.rendering.instruments import Instruments
+from fish_env.rendering.raster import shrunk
 from fish_env.rendering.scene import PICTURE_SIZE, Scene, Setting
 from fish_env.rendering.swimmer import Side, Swimmer
 from fish_env.rendering.water import paint
@@ -77,9 +78,7 @@ class View:
         water = paint(camera, coarse, scene.time_s, tank.top, tank.bottom)
         canvas = Canvas(pygame.transform.smoothscale(water, large), camera, unit)
         self._draw(canvas, scene)
-        if large == self.size:
-            return canvas.surface
-        return pygame.transform.smoothscale(canvas.surface, self.size)
+        return canvas.surface if large == self.size else shrunk(canvas.surface, self.size)
 
     def _draw(self, canvas: Canvas, scene: Scene) -> None:
         tank = self.setting.tank

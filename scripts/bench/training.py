@@ -53,7 +53,10 @@ FORMER_PPO = (
     *PLAIN, "total_steps=500000", "num_envs=64", "ppo.n_steps=64", "ppo.n_epochs=6",
     "ppo.learning_rate.start=6.0e-4",
 )  # fmt: skip
-FORMER_SAC = (*PLAIN, "total_steps=120000", "sac.gradient_steps=8")
+FEWER = (
+    "num_envs=64", "sac.batch_size=512", "sac.tau=0.02", "sac.learning_rate.start=2.0e-3",
+    "sac.learning_rate.end=0.0",
+)  # fmt: skip
 
 
 class Recipe(NamedTuple):
@@ -80,8 +83,8 @@ RECIPES = {
     },
     "sac": {
         "shipped": Recipe("sac-hold"),
-        "former": Recipe("sac-hold", (*FORMER_SAC, "sac.learning_rate.end=1.0e-3")),
-        "shipped, SBX": Recipe("sac-hold", library="sbx"),
+        "half the updates": Recipe("sac-hold", FEWER),
+        "half the updates, SBX": Recipe("sac-hold", FEWER, "sbx"),
     },
 }
 EVERY = {"ppo": 40_000, "sac": 20_000}

@@ -190,7 +190,7 @@ def page_of(rows: Sequence[dict[str, Any]]) -> str:
 def main() -> None:
     """Reads the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("algorithms", nargs="*", choices=list(RECIPES), default=[])
+    parser.add_argument("algorithms", nargs="*", help="ppo, sac, or both; none: only the table")
     parser.add_argument("--seeds", type=int, default=5, help="0 to this less one")
     parser.add_argument("--recipes", nargs="*", help="names; default: all")
     parser.add_argument("--sbx", default="", help="Python that has SBX; else it is left out")
@@ -198,6 +198,8 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="write the table into --results")
     parser.add_argument("--results", type=Path, default=RESULTS)
     options = parser.parse_args()
+    if set(options.algorithms) - set(RECIPES):
+        parser.error(f"choose from {', '.join(RECIPES)}")
     options.out.mkdir(parents=True, exist_ok=True)
     console = Console()
     for seed in range(options.seeds):

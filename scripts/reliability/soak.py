@@ -3,9 +3,11 @@
     python -m scripts.reliability.soak                # 1e8 steps, then eight hours
     python -m scripts.reliability.soak --only batch --steps 1e6
     python -m scripts.reliability.soak --only turns --hours 0.25
+    python -m scripts.reliability.soak --sum          # what all runs so far come to
 
 What grows after the warm-up (memory, open files, threads, files left) ends it with status 1. Each
-part writes a dated file into results/.
+part writes a dated file into results/. Ctrl-C or SIGTERM ends a part after the present round, with
+a result of what it reached. The next run draws other numbers.
 """
 
 from __future__ import annotations
@@ -19,8 +21,8 @@ from pathlib import Path
 from typing import Any
 
 from scripts.bench import harness
-from scripts.reliability import watch
-from scripts.results import RESULTS, write_dated
+from scripts.reliability import soak_runs, watch
+from scripts.results import RESULTS
 
 PARTS = ("batch", "turns")
 
@@ -34,12 +36,13 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     add("--threads", type=int, help="of the batch; default: all cores")
     add("--hours", type=float, default=8.0, help="of train, evaluate and diagnose; default: 8")
     add("--most-hours", type=float, help="end the batch after so long, with what it reached")
-    add("--seed", type=int, default=0)
+    add("--seed", type=int, help="default: the number of earlier results")
+    add("--sum", action="store_true", help="run nothing; add up the results in the folder")
     add("--out", type=Path, default=RESULTS, help="folder of the dated results")
     return parser.parse_args(arguments)
 
 
-def batch(options: argparse.Namespace) -> dict[str, Any]:
+def batch(options: argparse.Namespace, stopped: Callable[[], bool]) -> dict[str, Any]:
     """Steps the batch and looks at what the process holds after each round."""
     from scripts.reliability.soak_batch import soak
 
@@ -49,31 +52,43 @@ def batch(options: argparse.Namespace) -> dict[str, Any]:
         taken = time.monotonic() - begun
         samples.append(watch.sample(taken))
         print(f"{done:>13,} steps, {taken:7.0f} s, {samples[-1].memory_mb:.0f} MB", flush=True)
-        return options.most_hours is None or taken < options.most_hours * 3600.0
+        late = options.most_hours is not None and taken >= options.most_hours * 3600.0
+        return not (late or stopped())
 
     result = soak(int(options.steps), options.envs, options.seed, options.threads, look)
     return result | {"resources": watch.summary(samples)}
 
 
-def turns(options: argparse.Namespace) -> dict[str, Any]:
+def turns(options: argparse.Namespace, stopped: Callable[[], bool]) -> dict[str, Any]:
     """Trains, evaluates and diagnoses by turns until the hours are over."""
     from scripts.reliability.turns import take_turns
 
     with tempfile.TemporaryDirectory() as place:
-        return take_turns(Path(place), options.hours * 3600.0, options.seed, print)
+        seconds = options.hours * 3600.0
+        return take_turns(Path(place), seconds, options.seed, print, stopped=stopped)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
     options = parse(arguments)
-    parts: dict[str, Callable[[argparse.Namespace], dict[str, Any]]]
-    parts = {"batch": batch, "turns": turns}
+    names = [options.only] if options.only else PARTS
+    if options.sum:
+        print("\n".join(line for name in names for line in soak_runs.added_up(name, options.out)))
+        return
+    parts: dict[str, Callable[[argparse.Namespace, Callable[[], bool]], dict[str, Any]]]
+    parts, given = {"batch": batch, "turns": turns}, options.seed
     grew = []
-    for name in [options.only] if options.only else PARTS:
-        result = parts[name](options)
-        file = write_dated(options.out, f"soak-{name}", {"machine": harness.machine(), **result})
-        found = result["resources"]["grew"]
-        print(f"{name}: {', '.join(found) or 'nothing grew'}; written: {file.name}")
-        grew += found
+    with soak_runs.until_stopped() as stopped:
+        for name in names:
+            earlier = len(soak_runs.results_of(name, options.out))
+            options.seed = earlier if given is None else given
+            content = {"machine": harness.machine(), "seed": options.seed}
+            content |= parts[name](options, stopped)
+            file = soak_runs.write_result(name, options.out, content)
+            found = content["resources"]["grew"]
+            print(f"{name}: {', '.join(found) or 'nothing grew'}; written: {file.name}")
+            grew += found
+            if stopped():
+                break
     sys.exit(1 if grew else 0)
 
 

@@ -50,6 +50,7 @@ def take_turns(
     seed: int = 0,
     say: Callable[[str], object] = lambda line: None,
     turn: Callable[[Path, Path], None] = one_turn,
+    stopped: Callable[[], bool] = lambda: False,
 ) -> dict[str, Any]:
     """Takes turns until the time is over, each in a folder of its own that is removed.
 
@@ -60,6 +61,7 @@ def take_turns(
         seed: of the runs that are diagnosed.
         say: told how each turn went.
         turn: what a turn does.
+        stopped: asked after each turn; True ends the turns.
 
     Returns:
         Turns, seconds, and what the process held after each.
@@ -70,7 +72,7 @@ def take_turns(
     before, tempfile.tempdir = tempfile.tempdir, str(spare)
     samples, lasted, begun = [], [], time.monotonic()
     try:
-        while time.monotonic() - begun < seconds or len(samples) < LEAST_TURNS:
+        while not stopped() and (time.monotonic() - begun < seconds or len(samples) < LEAST_TURNS):
             started, folder = time.monotonic(), place / "turn"
             turn(folder, data)
             shutil.rmtree(folder, ignore_errors=True)

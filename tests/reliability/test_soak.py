@@ -1,5 +1,7 @@
 """The soak, shortened: nothing grows, every number is finite, and what grows is noticed."""
 
+import json
+import signal
 import time
 from collections import Counter
 from dataclasses import replace
@@ -7,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scripts.reliability import soak_batch, turns, watch, widest
+from scripts.reliability import soak_batch, soak_runs, turns, watch, widest
 from scripts.reliability.soak import main
 
 
@@ -111,3 +113,29 @@ def test_the_command_writes_a_dated_result(tmp_path):
     with pytest.raises(SystemExit):
         main(["--only", "batch", "--steps", "1", "--envs", "2", "--out", str(tmp_path)])
     assert [file.name.startswith("soak-batch-") for file in tmp_path.iterdir()] == [True]
+
+
+def test_runs_of_one_day_are_kept_and_added_up(tmp_path, capsys):
+    command = ["--only", "batch", "--envs", "2", "--out", str(tmp_path)]
+    for steps in ("1", "1"):
+        with pytest.raises(SystemExit):
+            main([*command, "--steps", steps])
+    first, second = soak_runs.results_of("batch", tmp_path)
+    runs = [json.loads(file.read_text()) for file in (first, second)]
+    assert [run["seed"] for run in runs] == [0, 1]
+    capsys.readouterr()
+    main([*command, "--sum"])
+    *each, total = capsys.readouterr().out.splitlines()
+    assert total == f"batch: {sum(run['steps'] for run in runs):,} steps in 2 runs"
+    assert [line.partition(":")[0] for line in each] == [first.name, second.name]
+    assert all("MB an hour" in line for line in each)
+
+
+def test_a_run_that_is_asked_to_end_has_a_result(tmp_path):
+    def stop(folder, data):
+        signal.raise_signal(signal.SIGTERM)
+
+    with soak_runs.until_stopped() as stopped:
+        result = turns.take_turns(tmp_path, 3600.0, turn=stop, stopped=stopped)
+    assert result["turns"] == 1
+    assert result["resources"]["grew"] == ["too few samples to tell"]

@@ -172,21 +172,27 @@ def check_outputs(
     written: list[Path] = []
     for output in (Path(path) for path in outputs if path is not None):
         for other in read if str(output) != STANDARD else ():
-            if _same(output, other):
+            if same_file(output, other):
                 called = "" if output == other else f" (as {other})"
                 raise OutputError(
                     f"{output}: is read{called} and would be replaced; give the output another name"
                 )
-        if any(_same(output, other) for other in written):
+        if any(same_file(output, other) for other in written):
             raise OutputError(f"{output}: two outputs have this name; give one another name")
         written.append(output)
 
 
-def _same(one: Path, other: Path) -> bool:
+def same_file(one: Path, other: Path) -> bool:
+    """Whether two paths are one file, also one that is not there yet.
+
+    Args:
+        one: A path.
+        other: Another.
+    """
     try:
         return os.path.samefile(one, other)
-    except OSError:
-        return one.resolve() == other.resolve()
+    except (OSError, ValueError):
+        return os.path.realpath(one) == os.path.realpath(other)
 
 
 def _new_part(target: Path) -> Path:

@@ -32,12 +32,12 @@ from fish_env.data.importing import (
 from fish_env.data.importing.correction import corrected
 from fish_env.data.importing.grouping import matches, safe_id
 from fish_env.data.importing.guess import UNKNOWN_START
-from fish_env.data.importing.plan import Content, Entry
+from fish_env.data.importing.plan import Content, Entry, fish_path
 from fish_env.data.importing.writing import used_content
+from fish_env.data.place import Place
 from fish_env.data.writing import check_free
 from fish_env.errors import DatasetError
-from fish_env.files import check_outputs
-from fish_env.params import list_fish
+from fish_env.files import check_outputs, same_file
 
 Ask = Callable[[str], str]
 
@@ -71,9 +71,7 @@ class Told:
 
     def applied(self, content: Content) -> Content:
         """The mapping with what is told in place of what stands there."""
-        fish = self.fish
-        if fish is not None and fish not in list_fish():
-            fish = str(Path(fish).expanduser().resolve())
+        fish = None if self.fish is None else fish_path(self.fish, Place(Path("--fish")))
         told = {
             "fish": fish,
             "frame": self.frame,
@@ -113,7 +111,7 @@ def import_logs(
         RoboticFishError: The logs cannot be read, or are not what the mapping says.
     """
     check_free(out, [FILE_NAME])
-    if mapping is None or mapping.resolve() != (out / MAPPING).resolve():
+    if mapping is None or not same_file(mapping, out / MAPPING):
         _check_mapping(out)
     sources, notes = open_logs(logs)
     read = dict.fromkeys(source.file for source in sources)

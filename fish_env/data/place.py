@@ -6,6 +6,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from fish_env.errors import DatasetError
+from fish_env.reading import printable
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,7 @@ class Place:
 
     def refuse(self, reason: str, remedy: str) -> DatasetError:
         """Words the error for this place; the caller raises it."""
-        return DatasetError(f"{self}: {reason}. {remedy}.")
+        return DatasetError(printable(f"{self}: {reason}. {remedy}."))
 
     def __str__(self) -> str:
         parts = [str(self.file)]

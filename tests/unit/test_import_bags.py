@@ -10,7 +10,7 @@ import yaml
 
 from fish_env.data import Dataset, load_dataset
 from fish_env.data.importing import assemble, guess_mapping, open_logs, parse_plan
-from fish_env.data.importing.bags import check_names
+from fish_env.data.importing.bag_checks import check_types
 from fish_env.errors import DatasetError
 from tests.command_line import run
 from tests.fixtures.foreign_logs import Swim, swim, write_odometry, write_ros1, write_ros2
@@ -182,8 +182,8 @@ def test_a_file_that_is_no_bag_is_refused_in_one_line(tmp_path, capsys, motion):
 )
 def test_definitions_that_could_become_code_are_refused(types, tmp_path):
     with pytest.raises(DatasetError, match=r"swim\.mcap"):
-        check_names(tmp_path / "swim.mcap", types)
-    check_names(tmp_path / "swim.mcap", {"a/msg/B": ([], [("x", (1, ("float64", 0)))])})
+        check_types(tmp_path / "swim.mcap", types)
+    check_types(tmp_path / "swim.mcap", {"a/msg/B": ([], [("x", (1, ("float64", 0)))])})
 
 
 def test_definitions_are_checked_before_rosbags_makes_functions_of_them(

@@ -1,7 +1,7 @@
 """ROS 1 and ROS 2 bags, read with `rosbags`: a table for each topic.
 
 `rosbags` makes reading functions from the message definitions in a bag. Only names enter their
-text, so every name is checked before; nothing of the bag is ever run.
+text, so every name is checked before (`bag_checks`); nothing of the bag is ever run.
 """
 
 import re
@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from fish_env.data.importing.bag_checks import check_bag, check_definition, check_types
 from fish_env.data.importing.source import Source, Values, reading
-from fish_env.data.place import Place
 from fish_env.errors import missing_extra
 
 STAMP = "header.stamp"
@@ -27,8 +27,6 @@ LONGEST_ARRAY = 32
 PICTURE = 1000
 """Elements of a list from which a message is a picture or a scan."""
 
-_NAME = re.compile(r"[A-Za-z]\w*(/[A-Za-z]\w*)*", re.ASCII)
-_LARGEST_FIXED = 10_000
 _TIMES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")
 _STANDARD_UNITS = (
     (re.compile(r"(position|translation|point)\.[xyz]$"), "m"),
@@ -59,6 +57,7 @@ def read_bag(path: Path) -> tuple[tuple[Source, ...], tuple[str, ...]]:
     except ImportError:
         raise missing_extra("Reading ROS bags", "rosbags", "logs") from None
     with reading(path, "a ROS bag"):
+        check_bag(path)
         ros1 = path.suffix == ".bag"
         with Reader1(path) if ros1 else Reader2(path) as reader:
             return _read_topics(path, reader, ros1)
@@ -122,6 +121,7 @@ def _type_store(path: Path, connection: Any, ros1: bool) -> Any:
     definition = connection.msgdef
     if definition.format == Format.NONE:
         return get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
+    check_definition(path, connection.msgtype, definition.data)
     types: dict[str, Any] = {}
     if definition.format == Format.MSG:
         types.update(get_types_from_msg(definition.data, connection.msgtype))
@@ -130,7 +130,7 @@ def _type_store(path: Path, connection: Any, ros1: bool) -> Any:
             types.update(get_types_from_idl(part))
     store = get_typestore(Stores.EMPTY)
     types = {name: fields for name, fields in types.items() if name not in store.fielddefs}
-    check_names(path, types)
+    check_types(path, types)
     store.register(types)
     return store
 
@@ -142,41 +142,6 @@ def _idl_parts(text: str) -> Iterator[str]:
         return
     for part in text.split(line)[1:]:
         yield part.partition("\n")[2]
-
-
-def check_names(path: Path, types: dict[str, Any]) -> None:
-    """Refuses message definitions whose names are none, or whose arrays have no sensible length.
-
-    Args:
-        path: The bag.
-        types: Constants and fields by type, as rosbags parsed them.
-
-    Raises:
-        DatasetError: Naming the first that is wrong.
-    """
-    for kind, (constants, fields) in types.items():
-        names = [kind, *(field[0] for field in fields), *(constant[0] for constant in constants)]
-        names += [name for field in fields for name in _named_types(field[1])]
-        wrong = next((name for name in names if not _NAME.fullmatch(str(name))), None)
-        if wrong is not None:
-            raise Place(path).refuse(
-                f"the message type {kind[:60]!r} uses {str(wrong)[:60]!r} as a name",
-                "Record the bag again; no ROS tool writes this",
-            )
-        for name, (node, detail) in fields:
-            if int(node) == 3 and detail[1] > _LARGEST_FIXED:
-                raise Place(path).refuse(
-                    f"{kind}.{name} is an array of {detail[1]} elements",
-                    "Record the bag without that topic",
-                )
-
-
-def _named_types(description: Any) -> list[str]:
-    """Types that a field refers to by name."""
-    node, detail = description
-    if int(node) == 2:
-        return [detail]
-    return _named_types(detail[0]) if int(node) in (3, 4) else []
 
 
 def _leaves(

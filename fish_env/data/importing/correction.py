@@ -4,11 +4,10 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
-from fish_env.data.importing.plan import Content
+from fish_env.data.importing.plan import Content, fish_path
 from fish_env.data.mapping import parse_section
 from fish_env.data.place import Place, closest
 from fish_env.data.vocabulary import COMMANDS, FILE_CHANNELS
-from fish_env.params import list_fish
 
 NOTHING = "none"
 KEYS = ("name", "fish", "frame", "start", "tail_phase", "run_column")
@@ -55,9 +54,9 @@ def corrected(content: Content, text: str, columns: Collection[str] = ()) -> Con
 
 
 def _resolved(key: str, value: Any) -> Any:
-    if key != "fish" or not isinstance(value, str) or value in list_fish():
+    if key != "fish" or not isinstance(value, str):
         return value
-    return str(Path(value).expanduser().resolve())
+    return fish_path(value, Place(Path("correction")))
 
 
 def _with_entry(content: Content, name: str, value: Any, columns: Collection[str]) -> Content:

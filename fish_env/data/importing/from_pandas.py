@@ -13,12 +13,12 @@ import numpy as np
 from fish_env.data.importing.assemble import assemble_runs
 from fish_env.data.importing.grouping import RunInput, safe_id
 from fish_env.data.importing.guess import UNKNOWN_START, guess_mapping
-from fish_env.data.importing.plan import FORMAT, Content, parse_plan
+from fish_env.data.importing.plan import FORMAT, Content, fish_path, parse_plan
 from fish_env.data.importing.source import Source, Values
 from fish_env.data.importing.stamps import guess_unit
+from fish_env.data.place import Place
 from fish_env.data.schema import Dataset
 from fish_env.errors import DatasetError
-from fish_env.params import list_fish
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -206,7 +206,7 @@ def _has_zone(column: Any) -> bool:
 
 
 def _fish(fish: str | Path) -> str:
-    return str(fish) if str(fish) in list_fish() else str(Path(fish).expanduser().resolve())
+    return fish_path(str(fish), Place(Path("from_frames")))
 
 
 def _entries(declared: Mapping[str, str | Mapping[str, Any]]) -> Content:

@@ -1,12 +1,14 @@
 """Rows of cells, of a text file or of a sheet, turned into named columns."""
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from datetime import UTC, date, datetime, time, timedelta
 from typing import Any
 
 import numpy as np
 
+from fish_env.data.importing import limits
 from fish_env.data.importing.source import Values
 from fish_env.data.place import Place
 from fish_env.data.units import unit_root
@@ -45,6 +47,11 @@ def columns_of(
         names = [name or f"column {i + 1}" for i, name in enumerate(names)]
         units = _units_row(names, rows[header + 1]) if len(rows) > header + 1 else {}
         first = header + (2 if units else 1)
+    if len(names) > limits.MOST_COLUMNS:
+        raise place.refuse(
+            f"{len(names)} columns, more than {limits.MOST_COLUMNS}",
+            "Save one row for each sample, and one column for each quantity",
+        )
     body = list(rows[first:])
     while body and not any(_label(cell) for cell in body[-1]):
         body.pop()
@@ -52,7 +59,7 @@ def columns_of(
         raise place.refuse(
             f"{len(body)} rows of values", "Give a header and at least two rows below it"
         )
-    twice = next((name for name in names if names.count(name) > 1), None)
+    twice = next((name for name, count in Counter(names).items() if count > 1), None)
     if twice is not None:
         raise place.at(column=twice).refuse("two columns have this name", "Rename one of them")
     _check_widths(body, len(names), first, place)

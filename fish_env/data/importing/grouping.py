@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fish_env.data.importing.limits import MOST_RUNS
 from fish_env.data.importing.plan import Plan, RunSpec, SourceSpec, used_sources
 from fish_env.data.importing.source import Source
 from fish_env.errors import DatasetError
@@ -146,8 +147,13 @@ def _split(run: RunInput, column: str, named: bool) -> list[RunInput]:
     labels = {}
     for name, source in run.sources.items():
         cells = source.column(column)
-        labels[name] = np.array([_cell_text(cell) for cell in cells])
+        labels[name] = np.array([_cell_text(cell) for cell in cells], dtype=object)
         ids |= dict.fromkeys(text for text in labels[name].tolist() if text)
+        if len(ids) > MOST_RUNS:
+            raise source.place(column).refuse(
+                f"it separates more than {MOST_RUNS} runs",
+                "Name a column that is the same in all rows of a run: --run-column",
+            )
     return [
         RunInput(
             safe_id(f"{run.id}-{id}" if named else id),

@@ -5,12 +5,15 @@ of them. Objects, function handles and cells are left out with a note; nothing i
 run, and no other file is opened.
 """
 
+import io
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from fish_env.data.importing import limits, matlab_checks
 from fish_env.data.importing.source import Source, Values, reading
 from fish_env.data.place import Place
 from fish_env.errors import missing_extra
@@ -19,8 +22,8 @@ Tree = dict[str, Any]
 
 WIDEST = 16
 """Columns of a matrix. A wider one is a picture or a table of something else."""
-LARGEST = 100_000_000
-"""Elements of one variable."""
+MOST_OBJECTS = 10_000
+"""Variables, structs and elements of struct arrays in one file of version 7.3."""
 _HDF5 = b"MATLAB 7.3"
 
 
@@ -39,7 +42,7 @@ def read_matlab(file: Path) -> tuple[tuple[Source, ...], tuple[str, ...]]:
     """
     with reading(file, "a MATLAB file"):
         with file.open("rb") as stream:
-            head = stream.read(128)
+            head = stream.read(matlab_checks.HEADER)
         newer = head.startswith(_HDF5) or head.startswith(b"\x89HDF")
         tree, notes = _read_hdf5(file) if newer else _read_version_5(file)
         sources = tuple(_sources(file, tree, "", notes))
@@ -53,7 +56,10 @@ def read_matlab(file: Path) -> tuple[tuple[Source, ...], tuple[str, ...]]:
 def _read_version_5(file: Path) -> tuple[Tree, list[str]]:
     from scipy.io import loadmat
 
-    content = loadmat(file, simplify_cells=True, appendmat=False)
+    raw = limits.content(file, matlab_checks.MOST_UNPACKED)
+    if 0 not in raw[:4]:  # a file of version 4 begins with a small number
+        matlab_checks.check(raw)
+    content = loadmat(io.BytesIO(raw), simplify_cells=True)
     # Matrices keep their shape; simplify_cells would drop an axis of length one.
     return {name: value for name, value in content.items() if not name.startswith("__")}, []
 
@@ -63,55 +69,102 @@ def _read_hdf5(file: Path) -> tuple[Tree, list[str]]:
         import h5py
     except ImportError:
         raise missing_extra("Reading MATLAB 7.3 files", "h5py", "logs") from None
-    notes: list[str] = []
     with h5py.File(file, "r") as opened:
-        tree = _group(opened, opened, notes, "")
-        return (tree if isinstance(tree, dict) else {}), notes
+        walk = _Walk(opened)
+        tree = _group(opened, walk, "")
+        return (tree if isinstance(tree, dict) else {}), walk.notes
+
+
+@dataclass
+class _Walk:
+    """What was met on the way through one HDF5 file.
+
+    Its links may lead to one object many times, and in circles.
+
+    Attributes:
+        root: The file.
+        notes: What was left out.
+        objects: Objects met, each as often as it was.
+        values: Numbers read.
+        depth: Of the group or reference that is being read.
+    """
+
+    root: Any
+    notes: list[str] = field(default_factory=list)
+    objects: int = 0
+    values: int = 0
+    depth: int = 0
+
+    def meet(self, values: int = 0) -> None:
+        """Counts an object, and its values if it is read.
+
+        Raises:
+            ValueError: There are too many.
+        """
+        self.objects += 1
+        self.values += values
+        if self.objects > MOST_OBJECTS or self.values > limits.MOST_VALUES:
+            raise ValueError(
+                f"more than {MOST_OBJECTS:,} variables or {limits.MOST_VALUES:,} values, what "
+                "several links lead to counted for each; save fewer variables"
+            )
+        if self.depth > limits.DEEPEST:
+            raise ValueError(f"structs nested more than {limits.DEEPEST} levels deep")
 
 
 class _Elements(list[Any]):
     """The values of one field of a struct array, one for each of its elements."""
 
 
-def _group(group: Any, root: Any, notes: list[str], path: str) -> Any:
+def _group(group: Any, walk: _Walk, path: str) -> Any:
     """The content of one HDF5 group; links that lead elsewhere are not followed."""
     import h5py
 
     tree: Tree = {}
+    walk.meet()
+    walk.depth += 1
     for name in group:
         here = f"{path}{name}"
         if name.startswith("#"):
             continue
         if not isinstance(group.get(name, getlink=True), h5py.HardLink):
-            notes.append(f"{here} left out: it is a link")
+            walk.notes.append(f"{here} left out: it is a link")
             continue
         item = group[name]
         if isinstance(item, h5py.Group):
-            tree[name] = _group(item, root, notes, f"{here}.")
-        elif (value := _dataset(item, root, notes, here)) is not None:
+            tree[name] = _group(item, walk, f"{here}.")
+        elif (value := _dataset(item, walk, here)) is not None:
             tree[name] = value
+    walk.depth -= 1
     return _transposed_structs(tree)
 
 
-def _dataset(item: Any, root: Any, notes: list[str], path: str) -> Any:
+def _dataset(item: Any, walk: _Walk, path: str) -> Any:
     import h5py
 
     kind = item.attrs.get("MATLAB_class", b"double")
     if "MATLAB_empty" in item.attrs or kind == b"char":
         return None
-    if item.external or item.is_virtual or item.size > LARGEST:
-        notes.append(f"{path} left out: its data lie in another file, or are too large")
+    if item.external or item.is_virtual:
+        walk.notes.append(f"{path} left out: its data lie in another file")
         return None
     if h5py.check_ref_dtype(item.dtype) is h5py.Reference and kind != b"cell":
-        # The field of a struct array: one reference for each element.
-        found = [root[reference] for reference in np.ravel(item[()])]
-        return _Elements(
-            _dataset(one, root, notes, path) if hasattr(one, "dtype") else None for one in found
-        )
+        return _referred(item, walk, path)
     if item.dtype.kind not in "fiub":
-        notes.append(f"{path} left out: {_text(kind)} holds no plain numbers")
+        walk.notes.append(f"{path} left out: {_text(kind)} holds no plain numbers")
         return None
+    walk.meet(item.size or 0)
     return np.asarray(item[()]).T
+
+
+def _referred(item: Any, walk: _Walk, path: str) -> _Elements:
+    """The field of a struct array: one reference for each element."""
+    walk.meet(item.size)
+    walk.depth += 1
+    found = [walk.root[reference] for reference in np.ravel(item[()])]
+    values = [_dataset(one, walk, path) if hasattr(one, "dtype") else None for one in found]
+    walk.depth -= 1
+    return _Elements(values)
 
 
 def _text(kind: Any) -> str:

@@ -4,6 +4,7 @@ A mapping is YAML. It names the tables (`sources`), and for each channel and com
 the column, its unit and, where needed, sign, scale and frame.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,6 +21,7 @@ from fish_env.data.table import Column
 from fish_env.data.units import Unit
 from fish_env.data.vocabulary import COMMANDS, FILE_CHANNELS, Quantity
 from fish_env.params import list_fish
+from fish_env.reading import Unreadable, located, plain_number
 
 FORMAT = "robofish-import/1"
 BETWEEN = ("hold", "linear")
@@ -160,11 +162,17 @@ def _with_numbers(content: Any) -> Any:
         return content
     numbers = {"sign", "scale", "offset", *COMMANDS}
     return {
-        key: yaml.safe_load(value)
-        if key in numbers and isinstance(value, str)
-        else _with_numbers(value)
+        key: _number(value) if key in numbers and isinstance(value, str) else _with_numbers(value)
         for key, value in content.items()
     }
+
+
+def _number(text: str) -> float | int | str:
+    """The number that a text is; a text that is none stays, for the reader to refuse."""
+    value = plain_number(text)
+    if not math.isfinite(value):
+        return text
+    return int(value) if value.is_integer() and text.strip().lstrip("+-").isdigit() else value
 
 
 class _Dumper(yaml.SafeDumper):
@@ -252,7 +260,26 @@ def read_content(file: Path) -> Content:
     Raises:
         DatasetError: It is missing or no YAML mapping.
     """
-    content = read_section(Place(file)).content
+    section = read_section(Place(file))
+    content = section.content
     if isinstance(fish := content.get("fish"), str) and fish not in list_fish():
-        content["fish"] = str((file.parent / Path(fish).expanduser()).resolve())
+        content["fish"] = str(section.path("fish").resolve())
     return content
+
+
+def fish_path(fish: str, place: Place) -> str:
+    """A fish as a mapping names it: a preset, or the whole path of a file.
+
+    Args:
+        fish: Preset, or path relative to the working folder.
+        place: Who names it, for errors.
+
+    Raises:
+        DatasetError: No path can be so named.
+    """
+    if fish in list_fish():
+        return fish
+    try:
+        return str(located(fish).resolve())
+    except Unreadable as error:
+        raise place.refuse(f"fish: {error.reason}", error.remedy.capitalize()) from None

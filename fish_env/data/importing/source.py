@@ -1,5 +1,7 @@
 """Tables of a log as they were found, before anybody says what their columns mean."""
 
+import errno
+import math
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -12,7 +14,9 @@ from numpy.typing import NDArray
 from fish_env.arrays import BoolArray, FloatArray
 from fish_env.data.place import Place, closest
 from fish_env.errors import DatasetError, MissingExtraError
+from fish_env.reading import plain_number, printable, shown
 
+_FULL = (errno.EFBIG, errno.ENOSPC, errno.EDQUOT, errno.ENOMEM)
 Values = NDArray[Any]
 """A column: float64, int64, or text as objects."""
 
@@ -75,7 +79,7 @@ class Source:
         for index, cell in enumerate(values):
             if not is_number(cell):
                 raise self.place(name, index).refuse(
-                    f"'{cell}' is not a number", "Correct the cell, or map another column"
+                    f"{shown(str(cell))} is not a number", "Correct the cell, or map another column"
                 )
         return np.array([np.nan if not str(cell).strip() else float(cell) for cell in values])
 
@@ -92,13 +96,7 @@ class Source:
 def is_number(cell: object) -> bool:
     """Whether a cell is empty or holds a number."""
     text = str(cell).strip()
-    if not text:
-        return True
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
+    return not text or text.lower() == "nan" or not math.isnan(plain_number(text))
 
 
 @contextmanager
@@ -118,10 +116,13 @@ def reading(file: Path, what: str) -> Iterator[None]:
         raise
     except FileNotFoundError as error:
         raise Place(file).refuse(f"it cannot be read: {_reason(error)}", "Check the path") from None
-    except MemoryError as error:
-        raise Place(file).refuse("it does not fit into memory", "Cut it into runs") from error
     # Parsers of foreign formats raise errors of many kinds on broken files.
     except Exception as error:
+        if isinstance(error, MemoryError) or getattr(error, "errno", None) in _FULL:
+            raise Place(file).refuse(
+                "reading it takes too much memory, or room in the temporary folder",
+                "Cut it into runs, or leave columns out",
+            ) from error
         raise Place(file).refuse(
             f"this cannot be read as {what} ({_reason(error)})",
             "Check that it is whole and of the kind its ending says",
@@ -129,5 +130,5 @@ def reading(file: Path, what: str) -> Iterator[None]:
 
 
 def _reason(error: Exception) -> str:
-    words = " ".join(str(error).split())[:200]
+    words = printable(str(error)[:1000])[:200]
     return f"{type(error).__name__}: {words}".rstrip(": ")

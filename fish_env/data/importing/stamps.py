@@ -19,6 +19,8 @@ Nanoseconds = IntArray
 
 EPOCH_NS = 10**17
 """ns, about three years. A later time counts from a date."""
+LATEST_NS = 9e18
+"""ns. 64 bits hold 9.22e18."""
 MOST_REPEATED = 0.02
 """Share of the stamps that may repeat the one before, beyond which the clock is too coarse."""
 _EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"), (1e8, "s"))
@@ -72,7 +74,7 @@ def read_stamps(source: Source, time: TimeColumn) -> Stamps:
     """
     ns, present = _to_ns(source, time)
     rows, notes = np.flatnonzero(present), list[str]()
-    ns = ns[rows] + round(time.offset_s * 1e9)
+    ns = _shifted(ns[rows], time.offset_s, source.place(time.column))
     backward = np.flatnonzero(np.diff(ns) < 0)
     if backward.size and source.kind == "":
         raise source.place(time.column, int(rows[backward[0] + 1])).refuse(
@@ -104,6 +106,9 @@ def _to_ns(source: Source, time: TimeColumn) -> tuple[Nanoseconds, BoolArray]:
         return _from_text(source, time.column)
     factor = parse_unit(time.unit, _DURATION, place).factor * 1e9
     if values.dtype == np.int64 and factor >= 1.0:
+        # As Python's number, since the size of the smallest int64 is none.
+        largest = max(abs(int(values.min(initial=0))), abs(int(values.max(initial=0))))
+        _check_date(largest, time.unit, factor, place)
         return values * round(factor), np.ones(len(values), bool)
     numbers = source.numbers(time.column)
     missing = ~np.isfinite(numbers)
@@ -113,16 +118,31 @@ def _to_ns(source: Source, time: TimeColumn) -> tuple[Nanoseconds, BoolArray]:
         raise source.place(time.column, index).refuse("the time is missing", "Fill it in")
     whole = np.floor(np.where(missing, 0.0, numbers))
     part = np.where(missing, 0.0, numbers) - whole
-    if np.abs(whole).max(initial=0.0) * factor > 9e18:
-        raise place.refuse(
-            f"{numbers[np.argmax(np.abs(whole))]:.6g} {time.unit} is not a plausible date",
-            "Correct the unit of time",
-        )
+    _check_date(float(np.abs(whole).max(initial=0.0)), time.unit, factor, place)
     if factor >= 1.0 and float(factor).is_integer():
         return whole.astype(np.int64) * int(factor) + np.rint(part * factor).astype(
             np.int64
         ), ~empty
     return np.rint((whole + part) * factor).astype(np.int64), ~empty
+
+
+def _check_date(largest: float, unit: str, factor: float, place: Place) -> None:
+    """Refuses a time that nanoseconds in 64 bits cannot hold."""
+    if largest * factor > LATEST_NS:
+        raise place.refuse(
+            f"{largest:.6g} {unit} is not a plausible date", "Correct the unit of time"
+        )
+
+
+def _shifted(ns: Nanoseconds, offset_s: float, place: Place) -> Nanoseconds:
+    """Times on the clock of the other sources."""
+    if not abs(offset_s) * 1e9 <= LATEST_NS / 2 or np.abs(ns).max(initial=0) > LATEST_NS / 2:
+        if offset_s == 0.0:
+            return ns
+        raise place.refuse(
+            f"an offset of {offset_s:g} s leads to no plausible date", "Correct the offset"
+        )
+    return ns + round(offset_s * 1e9)
 
 
 def _is_empty(source: Source) -> BoolArray:

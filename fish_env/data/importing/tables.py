@@ -3,11 +3,13 @@
 import csv
 import io
 import re
+import zipfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from fish_env.data.importing import limits
 from fish_env.data.importing.grid import columns_of
 from fish_env.data.importing.source import Source, Values, reading
 from fish_env.data.place import Place
@@ -18,6 +20,10 @@ Read = tuple[tuple[Source, ...], tuple[str, ...]]
 SEPARATORS = (";", "\t", ",", "|", None)
 """None is any number of spaces. A comma comes after those that leave it to the decimals."""
 COMMENTS = ("#", "%", "//")
+MOST_UNPACKED = 500_000_000
+"""Bytes of a workbook; a full sheet of numbers with twenty columns has this."""
+MOST_ROWS = 2**20
+"""Of a sheet, as Excel has it."""
 _SAMPLE = 200
 _COMMA_NUMBER = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
 _POINT_NUMBER = re.compile(r"[+-]?\d*\.\d+([eE][+-]?\d+)?")
@@ -49,7 +55,7 @@ def read_text_table(file: Path) -> Read:
 
 
 def _decode(file: Path) -> tuple[str, str]:
-    raw = file.read_bytes()
+    raw = limits.content(file)
     if raw.startswith((b"\xff\xfe", b"\xfe\xff")):
         return raw.decode("utf-16"), "UTF-16"
     try:
@@ -131,16 +137,17 @@ def read_workbook(file: Path) -> Read:
         raise missing_extra("Reading Excel files", "openpyxl", "logs") from None
     sources, notes = [], []
     with reading(file, "an Excel workbook"):
+        _check_unpacked(file)
         book = openpyxl.load_workbook(
             file, read_only=True, data_only=True, keep_vba=False, keep_links=False
         )
         try:
             for sheet in book.worksheets:
-                rows = [list(row) for row in sheet.iter_rows(values_only=True)]
+                place = Place(file, column=sheet.title)
+                rows = _rows(sheet, place)
                 if sum(any(cell is not None for cell in row) for row in rows) < 3:
                     notes.append(f"{file.name}: sheet {sheet.title} left out: it holds no table")
                     continue
-                place = Place(file, column=sheet.title)
                 columns, units, first = columns_of(rows, place)
                 units |= {name: "ns" for name in columns if _are_dates(rows[first:], columns, name)}
                 sources.append(Source(file, sheet.title, columns, units, first_row=first + 1))
@@ -149,6 +156,32 @@ def read_workbook(file: Path) -> Read:
     if not sources:
         raise Place(file).refuse("no sheet holds a table", "Give a header and rows below it")
     return tuple(sources), tuple(notes)
+
+
+def _check_unpacked(file: Path) -> None:
+    """Refuses an archive that unpacks to far more than a sheet can hold."""
+    with zipfile.ZipFile(file) as archive:
+        size = sum(member.file_size for member in archive.infolist())
+    if size > MOST_UNPACKED:
+        raise Place(file).refuse(
+            f"it unpacks to {size / 1e6:.0f} MB, more than {MOST_UNPACKED / 1e6:.0f} MB",
+            "Save the sheets as CSV or Parquet, or split them",
+        )
+
+
+def _rows(sheet: Any, place: Place) -> list[list[Any]]:
+    """Cells of a sheet as they stand in it; what the file says of its size is not believed."""
+    sheet.reset_dimensions()
+    rows, cells = [], 0
+    for row in sheet.iter_rows(values_only=True):
+        rows.append(list(row))
+        cells += len(row) + 1
+        if cells > limits.MOST_CELLS or len(rows) > MOST_ROWS:
+            raise place.refuse(
+                f"more than {limits.MOST_CELLS:,} cells or {MOST_ROWS:,} rows, with the empty ones",
+                "Delete empty rows and columns, or split the sheet",
+            )
+    return rows
 
 
 def _are_dates(body: list[list[Any]], columns: dict[str, Values], name: str) -> bool:
@@ -175,7 +208,9 @@ def read_parquet(file: Path) -> Read:
         raise missing_extra("Reading Parquet", "pyarrow", "logs") from None
     columns, units, notes = dict[str, Values](), dict[str, str](), []
     with reading(file, "a Parquet file"):
-        table = pyarrow.parquet.ParquetFile(file).read()
+        opened = pyarrow.parquet.ParquetFile(file)
+        _check_size(file, opened.metadata)
+        table = opened.read(use_threads=False)
         for name, column in zip(table.column_names, table.columns, strict=True):
             values, unit = _arrow_values(column)
             if values is None:
@@ -186,6 +221,15 @@ def read_parquet(file: Path) -> Read:
     if not columns:
         raise Place(file).refuse("no column holds numbers", "Save numbers")
     return (Source(file, "", columns, units),), tuple(notes)
+
+
+def _check_size(file: Path, about: Any) -> None:
+    if about.num_rows * about.num_columns > limits.MOST_VALUES:
+        raise Place(file).refuse(
+            f"{about.num_rows:,} rows of {about.num_columns} columns, more than "
+            f"{limits.MOST_VALUES:,} values",
+            "Split it, or leave columns out",
+        )
 
 
 def _arrow_values(column: Any) -> tuple[Values | None, str]:

@@ -182,6 +182,48 @@ def check_outputs(
         written.append(output)
 
 
+def check_no_links(outputs: Iterable[Path]) -> None:
+    """Refuses outputs whose names a program chose and that are links.
+
+    A folder may come from someone else, with a link among its files to one of the user's.
+
+    Args:
+        outputs: Files that will be written.
+
+    Raises:
+        OutputError: Names the link.
+    """
+    link = next((output for output in outputs if output.is_symlink()), None)
+    if link is not None:
+        raise OutputError(
+            f"{link}: is a link, and the file that it points to would be replaced; remove the "
+            "link, or give another folder with --out"
+        )
+
+
+def check_first_line(output: Path, first: str) -> None:
+    """Refuses to replace a file that begins otherwise than what will be written there.
+
+    Args:
+        output: The file, which need not be there.
+        first: How its first line begins.
+
+    Raises:
+        OutputError: It is another file.
+    """
+    if not output.exists():
+        return
+    wanted, begins = first.encode(), b""
+    if output.is_file():
+        with suppress(OSError), output.open("rb") as stream:
+            begins = stream.read(len(wanted))
+    if begins != wanted:
+        raise OutputError(
+            f"{output}: this program did not write it and would replace it; move it away, or give "
+            "another folder with --out"
+        )
+
+
 def same_file(one: Path, other: Path) -> bool:
     """Whether two paths are one file, also one that is not there yet.
 

@@ -8,6 +8,8 @@ from typing import Any
 
 VERSION = "0.2.0"
 WRITER = f"robotic-fish {VERSION}"
+WRITTEN_BY = "Written by"
+"""How the comment above a YAML text begins."""
 
 
 def stamped(text: str) -> str:
@@ -16,7 +18,7 @@ def stamped(text: str) -> str:
     Args:
         text: What is written otherwise.
     """
-    return f"# Written by {WRITER}.\n{text}"
+    return f"# {WRITTEN_BY} {WRITER}.\n{text}"
 
 
 def versioned(content: Mapping[str, Any]) -> dict[str, Any]:

@@ -44,7 +44,7 @@ def sweep(
     try:
         from fish_env.cluster import ClusterSettings
         from robofish_agents.sweep.plan import plan
-        from robofish_agents.sweep.run import FINISHED, TABLE, run_sweep
+        from robofish_agents.sweep.run import FINISHED, PLAN, TABLE, run_sweep
         from robofish_agents.training.command import in_words
         from robofish_agents.training.config import files_behind
     except ModuleNotFoundError as error:
@@ -52,8 +52,8 @@ def sweep(
 
     console = console_for(json)
     trials = plan(config, seeds, settings or (), steps, trust_effects)
-    check_outputs([json], files_behind(config, trials[0].config))
     folder = out or Path("out/sweep") / trials[0].config.name
+    check_outputs([json, folder / PLAN, folder / TABLE], files_behind(config, trials[0].config))
 
     def tell(name: str, row: dict[str, float]) -> None:
         console.print(f"{name}: {in_words(row)}", highlight=False, markup=False, soft_wrap=True)

@@ -135,13 +135,14 @@ def _named(sources: dict[Path, str]) -> Iterable[Case]:
         yield Case(file_name("-".join(tail).replace("/", "")), sources[path])
 
 
-def prepare(case: Case, options: Options, folder: Path) -> Payload:
+def prepare(case: Case, options: Options, folder: Path, *others: Path) -> Payload:
     """Reads a data set and its fish.
 
     Args:
         case: which.
         options: how it is diagnosed.
         folder: where the diagnosis will be written.
+        others: other files that will be written.
 
     Raises:
         DatasetError, ParameterError: the data or the fish cannot be used.
@@ -150,7 +151,7 @@ def prepare(case: Case, options: Options, folder: Path) -> Payload:
     dataset = load_dataset(case.source)
     fish = as_fish(options.fish or dataset.fish, options.trust_effects)
     read = [*dataset_files(case.source), *fish_files(fish)]
-    check_outputs(outputs(fish, folder), read)
+    check_outputs([*outputs(fish, folder), *others], read)
     if not set(fish.effects) - set(catalogue()):
         # Without a file of its own the fish is whole, and another machine need not have the file.
         fish = dataclasses.replace(fish, source_file=None)

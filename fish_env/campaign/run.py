@@ -11,8 +11,14 @@ from typing import Any
 from fish_env.campaign.cases import Case, Diagnosed, Options, Payload, diagnosed, prepare
 from fish_env.cluster import ClusterSettings, Failed, Task, connected, run_tasks
 from fish_env.errors import OutputError, RoboticFishError
-from fish_env.files import write_bytes, write_rows, write_text
-from fish_env.reading import Unreadable, read_json
+from fish_env.files import (
+    check_first_line,
+    check_no_links,
+    write_bytes,
+    write_rows,
+    write_text,
+)
+from fish_env.reading import Unreadable, is_number, printable, read_json, shown
 from fish_env.version import VERSION
 
 MARK = "case.json"
@@ -72,6 +78,8 @@ def run_campaign(
         ConfigError: there is no cluster.
         OutputError: a result cannot be written.
     """
+    check_no_links([out / TABLE])
+    check_first_line(out / TABLE, ",".join(field.name for field in fields(Row)))
     rows: dict[str, Row] = {}
 
     def done(row: Row) -> None:
@@ -109,7 +117,7 @@ def _to_do(
     """Tasks of the cases that are not finished; the others become rows at once."""
     for case in cases:
         try:
-            payload = prepare(case, options, out / case.name)
+            payload = prepare(case, options, out / case.name, out / TABLE)
             finished = _read_mark(case, out, payload.digest)
         except OutputError:
             raise
@@ -131,7 +139,7 @@ def _read_mark(case: Case, out: Path, digest: str) -> Row | None:
     file = out / case.name / MARK
     try:
         mark = read_json(file)
-        row = {field.name: mark["row"][field.name] for field in fields(Row)}
+        row = {field.name: _as(field.type, mark["row"][field.name]) for field in fields(Row)}
         saved = mark["digest"]
     except FileNotFoundError:
         return None
@@ -147,6 +155,15 @@ def _read_mark(case: Case, out: Path, digest: str) -> Row | None:
     return Row(**{**row, "source": case.source})
 
 
+def _as(kind: Any, value: Any) -> Any:
+    """A value of a mark that is of the type of its field, a text or a number."""
+    if kind == "float" and is_number(value):
+        return float(value)
+    if kind == "str" and isinstance(value, str):
+        return printable(value)
+    raise TypeError(f"{shown(value)} in it")
+
+
 def _kept(task: Task[Payload], result: Diagnosed | Failed, out: Path) -> Row:
     """Writes what came back, the mark last."""
     assert isinstance(task, _Known)
@@ -156,6 +173,7 @@ def _kept(task: Task[Payload], result: Diagnosed | Failed, out: Path) -> Row:
     answer, folder = result.answer, out / case.name
     causes = " ".join(cause["name"] for cause in answer["causes"])
     row = Row(case.name, case.source, FINISHED, answer["verdict"], causes, answer["runtime_s"])
+    check_no_links([folder / name for name in result.files])
     for name, content in result.files.items():
         write_bytes(folder / name, content)
     mark: dict[str, Any] = {"version": VERSION, "digest": task.payload.digest, "row": asdict(row)}

@@ -13,6 +13,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from fish_env.files import write_text
+from fish_env.reading import Unreadable, read_json
 from fish_env.version import versioned
 
 LIST = ".robofish-files.json"
@@ -32,7 +33,7 @@ def replace_part(folder: Path, part: str, files: Iterable[Path]) -> None:
     now = {file.relative_to(folder).as_posix(): _digest(file) for file in files}
     for name, digest in listed.get(part, {}).items():
         file = folder / name
-        if name not in now and _ours(name, file, digest):
+        if name not in now and _ours(name, folder, digest):
             file.unlink()
     listed[part] = now
     write_text(folder / LIST, json.dumps(versioned(listed), indent=1) + "\n")
@@ -41,18 +42,21 @@ def replace_part(folder: Path, part: str, files: Iterable[Path]) -> None:
 def _read(folder: Path) -> dict[str, dict[str, str]]:
     """The list of an earlier diagnosis; what is not as it should be counts as not written."""
     try:
-        found: Any = json.loads((folder / LIST).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        found: Any = read_json(folder / LIST)
+    except (OSError, Unreadable):
         return {}
     if not isinstance(found, Mapping):
         return {}
     return {part: dict(names) for part, names in found.items() if isinstance(names, Mapping)}
 
 
-def _ours(name: str, file: Path, digest: str) -> bool:
+def _ours(name: str, folder: Path, digest: str) -> bool:
     path = PurePosixPath(name)
-    inside = not path.is_absolute() and ".." not in path.parts and path.suffix in ENDINGS
-    return inside and file.is_file() and not file.is_symlink() and _digest(file) == digest
+    if path.is_absolute() or ".." in path.parts or path.suffix not in ENDINGS or "\0" in name:
+        return False
+    file = folder / name
+    linked = any((folder / above).is_symlink() for above in (path, *path.parents))
+    return not linked and file.is_file() and _digest(file) == digest
 
 
 def _digest(file: Path) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import io
 import os
 import socket
 import time
@@ -15,8 +16,9 @@ import yaml
 
 from fish_env.cluster import ClusterSettings, check_version, connected
 from fish_env.errors import ConfigError
-from fish_env.files import write_rows, write_text
-from fish_env.version import VERSION, stamped
+from fish_env.files import check_first_line, check_no_links, write_rows, write_text
+from fish_env.reading import MOST_TABLE_BYTES, Unreadable, read_text, shown
+from fish_env.version import VERSION, WRITTEN_BY, stamped
 from robofish_agents.evaluation.suites import TRUST
 from robofish_agents.sweep.plan import Trial
 from robofish_agents.training.config import TrainConfig
@@ -59,6 +61,9 @@ def run_sweep(
         ConfigError: there is no cluster, or a folder holds another training of the same name.
         OutputError: a file cannot be written.
     """
+    check_no_links([out / PLAN, out / TABLE])
+    check_first_line(out / PLAN, f"# {WRITTEN_BY}")
+    check_first_line(out / TABLE, "trial,")
     for trial in trials:
         _check_folder(trial, out / trial.name)
     left = [trial for trial in trials if _evaluations(trial, out)[0] != FINISHED]
@@ -90,9 +95,17 @@ def _evaluations(trial: Trial, out: Path) -> tuple[str, list[dict[str, float]]]:
     file = out / trial.name / EVALUATIONS
     if not file.is_file():
         return UNFINISHED, []
-    with file.open(encoding="utf-8", newline="") as stream:
-        rows = [{key: float(value) for key, value in row.items()} for row in csv.DictReader(stream)]
-    done = bool(rows) and rows[-1]["steps"] >= trial.config.total_steps
+    try:
+        table = csv.DictReader(io.StringIO(read_text(file, MOST_TABLE_BYTES), newline=""))
+        rows = [{key: float(value) for key, value in row.items()} for row in table]
+        done = bool(rows) and rows[-1]["steps"] >= trial.config.total_steps
+        if rows:
+            best_of(rows)
+    except (Unreadable, KeyError, TypeError, ValueError, csv.Error) as error:
+        raise ConfigError(
+            f"{file}: no evaluations of a training ({shown(str(error))}); move its folder away to "
+            "train it again"
+        ) from None
     return FINISHED if done else UNFINISHED, rows
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import socket
+import stat
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from datetime import datetime
@@ -20,6 +21,7 @@ except ImportError:  # Windows; there two trainings in one folder are not told a
     fcntl = None  # type: ignore[assignment]
 
 LOCK = "training.lock"
+MOST_BYTES = 1000
 
 
 class Held(ConfigError):
@@ -65,15 +67,17 @@ def locked(folder: Path) -> Iterator[None]:
 def _held(file: Path) -> int | None:
     """The locked file, opened; None if another process holds it."""
     while True:
-        opened = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
+        # A folder may come from someone else, with a link to a file of the user's by this name.
+        opened = os.open(file, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK, 0o666)
         try:
             fcntl.flock(opened, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            _check_ours(file, opened)
             # Its last holder may have removed it between the two calls above.
             current = _is(opened, file)
         except BlockingIOError:
             os.close(opened)
             return None
-        except OSError:
+        except (OSError, ConfigError):
             os.close(opened)
             raise
         if current:
@@ -87,6 +91,21 @@ def _held(file: Path) -> int | None:
     os.ftruncate(opened, 0)
     os.write(opened, json.dumps(about).encode())
     return opened
+
+
+def _check_ours(file: Path, opened: int) -> None:
+    """Refuses a file that no lock is: it would be emptied.
+
+    Raises:
+        ConfigError: it holds something else, or has a second name.
+    """
+    about = os.fstat(opened)
+    content = os.pread(opened, MOST_BYTES + 1, 0) if stat.S_ISREG(about.st_mode) else b"?"
+    ours = not content or (content.startswith(b'{"process"') and len(content) <= MOST_BYTES)
+    if about.st_nlink > 1 or not ours:
+        raise ConfigError(
+            f"{file}: is no lock of a training; move it away, or give another folder with --out"
+        )
 
 
 def _is(opened: int, file: Path) -> bool:

@@ -48,7 +48,9 @@ def read_plain(path: Path) -> Tree:
         OSError, ValueError, KeyError, BadZipFile: another kind of file, or a damaged one.
     """
     try:
-        arrays = read_arrays(read_bytes(path, MOST_BYTES), MOST_BYTES)
+        content = read_bytes(path, MOST_BYTES)
+        # It was written unpacked, so one that unpacks to more is forged.
+        arrays = read_arrays(content, len(content))
         return _with_arrays(parse_json(str(arrays[TREE])), arrays)
     except Unreadable as error:
         raise ValueError(error.reason) from None

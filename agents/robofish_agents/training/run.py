@@ -12,7 +12,7 @@ import torch
 import yaml
 
 from fish_env.errors import ConfigError
-from fish_env.files import write_bytes, write_rows
+from fish_env.files import check_no_links, write_bytes, write_rows
 from fish_env.version import stamped
 from robofish_agents.policies.files import write_policy
 from robofish_agents.policies.pretrained import PretrainedPolicy
@@ -104,6 +104,7 @@ def best_of(evaluations: Sequence[dict[str, float]]) -> dict[str, float]:
 
 def _check_folder(config: TrainConfig, folder: Path, resume: bool) -> None:
     """Refuses a folder with files that would be replaced."""
+    check_no_links(outputs(folder))
     if (folder / CHECKPOINT).exists():
         if not resume:
             raise ConfigError(

@@ -25,9 +25,13 @@ from fish_env.data.vocabulary import (
     QUATERNION,
     Quantity,
 )
+from fish_env.files import file_name
 from fish_env.params import list_fish
+from fish_env.reading import short
 
 FILE_NAME = "dataset.yaml"
+LONGEST_ID = 100
+"""Characters of a run's id, which names files."""
 ABOUT = ("description", "source", "licence", "license", "citation", "url", "date", "comment")
 """Keys of free text, kept with the data."""
 
@@ -231,7 +235,7 @@ def _parse_noise(section: Section, channels: Mapping[str, Unit]) -> dict[str, fl
 def _parse_runs(top: Section) -> tuple[RunEntry, ...]:
     entries = [_parse_run(item, top) for item in top.items("runs")]
     for what, values in (
-        ("id", [entry.id for entry in entries]),
+        ("id", [file_name(entry.id) for entry in entries]),
         ("file", [str(entry.file.resolve()) for entry in entries]),
     ):
         twice = [value for value, count in Counter(values).items() if count > 1]
@@ -246,6 +250,10 @@ def _parse_run(item: object, top: Section) -> RunEntry:
     section = Section(item, top.at("runs"))
     section.allow(["id", "file", "start", "tail_phase", "condition", "clock"])
     id = section.text("id")
+    if len(id) > LONGEST_ID:
+        raise section.at("id").refuse(
+            f"the id '{short(id)}' has {len(id)} characters, more than {LONGEST_ID}", "Shorten it"
+        )
     section = Section(item, Place(top.place.file, run=id))
     section.require(["file", "start", "tail_phase"])
     return RunEntry(

@@ -14,6 +14,7 @@ from fish_env.errors import ConfigError, ParameterError, ScheduleError
 from fish_env.params import load_fish
 from fish_env.simulator import Simulator
 from fish_env.steady import steady_motion
+from tests.command_line import run
 from tests.fixtures.measured_data import DESCRIPTION, good_folder
 from tests.fuzzing.found_inputs import (
     DESCRIPTIONS,
@@ -82,6 +83,30 @@ def test_a_run_that_cannot_be_is_refused(text, tmp_path):
 def test_a_description_that_cannot_be_is_refused(change, tmp_path):
     runs = [DESCRIPTION["runs"][0] | change]
     assert fault(load_dataset, good_folder(tmp_path, runs=runs))
+
+
+@pytest.mark.parametrize(
+    "id", ["a/b", "../../x", "/x", "..", "[/red]", "$\\frac{", "%d {0}", "con"]
+)
+def test_an_id_names_files_of_its_own_folder_only(id, tmp_path, capsys):
+    """Slashes lead nowhere, and markup and formulas are shown as they are."""
+    runs = [DESCRIPTION["runs"][0] | {"id": id}]
+    data, out = good_folder(tmp_path / "data", runs=runs, name=id), tmp_path / "a" / "out"
+    before = set(tmp_path.rglob("*"))
+    status, shown, error = run(capsys, "compare", str(data), "--runs", "--out", str(out))
+    assert (status, error) == (0, "")
+    assert id in shown
+    written = [file for file in set(tmp_path.rglob("*")) - before if file.is_file()]
+    assert written
+    assert {file.parent for file in written} == {out}
+
+
+@pytest.mark.parametrize("ids", [["x" * 300], ["a/b", "a:b"]])
+def test_ids_that_cannot_name_files_are_refused(ids, tmp_path):
+    runs = [DESCRIPTION["runs"][0] | {"id": id, "file": f"{i}.csv"} for i, id in enumerate(ids)]
+    message = str(fault(load_dataset, good_folder(tmp_path, runs=runs)))
+    assert "id" in message
+    assert "no such file" not in message
 
 
 @pytest.mark.parametrize("unit", UNITS, ids=range(len(UNITS)))

@@ -19,12 +19,14 @@ from fish_env.data.importing.stamps import guess_unit
 from fish_env.data.place import Place
 from fish_env.data.schema import Dataset
 from fish_env.errors import DatasetError
+from fish_env.reading import printable, shown
 
 if TYPE_CHECKING:
     import pandas as pd
 
     Frames = pd.DataFrame | Mapping[str, pd.DataFrame | Mapping[str, pd.DataFrame]]
 
+_MISSING = ("<NA>", "NaT")
 SINGLE = "frame"
 """Name of the source where a run has one frame."""
 
@@ -73,8 +75,10 @@ def from_frames(
     Raises:
         DatasetError: A column is missing, or the values cannot be what is said of them.
     """
+    name = str(_plain(name, "name"))
     tables = _tables(frames, name)
     told = {"fish": _fish(fish), "frame": frame, "start": start, "tail_phase": tail_phase}
+    told = {key: _plain(value, key) for key, value in told.items()}
     assumptions: tuple[str, ...] = ()
     if channels is None:
         content, assumptions = _guessed(tables, name, told)
@@ -84,12 +88,13 @@ def from_frames(
             part: {"part": part, "time": _time(time, part, source)}
             for part, source in next(iter(tables.values())).items()
         }
-        content["channels"] = _entries(channels)
-        content["commands"] = _entries(commands or {})
-        content["constant_commands"] = dict(constant_commands or {})
+        content["channels"] = _entries(channels, "channels")
+        content["commands"] = _entries(commands or {}, "commands")
+        content["constant_commands"] = _mapping(constant_commands or {}, "constant_commands")
     if noise is not None:
-        content["noise"] = dict(noise)
-    about = {run: {"condition": word} for run, word in (conditions or {}).items()}
+        content["noise"] = _mapping(noise, "noise")
+    told_of = _mapping(conditions or {}, "conditions")
+    about = {run: {"condition": str(word)} for run, word in told_of.items()}
     runs = [RunInput(safe_id(run), own, about.get(run, {})) for run, own in tables.items()]
     imported = assemble_runs(parse_plan(content, Path("from_frames")), runs, Path(name))
     about_source = {key: text for key, text in imported.dataset.about.items() if key != "comment"}
@@ -172,11 +177,11 @@ def frame_source(frame: pd.DataFrame, run: str, part: str) -> Source:
         frame = frame.reset_index(names=index)
     columns, units = dict[str, Values](), dict[str, str]()
     source = Source(Path(run), part, {})
-    for label in frame.columns:
+    for position, label in enumerate(frame.columns):
         name = str(label)
         if name in columns:
             raise source.place(name).refuse("two columns have this name", "Rename one of them")
-        columns[name], unit = _values(frame[label])
+        columns[name], unit = _values(frame.iloc[:, position])
         units |= {name: unit} if unit else {}
     if len(frame) < 2:
         raise source.place().refuse(f"{len(frame)} rows", "Give at least two")
@@ -198,7 +203,12 @@ def _values(column: Any) -> tuple[Values, str]:
         return column.to_numpy(dtype=np.int64), ""
     if kind in "iufb":
         return column.to_numpy(dtype=np.float64, na_value=np.nan), ""
-    return np.array(["" if cell != cell else str(cell) for cell in column], dtype=object), ""
+    return np.array(["" if _is_missing(cell) else str(cell) for cell in column], dtype=object), ""
+
+
+def _is_missing(cell: object) -> bool:
+    """Whether a cell of any kind is empty, NaN or what pandas writes for it."""
+    return cell is None or (isinstance(cell, float) and cell != cell) or str(cell) in _MISSING
 
 
 def _has_zone(column: Any) -> bool:
@@ -209,11 +219,37 @@ def _fish(fish: str | Path) -> str:
     return fish_path(str(fish), Place(Path("from_frames")))
 
 
-def _entries(declared: Mapping[str, str | Mapping[str, Any]]) -> Content:
+def _plain(value: Any, name: str) -> Any:
+    """A value as YAML holds it.
+
+    Raises:
+        DatasetError: It is no text, number or mapping of these.
+    """
+    if isinstance(value, np.generic):
+        value = value.item()
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item, f"{name}: {key}") for key, item in value.items()}
+    raise DatasetError(
+        printable(f"from_frames: {name}: {shown(value)} is no text, number or mapping; give one")
+    )
+
+
+def _mapping(value: Any, name: str) -> Content:
+    if not isinstance(value, Mapping):
+        raise DatasetError(
+            f"from_frames: {name}: {shown(value)}; give a mapping by name, such as {{'x': ...}}"
+        )
+    return dict(_plain(value, name))
+
+
+def _entries(declared: Any, name: str) -> Content:
     """Entries of a mapping; a unit alone means the column of the channel's name."""
+    entries = _mapping(declared, name)
     return {
-        name: {"column": name, **({"unit": entry} if isinstance(entry, str) else dict(entry))}
-        for name, entry in declared.items()
+        key: {"column": key, **({"unit": str(entry)} if not isinstance(entry, dict) else entry)}
+        for key, entry in entries.items()
     }
 
 
@@ -221,7 +257,10 @@ def _time(time: str | Mapping[str, Any] | None, part: str, source: Source) -> Co
     """Time column and unit of one of a run's frames."""
     if isinstance(time, Mapping) and "column" not in time:
         time = time.get(part)
-    given = {"column": time or "t"} if time is None or isinstance(time, str) else dict(time)
+    if time is None or isinstance(time, str):
+        given = {"column": time or "t"}
+    else:
+        given = _mapping(time, "time")
     column = str(given.get("column", "t"))
     if column not in source.columns:
         raise source.place().refuse(

@@ -16,6 +16,7 @@ from fish_env.envs.outline import outline
 from fish_env.errors import ConfigError
 from fish_env.model.emit import OUTPUTS as TERM_OUTPUTS
 from fish_env.model.state import BASE_STATES
+from fish_env.reading import shown
 from fish_env.rendering import (
     Goal,
     Scene,
@@ -139,7 +140,9 @@ class Viewer:
         count: int = 1,
     ) -> None:
         if mode not in (None, *modes):
-            raise ConfigError(f"render_mode '{mode}': choose None or one of {', '.join(modes)}")
+            raise ConfigError(
+                f"render_mode {shown(mode)}: choose None or one of {', '.join(modes)}"
+            )
         if mode is not None:
             check_installed()
         self.mode = mode
@@ -237,10 +240,13 @@ class Watched:
 
 
 def _checked_size(size: Any) -> tuple[int, int]:
-    numbers = np.asarray(size)
+    try:
+        numbers = np.asarray(size)
+    except ValueError:  # lists of different lengths
+        numbers = np.zeros(0)
     whole = numbers.shape == (2,) and np.issubdtype(numbers.dtype, np.integer)
     if not whole or numbers.min() < SMALLEST or numbers.max() > LARGEST:
         raise ConfigError(
-            f"render_size {size!r}: width and height in pixels, {SMALLEST} to {LARGEST} each"
+            f"render_size {shown(size)}: width and height in pixels, {SMALLEST} to {LARGEST} each"
         )
     return int(numbers[0]), int(numbers[1])

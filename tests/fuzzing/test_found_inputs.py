@@ -10,6 +10,7 @@ from fish_env.comparison import compare
 from fish_env.data import load_dataset
 from fish_env.envs.batch import real_actions
 from fish_env.envs.options import env_options
+from fish_env.envs.vector import RoboticFish3DVectorEnv
 from fish_env.errors import ConfigError, ParameterError, ScheduleError
 from fish_env.params import load_fish
 from fish_env.simulator import Simulator
@@ -122,6 +123,21 @@ def test_an_option_of_a_wrong_type_is_refused_by_name(option):
         message = fault(env_options, **{option: value})
         fits += message is None
     assert fits <= 6, "most of these must be refused"
+
+
+OF_BATCHES = ("num_envs", "threads", "max_episode_steps", "autoreset_mode", "render_count")
+
+
+@pytest.mark.parametrize("option", ["render_mode", "render_size", *OF_BATCHES])
+def test_an_option_of_rendering_or_of_a_batch_is_refused_by_name(option):
+    count = {} if option == "num_envs" else {"num_envs": 2}
+    for value in WRONG:
+        if type(value) is int and 0 < value < 10 and option != "render_mode":
+            continue  # these options are such numbers
+        message = fault(RoboticFish3DVectorEnv, **count, **{option: value})
+        assert message, value
+        assert message.isprintable()
+        assert option in message
 
 
 def test_a_grouped_number_is_one_and_base_60_is_none(tmp_path):

@@ -231,6 +231,35 @@ def numbered(count: int) -> str:
     return ",".join(f"c{i}" for i in range(count)) + "\n" + (",".join("0" * count) + "\n") * 3
 
 
+def matlab_5(file: Path) -> None:
+    from scipy.io import savemat
+
+    struct_ = {"t": np.arange(9.0), "x": np.arange(9.0)}
+    savemat(file, {"pose": struct_, "cells": np.array([1, "a"], object)}, do_compression=False)
+
+
+def plain_group(opened) -> None:
+    opened["t"], opened["x"] = np.arange(9.0), np.arange(9.0)
+
+
+def plain_table():
+    import pyarrow
+
+    return pyarrow.table({"t": np.arange(9.0), "word": ["a"] * 9})
+
+
+MESSAGE = "INSERT INTO messages VALUES (1, 1, 5, x'000100000000000000000000'), (2, 1, 6, x'00');"
+ORDINARY: dict[str, Maker] = {
+    "x.csv": text("t;x [mm]\n" + "".join(f"{i};{i},5\n" for i in range(9))),
+    "x5.mat": matlab_5,
+    "x7.mat": hdf5(plain_group),
+    "x.xlsx": workbook(""),
+    "x.parquet": parquet(plain_table),
+    "x": bag("float64 x\nfloat64[] y\nstring z\n", b"\0\1\0\0" + bytes(24)),
+    "x.db3": database(TOPICS + MESSAGES + MESSAGE),
+}
+"""Logs that are as they should be, to be damaged."""
+
 LOGS: dict[str, tuple[str, Maker, str]] = {
     "a pipe": ("x.csv", os.mkfifo, "is no file"),
     "a pipe as a bag": ("x.bag", os.mkfifo, "is no file"),
@@ -244,6 +273,17 @@ LOGS: dict[str, tuple[str, Maker, str]] = {
         "x.mat", raw(lambda: matlab(variable(1, (2**31 - 1, 1), b""), b"XX")), "x.mat",
     ),
     "cells in cells": ("x.mat", raw(lambda: matlab(nested_cells(200_000))), "nested"),
+    "data of an unknown type": (
+        "x.mat", raw(lambda: matlab(variable(6, (2, 1), element(35337, bytes(16))))), "type",
+    ),
+    "text without a size": (
+        "x.mat", raw(lambda: matlab(variable(4, (), element(16, b"text")))), "dimensions",
+    ),
+    "a struct without its fields": (
+        "x.mat",
+        raw(lambda: matlab(variable(2, (1, 1), element(5, b"\4\0\0\0") + element(1, b"abc\0")))),
+        "promised",
+    ),
     "a packed variable": ("x.mat", raw(lambda: matlab(unpacking(60))), "unpacks to"),
     "HDF5 with many links": ("x.mat", hdf5(many_links), "links"),
     "HDF5 in a circle": ("x.mat", hdf5(circle), "nested"),

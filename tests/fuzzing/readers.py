@@ -9,6 +9,7 @@ from typing import Any
 
 from fish_env.commands.case import read_case
 from fish_env.data import load_dataset
+from fish_env.data.importing import parse_plan, read_content
 from fish_env.envs.config import load_env_config
 from fish_env.envs.record import read_episode
 from fish_env.errors import RoboticFishError
@@ -35,6 +36,7 @@ READERS: dict[str, tuple[Callable[[Path], Any], str]] = {
     "results": (read_results, ".json"),
     "replay": (read_replay_file, ".csv"),
     "waypoints": (read_waypoints, ".csv"),
+    "mapping": (lambda file: parse_plan(read_content(file), file), ".yaml"),
     "policy": (read_policy, ".npz"),
     "episode": (read_episode, ".npz"),
 }

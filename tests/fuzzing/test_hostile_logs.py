@@ -7,13 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from hypothesis import given
+from hypothesis import strategies as st
 
 from fish_env.data.importing import assemble, limits, open_logs, parse_plan
 from fish_env.data.importing.correction import corrected
 from fish_env.errors import DatasetError
 from tests.command_line import run
-from tests.fuzzing.hostile_logs import LOGS, MESSAGES, TOPICS, database, workbook
+from tests.fuzzing.hostile_logs import LOGS, MESSAGES, ORDINARY, TOPICS, database, workbook
 from tests.fuzzing.readers import LONGEST_S, fault
+from tests.fuzzing.test_structured import fuzz
 
 MEMORY = 900_000_000
 LIMITS = {
@@ -58,6 +61,31 @@ def test_a_hostile_log_is_refused(log, tmp_path, little):
     message = fault(open_logs, [tmp_path / name])
     assert word in str(message)
     assert str(message).isprintable()
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory) -> dict[str, bytes]:
+    """The content of an ordinary log of each kind, by its ending."""
+    folder = tmp_path_factory.mktemp("whole")
+    for name, make in ORDINARY.items():
+        make(folder / name)
+    files = [file for file in folder.rglob("*") if file.is_file() and file.suffix != ".yaml"]
+    return {
+        file.suffix if file.suffix != ".mat" else file.name[1:]: file.read_bytes() for file in files
+    }
+
+
+@pytest.mark.parametrize("kind", [".csv", "5.mat", "7.mat", ".xlsx", ".parquet", ".mcap", ".db3"])
+@fuzz
+@given(data=st.data())
+def test_damaged_logs(kind, whole, tmp_path_factory, data):
+    content = bytearray(whole[kind])
+    for _ in range(data.draw(st.integers(1, 5))):
+        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
+    file = tmp_path_factory.getbasetemp() / f"damaged{kind}"
+    file.write_bytes(content[: data.draw(st.sampled_from([len(content), len(content) // 2]))])
+    message = fault(open_logs, [file])
+    assert message is None or message.isprintable()
 
 
 def test_the_limits_of_the_process_are_put_back():

@@ -40,6 +40,14 @@ CASE = {
     "initial": {"position_inertial": [0, 0, 1], "tail_phase": 0.0},
     "effects": {"servo_lag": {"time_constant": 0.05}},
 }
+MAPPING = {
+    "format": "robofish-import/1", "name": "a", "fish": "zheng-2021-a", "frame": "ned",
+    "sources": {"log": {"files": "*.csv", "time": {"column": "t", "unit": "s", "offset": 0.5}}},
+    "channels": {"x": {"column": "x", "unit": "m", "scale": 2.0, "sign": -1}},
+    "commands": {"tail_offset": {"column": "o", "unit": "rad", "between": "hold"}},
+    "constant_commands": {"tail_amplitude": 0.3, "tail_frequency": 1},
+    "runs": [{"id": "r1", "files": ["a.csv"], "start": "rest"}],
+}  # fmt: skip
 RESULTS = {"results": [{"agent": "pid", "metrics": {"depth": {"mean": 1.0}}}]}
 
 
@@ -56,6 +64,7 @@ TREES = {
     "training": shipped_tree("train/ppo-hold.yaml"),
     "case": CASE,
     "results": RESULTS,
+    "mapping": MAPPING,
 }
 
 numbers = (

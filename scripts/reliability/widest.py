@@ -24,6 +24,9 @@ SHORTEST_S = 0.01
 GENTLER: Ranges = {
     "effects.tail_flexibility.natural_frequency": [0.1, 1.0],
     "effects.tail_flexibility.damping_ratio": [0.05, 2.0],
+    "effects.body_flexibility.stiffness": [0.01, 1.0],
+    "effects.body_flexibility.natural_frequency": [0.5, 4.0],
+    "effects.body_flexibility.damping_ratio": [0.05, 1.0],
     "effects.servo_delay.delay": [0.0, 0.15],
     "effects.current.north": [-0.5, 0.5],
     "effects.current.east": [-0.5, 0.5],
@@ -34,7 +37,7 @@ GENTLER: Ranges = {
     "effects.water_ingress.rate": [-0.002, 0.002],
     "effects.hull_compression.rate": [-0.002, 0.002],
 }
-"""Ends that let a fish swim for some seconds."""
+"""Ends that let a fish swim for some seconds, in steps that are not divided."""
 DEEP: dict[str, Any] = {"task": "track", "config": {"tank": {"depth": 20.0}}}
 """A tank in which a fish that sinks takes its time."""
 WATER: dict[str, Any] = {
@@ -85,7 +88,10 @@ def swimmable(factor: float = 3.0) -> Ranges:
 
 
 def with_effects() -> Ranges:
-    """The same with every effect to its ends, but for those that divide the step or sink a fish."""
+    """The same with every effect to its ends, but for those that divide the step or sink a fish.
+
+    Half the step is left to a surface that the fish pierces, which is as quick at every size.
+    """
     return swimmable() | dict(_effects()) | GENTLER
 
 

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fish_env.envs.options import env_options
 from scripts.reliability import soak_batch, soak_runs, turns, watch, widest
 from scripts.reliability.soak import main
 
@@ -22,6 +23,13 @@ def test_the_widest_draws_are_legal_and_wider_ones_are_not():
     low, high = ranges[path]
     assert widest.accepted({path: [low, high]})
     assert not widest.accepted({path: [low, 4 * high]})
+
+
+def test_the_draws_that_swim_hardly_divide_the_step():
+    """One new effect divided it by 18, and a soak of minutes took hours."""
+    usual = env_options(**widest.DEEP).config.substeps
+    drawn = env_options(randomization=widest.with_effects(), **widest.DEEP).config.substeps
+    assert drawn <= 2 * usual
 
 
 @pytest.mark.slow

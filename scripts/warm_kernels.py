@@ -28,8 +28,6 @@ FISH = "zheng-2021-a"
 SWIM = (0.0, 0.3, 2.0, 0.0, 0.0)
 EFFECT: EffectValues = {"servo_lag": {"time_constant": 0.05}}
 CORNERS: EffectValues = {"servo_backlash": {"gap": 0.05}}
-WATER: EffectValues = {"current": {"north": 0.01}}
-LOADED: EffectValues = {"servo_torque_limit": {"torque": 0.05}}
 
 
 def one_fish(effects: EffectValues) -> None:
@@ -79,10 +77,7 @@ def hidden_fish(effects: EffectValues) -> None:
 
 
 TASKS: Mapping[str, tuple[Callable[[EffectValues], None], EffectValues]] = {
-    "filter, a loaded drive": (filters, LOADED),
-    "filter, all effects": (filters, {**EFFECT, **WATER}),
-    "filter, effects of water": (filters, WATER),
-    "filter, an effect of the tail": (filters, EFFECT),
+    "filter, all effects": (filters, EFFECT),
     "filter, no effects": (filters, {}),
     "hidden physics": (hidden_fish, {}),
 } | {

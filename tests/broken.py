@@ -15,8 +15,8 @@ from fish_env.model.composition import Composition
 from fish_env.model.runtime import Kernels
 from fish_env.simulator import Simulator
 
-JIT_IMPORT = "from fish_env.model.jit import entry_point, kernel, lean_entry_point"
-NO_JIT = "entry_point = lean_entry_point = kernel = lambda function: function"
+JIT_IMPORT = "from fish_env.model.jit import entry_point, kernel, lean_entry_point, shared_kernel"
+NO_JIT = "entry_point = lean_entry_point = kernel = shared_kernel = lambda function: function"
 Replacements = Mapping[str, str]
 
 

@@ -29,4 +29,5 @@ EFFECT = Effect(
         )
     ),
     hooks={"wrench": applied},
+    varies=True,
 )

@@ -31,12 +31,16 @@ from fish_env.model.composed import (
     kernel,
     lane_initialise,
     normalise,
+    past_matters,
     rk4_step,
+    shared_kernel,
+    switch_effects,
 )
 from fish_env.model.history import HEARD, RECORD
 
 # --- end ---
 
+BLOCK = 24  # lanes: a fish's coefficients, an effect or two; 20 states; whole vector registers
 WRENCH = PAR + N_PARAMETERS - 6
 DIVERGED = 1e4
 MOST_SWING = 1.2  # swing of a soft tail over the told one, below its resonance
@@ -77,9 +81,10 @@ def set_commands(work, width, times, values, at, start, length, skew, delay, sha
                 work[(U + j) * width + k] = work[(U + j) * width]
 
 
-@kernel
-def step_lanes_once(work, width, elapsed, h, pace, late, history, tables):
+@shared_kernel
+def step_lanes_once(work, elapsed, h, pace, late, history, tables):
     """One RK4 step of every lane, kept where it stays finite."""
+    width = BLOCK
     for k in range(width):  # true time since the run began is `pace` times the recorded one
         work[TIME * width + k] = (pace[k] - 1.0) * elapsed
     rk4_step(work, width, elapsed, h, tables, late, history, 0, width, pace)
@@ -197,9 +202,10 @@ def load_lane(work, width, k, state, par, row, first_command):
     work[TIME * width + k] = 0.0
 
 
-@kernel
-def initialise_effects(work, width):
+@shared_kernel
+def initialise_effects(work):
     """Effect states at rest (they live in the X rows)."""
+    width = BLOCK
     for n in range(N_STATES * width):
         work[X * width + n] = work[X0 * width + n]
     for k in range(width):
@@ -210,18 +216,19 @@ def initialise_effects(work, width):
 
 @kernel
 def start_effects(work, width, begin, swimming, pace, late, history, tables):
-    """Effect states where the start of a run leaves them, or where beating before it has."""
-    initialise_effects(work, width)
-    if swimming & (TAIL_ROWS.shape[0] > 0):
+    """Which effects are on, and their states where the start of a run or beating before it has."""
+    switch_effects(width, work)
+    initialise_effects(work)
+    if swimming & past_matters(width, work):
         base = work[X0 * width : (X0 + BASE) * width].copy()
-        step_lanes_once(work, width, begin, STEP_S, pace, late, history, tables)
+        step_lanes_once(work, begin, STEP_S, pace, late, history, tables)
         for n in range(BASE * width):
             work[X0 * width + n] = base[n]
         for k in range(width):  # as much earlier as the beat is going to last
             work[(X0 + PHASE) * width + k] -= SETTLING_S * work[(DX + PHASE) * width + k]
-        initialise_effects(work, width)
+        initialise_effects(work)
         for i in range(SETTLING_STEPS):
             earlier = begin - SETTLING_S + i * STEP_S
-            step_lanes_once(work, width, earlier, STEP_S, pace, late, history, tables)
+            step_lanes_once(work, earlier, STEP_S, pace, late, history, tables)
         for n in range(BASE * width):
             work[X0 * width + n] = base[n]

@@ -24,6 +24,7 @@ from fish_env.identification.state_blocks import N_ERROR, N_MOVING
 
 # --- completed by compose ---
 from fish_env.model.composed import (
+    BLOCK,
     DX,
     LATE_TAIL,
     N_STATES,
@@ -48,9 +49,6 @@ from fish_env.model.composed import (
 
 # --- end ---
 
-FILTER_LANES = 24  # a fish's coefficients and an effect or two, each moved once
-EKF_LANES = 24  # the estimate and 19 neighbours, rounded up to whole vector registers
-
 
 @kernel
 def slopes_of_interval(
@@ -74,7 +72,7 @@ def slopes_of_interval(
     for i in range(steps):
         start = begin + i * h
         set_commands(work, width, times, values, at, start, h, skew, delay, True)
-        step_lanes_once(work, width, start, h, pace, late, history, tables)
+        step_lanes_once(work, start, h, pace, late, history, tables)
         keep_step(work, width, path, i)
     difference(work, width, gap)
     for j in range(N_MOVING):
@@ -140,7 +138,7 @@ def ekf_run(
     Returns:
         Log likelihood without its constant.
     """
-    width = EKF_LANES
+    width = BLOCK
     work = np.zeros(WORK_ROWS * width)
     pace, skew = np.full(width, pace_one), np.full(width, skew_one)
     delay = np.full(width, delay_one)
@@ -264,7 +262,7 @@ def filter_block(
     known, push_basis, push_column, push_size, tables, out, place, first, count,
 ):  # fmt: skip
     """Lanes first..first+count through a run with given gains (see :func:`filter_lanes`)."""
-    width = FILTER_LANES
+    width = BLOCK
     channels = codes.shape[0]
     work = np.zeros(WORK_ROWS * width)
     pace, skew, delay = np.ones(width), np.ones(width), np.zeros(width)
@@ -304,7 +302,7 @@ def filter_block(
             for i in range(steps):
                 begin = clock[sample - 1] + i * h
                 set_commands(work, width, times, values, at, begin, h, skew, delay, shared)
-                step_lanes_once(work, width, begin, h, pace, late, history, tables)
+                step_lanes_once(work, begin, h, pace, late, history, tables)
                 keep_step(work, width, path, i)
             if pushed:
                 push(
@@ -363,11 +361,11 @@ def filter_lanes(
         first: first lane.
         last: one past the last.
     """
-    for block in range(first, last, FILTER_LANES):
+    for block in range(first, last, BLOCK):
         filter_block(
             states0, swimming, par, pace, skew, delay, gain, bias, ages, lens, clock, substeps,
             times, values, measured, codes, k_in, w_in, wrench_decay_s, history_rows, known,
             push_basis, push_column, push_size, tables, out, place, block,
-            min(FILTER_LANES, last - block),
+            min(BLOCK, last - block),
         )  # fmt: skip
     return 0

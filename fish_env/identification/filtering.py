@@ -322,7 +322,7 @@ class RunFilter:
             variation: (K, N) added to every run's own numbers.
             starts: of each run, (18, N) base states to begin from; default: those of the run.
         """
-        entry, lanes = self.kernels.entry("filter_lanes"), self.kernels.module.FILTER_LANES
+        entry, lanes = self.kernels.entry("filter_lanes"), self.kernels.module.BLOCK
         own = [records] * len(self.runs) if isinstance(records, np.ndarray) else records
         count = own[0].shape[1]
         ends = np.cumsum([data.measured.size for data in self.runs]).tolist()

@@ -10,19 +10,9 @@ from fish_env.identification.applied_wrench import EFFECT as APPLIED_WRENCH
 from fish_env.model.effect import LOAD, STAGES
 
 LEAN = frozenset[str]()
-KERNELS = (
-    LEAN,
-    frozenset({"inputs", "tail"}),
-    frozenset(
-        {"density", "barycentre", "water", "water_rate", "tail_inflow", "tail_lift", "tail_force"}
-        | {"body_drag", "wrench"}
-    ),
-    frozenset(STAGES),
-    frozenset({*STAGES, LOAD}),
-)
-"""Stages that are compiled together. An effect costs a little where it is neutral too, so one of
-what drives the tail, or of what pushes the fish, is computed without the other kinds: the same
-bits, in two thirds of the time. A loaded drive costs a quarter of all others together."""
+KERNELS = (LEAN, frozenset({*STAGES, LOAD}))
+"""Stages that are compiled together: none for a fish without effects, and all. The kernel of all
+passes over effects that are off in a whole block of lanes (:mod:`fish_env.model.emit_blocks`)."""
 
 
 def quickest(stages: AbstractSet[str]) -> frozenset[str]:

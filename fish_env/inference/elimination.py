@@ -61,7 +61,7 @@ def _smaller(current: Explanation, needed: Collection[CauseId]) -> list[Explanat
         if alone and not doubtful:
             continue
         least = POLICY.evidence_doubt + (allowed_loss(current.fit, cause) if doubtful else 0.0)
-        smaller = None if _is_needed(fitter, cause, least) else without(current, (cause,))
+        smaller = None if _is_needed(fitter, cause, least) else without(current, (cause,), least)
         if smaller and smaller.score < current.score + least:
             found.append(smaller)
     return sorted(found, key=lambda e: e.score)
@@ -83,8 +83,8 @@ def _is_needed(fitter: CoarseFitter, cause: CauseId, least: float) -> bool:
 def without_idle(found: Explanation) -> Explanation:
     """The explanation without causes that may not act, if one fit can do without all of these."""
     idle = [cause for cause in found.causes if may_not_act(found.fit, cause)]
-    smaller = without(found, idle) if idle else None
     least = POLICY.evidence_doubt + sum(allowed_loss(found.fit, cause) for cause in idle)
+    smaller = without(found, idle, least) if idle else None
     return smaller if smaller and smaller.score < found.score + least else found
 
 

@@ -9,12 +9,12 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from fish_env.arrays import FloatArray
+from fish_env.arrays import FloatArray, IntArray
 from fish_env.inference.adequacy import disturbance_at_limit
 from fish_env.inference.estimate.again import search_steps, with_run_variation
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.estimate.information import information, prior_precision
-from fish_env.inference.hypotheses import CauseId
+from fish_env.inference.hypotheses import CauseId, EffectParameterId
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Problem
 
@@ -110,11 +110,35 @@ class Explanation:
         coefficient whose prior is lifted within ``prior_reach_sd`` deviations. Source: Kass and
         Raftery (1995), "Bayes factors", JASA 90, eq. 3; differences of 6 they call strong.
         """
-        own, known = self.fit, known_before(self)
+        own, (known, _) = self.fit, self._informed
         lifted = [own.problem.baseline.ids.index(one) for one in own.released]
-        narrowed = np.linalg.slogdet(information(own.linearised.slopes, known))[1]
         penalty = known[lifted] @ own.point.z[lifted] ** 2
-        return float(own.objective + penalty + narrowed - np.log(known).sum())
+        return float(own.objective + penalty + self._narrowed(np.arange(len(known))))
+
+    def narrowed_by(self, dropped: Collection[CauseId]) -> float:
+        """What the score would lose without some causes, were estimates and misfit the same.
+
+        Args:
+            dropped: the causes; one that is a coefficient stays a parameter.
+        """
+        ids = self.fit.ids
+        stays = [not (isinstance(id, EffectParameterId) and id.effect in dropped) for id in ids]
+        return self._narrowed(np.arange(len(ids))) - self._narrowed(np.flatnonzero(stays))
+
+    @cached_property
+    def _informed(self) -> tuple[FloatArray, FloatArray]:
+        """Precision of the free parameters before the data (n,), and information with it (n, n)."""
+        known = known_before(self)
+        return known, information(self.fit.linearised.slopes, known)
+
+    def _narrowed(self, which: IntArray) -> float:
+        """By how much the data narrowed some free parameters (k,), in -2 log evidence.
+
+        The others are taken to be known.
+        """
+        known, informed = self._informed
+        after = np.linalg.slogdet(informed[np.ix_(which, which)])[1]
+        return float(after - np.log(known[which]).sum())
 
 
 def known_before(explanation: Explanation) -> FloatArray:

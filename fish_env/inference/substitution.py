@@ -28,6 +28,8 @@ from fish_env.inference.search import Report, at_noise, is_off
 from fish_env.inference.starts import baselines, probed
 
 Values = Mapping[EffectParameterId, float]
+STRAYED = 3.0 * POLICY.evidence_doubt
+"""What the log determinant of all estimates may change by as they move without a cause."""
 MOST_TURNS = 6
 """Sizes from which a coarse fit is tried in turn."""
 
@@ -165,18 +167,27 @@ def _parts(problem: Problem, effect: EffectName, values: Values) -> Parts:
     return parts if {*parts} <= {*known} else {}
 
 
-def without(current: Explanation, dropped: Collection[CauseId]) -> Explanation | None:
+def without(
+    current: Explanation, dropped: Collection[CauseId], least: float = np.inf
+) -> Explanation | None:
     """The fit when some of its causes are dropped, under the same noise model.
 
     None where the simulation diverges without them.
+
+    Args:
+        current: all causes.
+        dropped: those to drop.
+        least: growth of the score from which the fit is of no use, and may stop early.
     """
     own = current.fit
     effects, released, begin = _dropped(own, dropped)
+    enough = own.objective + least + current.narrowed_by(dropped) + STRAYED
     smaller = reached(
         lambda: fit(
-            own.problem, effects, begin, own.noise, released, refit_noise=False, iterations=4
+            own.problem, effects, begin, own.noise, released, refit_noise=False, iterations=4,
+            give_up_above=enough,
         )
-    )
+    )  # fmt: skip
     if smaller is None:
         return None
     return Explanation(tuple(c for c in current.causes if c not in dropped), smaller)

@@ -20,7 +20,7 @@ from fish_env.files import write_text
 from fish_env.model import jit
 from fish_env.model.composition import Composition
 from fish_env.model.effect import STAGES, Effect
-from fish_env.model.emit_corners import CornerEmitter
+from fish_env.model.emit_blocks import BlockEmitter
 from fish_env.model.kernel_cache import cache_root
 
 HEADER = '''"""Composed physics, generated: edit the sources in fish_env/model and effects."""
@@ -41,11 +41,11 @@ from fish_env.model.history import (
     told_anew,
 )
 from fish_env.model.hydrostatics import buoyancy_force, gravity_wrench
-from fish_env.model.jit import entry_point, kernel, lean_entry_point
+from fish_env.model.jit import entry_point, kernel, lean_entry_point, shared_kernel
 from fish_env.model.mass_properties import barycentre, rigid_inertia
 from fish_env.model.newton_euler import inertial_wrench, solve_full, solve_rigid
 from fish_env.model.plate import drag_force, lift_force, speed_and_inverse
-from fish_env.model.records import Fish, Inputs, Vector, Wrench
+from fish_env.model.records import Barycentre, Fish, Inputs, Tail, Vector, Wrench
 from fish_env.model.tail import (
     TWO_PI, commanded_tail, hinge_power, tail_arm, tail_velocity, tail_wrench, wrench_at,
 )
@@ -66,7 +66,7 @@ def source(composition: Composition) -> str:
     texts = [path.read_text(encoding="utf-8") for path in composition.templates]
     bodies = [text[text.index(_END) :] for text in texts]
     imports = [_kept_imports(text) for text in texts]
-    return "\n".join([HEADER, *imports, CornerEmitter(composition).text(), *bodies])
+    return "\n".join([HEADER, *imports, BlockEmitter(composition).text(), *bodies])
 
 
 def cache_folder(composition: Composition) -> Path:

@@ -107,6 +107,7 @@ class Effect(Switched):
             tail whose states are its angle, or angle and rate.
         command_delay: name of the parameter (s) by which the tail's command is late.
         loaded: whether the hook of the tail takes the motion through the water too.
+        varies: whether its parameters change during a run, so that it counts as on throughout.
         order: place among the effects of its section, low ones first.
         sample_time: (recorded time array, parameters) -> true time array (measurement).
         command_time: (recorded time array, parameters) -> true time array, of commands.
@@ -145,6 +146,7 @@ class Effect(Switched):
     settling: Callable[..., Any] | None = None
     command_delay: str | None = None
     loaded: bool = False
+    varies: bool = False
     order: int = 0
     sample_time: Callable[..., Any] | None = None
     command_time: Callable[..., Any] | None = None

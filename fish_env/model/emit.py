@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from fish_env.model.composition import BASE_TERMS, Composition
 from fish_env.model.effect import Effect
 from fish_env.model.history import COMMAND, HEARD
+from fish_env.model.records import Wrench
 from fish_env.params.packing import CURVES, RECORD_FIELDS
 
 OUTPUTS = {
@@ -25,6 +26,8 @@ OUTPUTS = {
     "heave_through_water": "motion.w",
 }
 """Quantities reported beside the wrenches (rad, rad/s, W, m, m/s) and what they are called here."""
+PHASE = "phase = work[(X + 13) * width + k]"
+POWER = "power = hinge_power(tail, arm, force)"
 ACROSS = {1: "xz_", 2: "xy_"}
 """Component of the force across each body plane, which is zero."""
 
@@ -70,7 +73,7 @@ class Emitter:
         lines = [*self.evaluation()]
         for row, (name, kind) in enumerate(self.wrench_terms()):
             for component in range(6):
-                attribute = ("fx", "fy", "fz", "mx", "my", "mz")[component]
+                attribute = Wrench._fields[component]
                 value = f"{name}.{attribute}"
                 if kind != "wrench":
                     present = (component < 3) == (kind == "force")
@@ -149,20 +152,44 @@ class Emitter:
 
     def unpack(self) -> list[str]:
         """Read parameters, state and inputs of a lane."""
+        return [*self.fish_lines(), *self.records(), *self.state_lines(), *self.input_lines()]
+
+    def fish_lines(self) -> list[str]:
+        """Read the coefficients of the fish of a lane."""
         count = len(RECORD_FIELDS)
         fields = ", ".join(f"work[(PAR + {i}) * width + k]" for i in range(count))
-        lines = [f"fish = Fish({fields})", *self.records()]
-        state = [f"work[(X + {i}) * width + k]" for i in range(14)]
-        lines += [
+        return [f"fish = Fish({fields})"]
+
+    def state_lines(self) -> list[str]:
+        """Read the state of a lane, and put its fish into the water where that is."""
+        return [*self.place_lines(), *self.pose_lines(), PHASE]
+
+    def place_lines(self, water: bool = True) -> list[str]:
+        """Read when and where a lane is.
+
+        Args:
+            water: put its fish into the water there.
+        """
+        state = ", ".join(f"work[(X + {i}) * width + k]" for i in range(3))
+        return [
             "time = work[TIME * width + k] + elapsed + shift",
             f"since = shift{' - work[BEGUN * width + k]' if self.composition.corners else ''}",
-            f"place = Vector({', '.join(state[:3])})",
-            *self.other_water(),
+            f"place = Vector({state})",
+            *(self.other_water() if water else ()),
+        ]
+
+    def pose_lines(self) -> list[str]:
+        """Read attitude and velocities of a lane."""
+        state = [f"work[(X + {i}) * width + k]" for i in range(13)]
+        return [
             f"attitude = rotation({', '.join(state[3:7])})",
             f"velocity = Vector({', '.join(state[7:10])})",
             f"omega = Vector({', '.join(state[10:13])})",
-            f"phase = {state[13]}",
         ]
+
+    def input_lines(self) -> list[str]:
+        """Read what the actuators of a lane do."""
+        lines = []
         for i in range(5):
             lines.append(f"u{i}_rate = work[(U_RATE + {i}) * width + k]")
             lines.append(f"u{i} = work[(U + {i}) * width + k] + shift * u{i}_rate")
@@ -172,13 +199,16 @@ class Emitter:
 
     def records(self) -> list[str]:
         """Read the parameters of effects of a lane."""
-        lines, row = [], len(RECORD_FIELDS)
-        for effect in self.effects:
-            rows = range(row, row + len(effect.parameters))
-            values = ", ".join(f"work[(PAR + {i}) * width + k]" for i in rows)
-            lines.append(f"e_{effect.name} = {effect.name}_record({values})")
-            row += len(effect.parameters)
-        return lines
+        return [self.record(effect) for effect in self.effects]
+
+    def record(self, effect: Effect) -> str:
+        """Read the parameters of an effect of a lane."""
+        values = ", ".join(f"work[(PAR + {i}) * width + k]" for i in self.parameter_rows(effect))
+        return f"e_{effect.name} = {effect.name}_record({values})"
+
+    def parameter_rows(self, effect: Effect) -> list[int]:
+        """Rows of an effect's parameters."""
+        return [self.parameters.index(f"{effect.name}.{p.name}") for p in effect.parameters]
 
     def other_water(self) -> list[str]:
         """The fish of the lane in water whose density effects change."""
@@ -242,16 +272,24 @@ class Emitter:
             *self.apply("barycentre", "centre", "place, inputs, time, fish"),
             *self.tail_lines(),
             *self.body_lines(),
+            *self.weight_lines(),
+        ]
+        wrenches = (e for e in self.effects if "wrench" in e.hooks)
+        return [*lines, *(self.wrench_line(effect) for effect in wrenches)]
+
+    def weight_lines(self) -> list[str]:
+        """Weight, buoyancy, rotational damping and inertia."""
+        return [
             "gravity = gravity_wrench(attitude, centre, fish)",
             "buoyancy = buoyancy_force(attitude, centre, fish)",
             "damping = damping_moment(motion, fish)",
             "inertial = inertial_wrench(motion, centre)",
         ]
-        for effect in self.effects:
-            if "wrench" in effect.hooks:
-                given = "motion, tail, inputs, centre, fish"
-                lines.append(self.call(effect, "wrench", f"t_{effect.name}", given))
-        return lines
+
+    def wrench_line(self, effect: Effect) -> str:
+        """The wrench of an effect."""
+        given = "motion, tail, inputs, centre, fish"
+        return self.call(effect, "wrench", f"t_{effect.name}", given)
 
     def motion_lines(self) -> list[str]:
         """The fish against the ground and against the water."""
@@ -267,9 +305,25 @@ class Emitter:
 
     def tail_lines(self) -> list[str]:
         """Tail: kinematics, forces, servo power."""
+        lines = self.own_tail_lines()
+        for effect in self.effects:
+            lines += self.tail_force_lines(effect) if "tail_force" in effect.hooks else ()
+        return [*lines, POWER]
+
+    def tail_force_lines(self, effect: Effect) -> list[str]:
+        """What an effect makes of the force on the tail, and the wrench of the change."""
+        change = ", ".join(f"force.{axis} - before.{axis}" for axis in "xyz")
+        return [
+            "before = force",
+            self.call(effect, "tail_force", "force", "force, motion, tail, fish"),
+            f"t_{effect.name} = tail_wrench(arm, Vector({change}), fish)",
+        ]
+
+    def own_tail_lines(self) -> list[str]:
+        """Tail: kinematics, lift and drag."""
         drag = self.coefficient("drag", "s_tail", "tail.drag", "tail_c0", "tail_c2")
         lift = self.coefficient("lift", "s_tail", "tail.lift", "tail_c1")
-        lines = [
+        return [
             "inflow = motion",
             *self.apply("tail_inflow", "inflow", "fish"),
             "arm, normal = tail_arm(tail, fish)",
@@ -285,17 +339,15 @@ class Emitter:
             "tail_drag = tail_wrench(arm, f_drag, fish)",
             "tail_lift = tail_wrench(arm, f_lift, fish)",
         ]
-        for effect in self.effects:
-            if "tail_force" in effect.hooks:
-                lines.append("before = force")
-                lines.append(self.call(effect, "tail_force", "force", "force, motion, tail, fish"))
-                change = ", ".join(f"force.{axis} - before.{axis}" for axis in "xyz")
-                lines.append(f"t_{effect.name} = tail_wrench(arm, Vector({change}), fish)")
-        return [*lines, "power = hinge_power(tail, arm, force)"]
 
     def body_lines(self) -> list[str]:
         """Body planes and impact moments."""
-        lines = ["factor = 1.0", *self.apply("body_drag", "factor", "motion, fish")]
+        factor = ["factor = 1.0", *self.apply("body_drag", "factor", "motion, fish")]
+        return [*factor, *self.plane_lines()]
+
+    def plane_lines(self) -> list[str]:
+        """Body planes, whose drag is multiplied by a factor, and impact moments."""
+        lines = []
         scale = "factor * " if self.has("body_drag") else ""
         for plane, normal, area in (("xz", "w", "z"), ("xy", "v", "y")):
             curve = f"body.plane_{plane}"
@@ -334,12 +386,16 @@ class Emitter:
         ]
 
     def total(self) -> list[str]:
-        """Sum of all terms, leaving out components that are zero by construction."""
+        """Sum of all terms."""
+        return self.sum_of(self.wrench_terms())
+
+    def sum_of(self, terms: Sequence[tuple[str, str]]) -> list[str]:
+        """Sum of terms with their kinds, without components that are zero by construction."""
         sums = []
-        for component, attribute in enumerate(("fx", "fy", "fz", "mx", "my", "mz")):
+        for component, attribute in enumerate(Wrench._fields):
             is_force = component < 3
             parts = []
-            for name, kind in self.wrench_terms():
+            for name, kind in terms:
                 if kind == "wrench":
                     parts.append(f"{name}.{attribute}")
                 elif (kind == "force") == is_force and name[:3] != ACROSS.get(component):
@@ -347,17 +403,36 @@ class Emitter:
             sums.append(" + ".join(parts))
         return [f"total = Wrench({', '.join(sums)})"]
 
-    def accelerations(self) -> list[str]:
-        """Newton-Euler: the mass matrix solved for the total wrench."""
-        solver = "solve_full" if self.has("inertia") else "solve_rigid"
+    def accelerations(self, rigid: bool = False) -> list[str]:
+        """Newton-Euler: the mass matrix solved for the total wrench.
+
+        Args:
+            rigid: leave out what effects do to the mass matrix.
+        """
+        changed = [] if rigid else self.apply("inertia", "inertia", "tail, fish")
         return [
             "inertia = rigid_inertia(centre)",
-            *self.apply("inertia", "inertia", "tail, fish"),
-            f"acceleration = {solver}(inertia, total)",
+            *changed,
+            f"acceleration = {'solve_full' if changed else 'solve_rigid'}(inertia, total)",
         ]
 
     def rates(self) -> list[str]:
         """Store the derivative of every state."""
+        lines = self.own_rates()
+        for effect in self.effects:
+            lines += self.slopes(effect)
+        return lines
+
+    def slopes(self, effect: Effect) -> list[str]:
+        """Store the derivatives of an effect's states."""
+        rows = zip(effect.state_names, self.rows_of(effect), strict=False)
+        return [
+            f"work[(DX + {row}) * width + k] = d_{effect.name}_{i}"
+            for i, (_, row) in enumerate(rows)
+        ]
+
+    def own_rates(self) -> list[str]:
+        """Store the derivative of the state of the fish."""
         quaternion = ", ".join(f"work[(X + {i}) * width + k]" for i in range(3, 7))
         values = [
             "drift.x",
@@ -371,8 +446,6 @@ class Emitter:
             "velocity.x",
             "power",
         ]
-        for effect in self.effects:
-            values += [f"d_{effect.name}_{i}" for i in range(len(effect.state_names))]
         return [
             "drift = to_inertial(attitude, velocity)",
             f"spin = quaternion_rate({quaternion}, omega.x, omega.y, omega.z)",

@@ -30,10 +30,11 @@ _COMMON: dict[str, Any] = {"error_model": "numpy", "nogil": True}
 # Nothing calls these functions through a pointer of C.
 _ENTRY: dict[str, Any] = {**_COMMON, "no_cfunc_wrapper": True}
 _COUNTLESS: dict[str, Any] = {**_ENTRY, "_nrt": False}
-_INLINED: dict[str, Any] = {**_ENTRY, "forceinline": True, "no_cpython_wrapper": True}
+_CALLED: dict[str, Any] = {**_ENTRY, "no_cpython_wrapper": True}
+_INLINED: dict[str, Any] = {**_CALLED, "forceinline": True}
 
 
-class InlinedKernel(CPUDispatcher):
+class InnerKernel(CPUDispatcher):
     """A compiled function without the wrapper through which Python calls it.
 
     Only kernels call kernels as a rule, and their wrappers, which take named tuples apart, are a
@@ -56,10 +57,24 @@ def kernel(function: F) -> F:
     Kernels take and return floats, arrays and named tuples of floats: no random numbers, no I/O,
     no exceptions. Effects written by users carry the same decorator.
     """
-    compiled: Any = numba.njit(**_INLINED)(function)
+    return _within(function, _INLINED)
+
+
+def shared_kernel(function: F) -> F:
+    """As :func:`kernel`, for a large one that is called and not inlined.
+
+    What several places call is then compiled once for all of them. Nothing is known in it of the
+    numbers that it is called with.
+    """
+    return _within(function, _CALLED)
+
+
+def _within(function: F, options: dict[str, Any]) -> F:
+    """A function that only kernels call."""
+    compiled: Any = numba.njit(**options)(function)
     if not hasattr(compiled, "targetoptions"):  # NUMBA_DISABLE_JIT
         return function
-    return cast(F, InlinedKernel(function, targetoptions=compiled.targetoptions))
+    return cast(F, InnerKernel(function, targetoptions=compiled.targetoptions))
 
 
 def entry_point(function: F) -> F:

@@ -14,9 +14,11 @@ import numpy as np
 from fish_env.model.composed import (
     CORNERS,
     LATE_TAIL,
+    N_KEPT,
     N_MEMORY,
     N_PARAMETERS,
     N_STATES,
+    derive_lanes,
     lane_command,
     lane_corner,
     lane_derivative,
@@ -24,6 +26,7 @@ from fish_env.model.composed import (
     lane_remember,
     lane_terms,
     lane_turns,
+    memory_matters,
     step_in_parts,
 )
 from fish_env.model.history import HEARD, RECORD, assume_running, recall, remember
@@ -54,7 +57,8 @@ BEGUN = PAST_END + LATE_TAIL * len(HEARD)  # how much of its step a lane has don
 LENGTH = BEGUN + CORNERS  # corners: the length of its present part (s),
 CORNER = LENGTH + CORNERS  # when in it the tail's rate jumps (s),
 TURNS = CORNER + CORNERS  # and whether it may jump at all
-PAR = TURNS + CORNERS
+KEPT = TURNS + CORNERS  # what is on, and what effects hand on (see model.emit_blocks)
+PAR = KEPT + N_KEPT
 WORK_ROWS = PAR + N_PARAMETERS
 LARGEST = 1e4  # a state beyond this many SI units has diverged
 MOMENT = 1e-6  # s; how a tail goes on is how it is for this long
@@ -140,8 +144,7 @@ def rk4_step(work, width, elapsed, h, tables, late, history, first, count, pace)
         ahead = 0.5 * h if stage < 2 else h
         if late:
             recall(work, width, TOLD, PAST, BEGIN, fraction * h, h, history, first, count)
-        for k in range(width):
-            lane_derivative(k, width, elapsed, fraction * h, work, tables)
+        derive_lanes(width, elapsed, fraction * h, work, tables)
         if pace.shape[0] > 0:
             for i in range(N_SLOPES):
                 for k in range(width):
@@ -155,7 +158,7 @@ def rk4_step(work, width, elapsed, h, tables, late, history, first, count, pace)
             for n in range(N_SLOPES * width):
                 total = work[SUM * width + n] + work[DX * width + n]
                 work[X * width + n] = work[X0 * width + n] + (h / 6.0) * total
-    if N_MEMORY > 0:
+    if N_MEMORY > 0 and memory_matters(width, work):
         # Not over the width: a loop of known length would be unrolled instead of vectorised.
         for k in range(count):
             lane_remember(k, width, elapsed, h, work)

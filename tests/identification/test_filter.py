@@ -171,26 +171,27 @@ def test_lanes_repeat_the_filter_and_slope_with_its_likelihood():
         )
 
 
-@pytest.mark.parametrize(
-    ("parameter", "value"),
-    [
-        (EffectParameterId("servo_lag", "time_constant"), 0.05),
-        (EffectParameterId("current", "north"), 0.1),
-    ],
-)
-def test_effects_left_out_of_a_kernel_would_change_no_bit(parameter, value):
+def test_effects_that_are_off_change_no_bit():
+    """Whichever kernel computes them, and whatever other lanes of a block have on."""
     setup = Setup()
     problem = problem_of(setup)
-    own = {**problem.neutral([parameter.effect]), parameter: value}
-    all_of_them = {**own, **problem.neutral(["added_mass"])}
-    assert problem.batch_key(effects_of(own)) < problem.batch_key(effects_of(all_of_them))
+    names = ("servo_lag", "current", "added_mass", "servo_backlash", "wake_memory")
+    off = problem.neutral(names)
+    assert problem.batch_key(effects_of({})) < problem.batch_key(effects_of(off))
     alone, among = (
-        problem.filtered(Point(problem.start.z, effects), setup.noise)
-        for effects in (own, all_of_them)
+        problem.filtered(Point(problem.start.z, effects), setup.noise) for effects in ({}, off)
     )
     for a, b in zip(alone, among, strict=True):
         np.testing.assert_array_equal(a.innovations, b.innovations)
         np.testing.assert_array_equal(a.gains, b.gains)
+    lanes = {id: np.full(3, value) for id, value in off.items()}
+    lanes[EffectParameterId("servo_lag", "time_constant")][1] = 0.05
+    lanes[EffectParameterId("servo_backlash", "gap")][2] = 0.05
+    z = np.repeat(problem.start.z[:, None], 3, axis=1)
+    plain = problem.innovations(z, {}, setup.noise, alone)
+    beside = problem.innovations(z, lanes, setup.noise, alone)
+    np.testing.assert_array_equal(beside[0], plain[0])
+    assert np.all(np.any(beside[1:] != plain[1:], axis=1))
 
 
 def test_products_of_tall_matrices_do_not_depend_on_how_many_blocks_are_held():

@@ -15,8 +15,9 @@ import numpy as np
 
 from fish_env.model.composition import BASE_TERMS, Composition
 from fish_env.model.effect import Effect
-from fish_env.model.emit import PHASE, POWER
+from fish_env.model.emit import POWER
 from fish_env.model.emit_corners import CornerEmitter
+from fish_env.model.emit_reading import PHASE
 from fish_env.model.records import Barycentre, Inputs, Tail, Vector, Wrench
 
 KEPT: dict[str, type | None] = {

@@ -175,7 +175,7 @@ def test_effects_that_are_off_change_no_bit():
     """Whichever kernel computes them, and whatever other lanes of a block have on."""
     setup = Setup()
     problem = problem_of(setup)
-    names = ("servo_lag", "current", "added_mass", "servo_backlash", "wake_memory")
+    names = ("servo_lag", "current", "added_mass", "tail_bias", "wake_memory")  # without corners
     off = problem.neutral(names)
     assert problem.batch_key(effects_of({})) < problem.batch_key(effects_of(off))
     alone, among = (
@@ -186,7 +186,7 @@ def test_effects_that_are_off_change_no_bit():
         np.testing.assert_array_equal(a.gains, b.gains)
     lanes = {id: np.full(3, value) for id, value in off.items()}
     lanes[EffectParameterId("servo_lag", "time_constant")][1] = 0.05
-    lanes[EffectParameterId("servo_backlash", "gap")][2] = 0.05
+    lanes[EffectParameterId("current", "north")][2] = 0.1
     z = np.repeat(problem.start.z[:, None], 3, axis=1)
     plain = problem.innovations(z, {}, setup.noise, alone)
     beside = problem.innovations(z, lanes, setup.noise, alone)

@@ -99,6 +99,35 @@ class LearningRate:
 
 
 @dataclass(frozen=True)
+class Teaching:
+    """A teacher that sees the true state and learns by PPO, before the policy (engine ``tensor``).
+
+    Attributes:
+        steps: control steps in which the teacher learns, of ``total_steps``; 0: none.
+        distil_steps: control steps after them in which the policy is fitted to the teacher.
+        layers: widths of the teacher's hidden layers.
+        log_std_init: logarithm of its first standard deviation of actions.
+        learning_rate: of its PPO.
+        distil_rate: of the fit.
+        distil_epochs: passes of the fit through each rollout.
+    """
+
+    steps: int = 0
+    distil_steps: int = 0
+    layers: tuple[int, ...] = (64, 64)
+    log_std_init: float = -0.5
+    learning_rate: LearningRate = field(default_factory=LearningRate)
+    distil_rate: LearningRate = field(default_factory=LearningRate)
+    distil_epochs: int = 4
+
+    def __post_init__(self) -> None:
+        _check(min(self.steps, self.distil_steps) >= 0, "teacher: steps, distil_steps >= 0")
+        _check(self.distil_steps == 0 or self.steps > 0, "teacher.distil_steps: needs steps")
+        _check(bool(self.layers) and min(self.layers) > 0, "teacher.layers: positive widths")
+        _check(self.distil_epochs > 0, "teacher.distil_epochs: positive")
+
+
+@dataclass(frozen=True)
 class Ppo:
     """Proximal policy optimisation, Schulman et al. 2017; names as in Stable-Baselines3."""
 
@@ -217,6 +246,7 @@ class TrainConfig:
         history: past observations that the policy sees.
         network: see :class:`NetworkSettings`.
         critic: see :class:`Critic`.
+        teacher: see :class:`Teaching`.
         ppo: see :class:`Ppo`.
         sac: see :class:`Sac`.
         imitate: see :class:`Imitation`.
@@ -242,6 +272,7 @@ class TrainConfig:
     history: History = field(default_factory=History)
     network: NetworkSettings = field(default_factory=NetworkSettings)
     critic: Critic = field(default_factory=Critic)
+    teacher: Teaching = field(default_factory=Teaching)
     ppo: Ppo = field(default_factory=Ppo)
     sac: Sac = field(default_factory=Sac)
     imitate: Imitation = field(default_factory=Imitation)
@@ -266,6 +297,7 @@ class TrainConfig:
             self._check_tensor()
         else:
             _check(self.critic == Critic(), f"critic: engine {self.engine} has none of its own")
+            _check(self.teacher == Teaching(), f"teacher: engine {self.engine} has none")
         _check(0 <= self.seed < 1_000_000, "seed: 0 to 999999")
         _check(1 <= self.num_envs <= MOST_FISH, f"num_envs: 1 to {MOST_FISH}")
         _check(min(self.total_steps, self.checkpoint_every) > 0, "steps must be positive")
@@ -317,6 +349,9 @@ class TrainConfig:
         _check(self.algorithm == "ppo", "algorithm: " + without.format("choose ppo"))
         _check(not self.ppo.use_sde, "ppo.use_sde: " + without.format("remove it"))
         _check(not self.imitate.rounds, "imitate: " + without.format("remove it"))
+        taught = self.teacher.steps + self.teacher.distil_steps
+        _check(taught <= self.total_steps, "teacher: steps and distil_steps within total_steps")
+        _check(not taught or self.critic.privileged, "teacher: needs critic.privileged: true")
 
     def history_spec(self, period_s: float) -> HistorySpec:
         """Returns the past observations that the policy sees, for a control period (s)."""
@@ -328,7 +363,7 @@ class TrainConfig:
         if self.engine == DEFAULT_ENGINE:
             left_out.append("engine")  # configurations of before there was a choice stay the same
         if self.engine != "tensor":
-            left_out.append("critic")
+            left_out += ["critic", "teacher"]
         tree = {key: value for key, value in asdict(self).items() if key not in left_out}
         return dict(yaml.safe_load(yaml.safe_dump(_plain(tree))))
 

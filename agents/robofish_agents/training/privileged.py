@@ -28,6 +28,9 @@ FLOW_SCALE = 0.02
 class Sight:
     """Privileged observations of several batches side by side.
 
+    The true state, the goals as far as they can be foreseen, the flow, the parameters, and then
+    the goals as they will be.
+
     Args:
         batches: the fish; each batch may draw other parameters.
     """
@@ -37,8 +40,11 @@ class Sight:
         drawn = [path for batch in self._batches for path in batch.drawn]
         self.paths = tuple(dict.fromkeys(drawn))
         """Parameters that any of the batches draws."""
-        self.width = len(OBSERVATION) + 2 * len(AHEAD_S) + len(FLOW) + len(self.paths)
+        known = len(OBSERVATION) + 2 * len(AHEAD_S) + len(FLOW) + len(self.paths)
+        self.width = known + 2 * len(AHEAD_S)
         """Numbers of a privileged observation."""
+        self.present = known
+        """The first of them know nothing of steps and ramps to come: what a teacher may see."""
 
     def see(self, observations: FloatArray) -> np.ndarray:
         """Returns privileged observations (N, m), float32.
@@ -53,7 +59,30 @@ class Sight:
     def _of(self, observations: FloatArray, batch: FishBatch) -> FloatArray:
         true = true_observations(observations, batch)
         own = np.reshape([drawn(batch, path) for path in self.paths], (-1, batch.count))
-        return np.concatenate([true.T, *future(batch), flow(batch), own]).T
+        now = (true.T, *foreseeable(batch), flow(batch), own)
+        return np.concatenate([*now, *future(batch)]).T
+
+
+def foreseeable(batch: FishBatch) -> list[FloatArray]:
+    """As :func:`future`, if no step and no ramp begins or ends: what the past of a goal tells."""
+    goal, now = batch.goal, batch.time
+    changes = []
+    for name in ("depth", "heading"):
+        given = {field: goal[GOAL.index(f"{name}_{field}")] for field in REFERENCE}
+        ramping = (now >= given["ramp_start"]) & (now < given["ramp_end"])
+        rate = np.where(ramping, given["ramp_rate"], 0.0)
+        omega = 2.0 * np.pi * given["sine_frequency"]
+        rows = [
+            rate * ahead
+            + given["sine_amplitude"]
+            * (
+                np.sin(omega * (now + ahead) + given["sine_phase"])
+                - np.sin(omega * now + given["sine_phase"])
+            )
+            for ahead in AHEAD_S
+        ]
+        changes.append(np.stack(rows) / SCALE[name])
+    return changes
 
 
 def future(batch: FishBatch) -> list[FloatArray]:

@@ -1,13 +1,19 @@
 """Training with PPO over tensors: a lean loop of PyTorch over the native batch.
 
-The fish, their history and their normalisation are those of the other engines. The critic may see
-the true state (:mod:`robofish_agents.training.privileged`). Episodes of different fish begin at
-different times, so that every rollout has all parts of an episode.
+The fish, their history and their normalisation are those of the other engines. Episodes of
+different fish begin at different times, so that every rollout has all parts of an episode. The
+critic may see the true state (:mod:`robofish_agents.training.privileged`).
+
+With ``teacher`` a training has three phases. First a policy that sees the true state learns by PPO:
+the teacher, which nobody made by hand. Then the policy proper swims, and is fitted to what the
+teacher would have done (Lee et al., "Learning quadrupedal locomotion over challenging terrain",
+Science Robotics 5, 2020). At last it goes on by PPO with the critic of the teacher.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +29,7 @@ from fish_env.envs.registration import ENV_ID
 from robofish_agents.policies.files import ACTIONS, PolicyFile
 from robofish_agents.policies.network import Network
 from robofish_agents.training.books import Books
-from robofish_agents.training.config import TrainConfig
+from robofish_agents.training.config import LearningRate, TrainConfig
 from robofish_agents.training.learner_state import (
     optimiser_state,
     random_state,
@@ -39,6 +45,7 @@ from robofish_agents.training.tensor_ppo import (
     Recipe,
     Samples,
     Taken,
+    follow,
     generalised,
     improve,
 )
@@ -50,7 +57,7 @@ LIMIT = 10.0
 
 
 def recipe_of(config: TrainConfig) -> Recipe:
-    """The settings of a configuration as a recipe of PPO over tensors."""
+    """The settings of the policy's PPO as a recipe over tensors."""
     ppo, network = config.ppo, config.network
     return Recipe(
         steps=ppo.n_steps,
@@ -70,6 +77,17 @@ def recipe_of(config: TrainConfig) -> Recipe:
     )
 
 
+def teacher_recipe(config: TrainConfig) -> Recipe:
+    """The same with what differs for the teacher."""
+    teacher = config.teacher
+    return replace(
+        recipe_of(config),
+        layers=teacher.layers,
+        log_std=teacher.log_std_init,
+        learning_rate=teacher.learning_rate.start,
+    )
+
+
 class TensorEngine:
     """A learner in plain PyTorch, see :class:`robofish_agents.training.engines.Engine`.
 
@@ -80,23 +98,27 @@ class TensorEngine:
 
     def __init__(self, config: TrainConfig, stack: Stack) -> None:
         self.config, self.stack = config, stack
-        self.recipe = recipe_of(config)
-        self._sight = self._sight_of(stack) if config.critic.privileged else None
-        self._known = RunningMeanStd(shape=(self._sight.width if self._sight else 0,))
+        self.recipe, self.lessons = recipe_of(config), teacher_recipe(config)
+        self._sight: Sight | None = None
+        if config.critic.privileged:
+            self._sight = Sight([part.env.batch for part in stack.fish.parts])
+        judged = self._sight.width if self._sight else None
+        self._known = RunningMeanStd(shape=(judged or 0,))
         set_random_seed(config.seed)
         (seen,) = stack.outside.observation_space.shape or (0,)
-        judged = self._sight.width if self._sight else None
         self.learner = ActorCritic(seen, ACTIONS, self.recipe, judged)
+        self.optimiser = _adam(self.learner)
+        self.teacher: ActorCritic | None = None
+        if self._sight and config.teacher.steps:
+            self.teacher = ActorCritic(self._sight.present, ACTIONS, self.lessons, judged)
+            self.teacher_optimiser = _adam(self.teacher)
         if config.network.first_action:
-            self.learner.mean[-1].bias.data = torch.tensor(config.network.first_action)
-        rate = config.ppo.learning_rate.start
-        self.optimiser = torch.optim.Adam(self.learner.parameters(), rate, eps=1e-5)
+            first = self.teacher or self.learner
+            first.mean[-1].bias.data = torch.tensor(config.network.first_action)
         self._latest: np.ndarray | None = None
         self._log: logger.Logger | None = None
-
-    @staticmethod
-    def _sight_of(stack: Stack) -> Sight:
-        return Sight([part.env.batch for part in stack.fish.parts])
+        self._succeeded: list[float] = []
+        self._raw: list[np.ndarray] = []
 
     def imitate(self) -> None:
         """Refused by the configuration."""
@@ -110,20 +132,56 @@ class TensorEngine:
     def learn(self, books: Books) -> None:
         """Learns from the books' steps to those of the configuration."""
         config, steps = self.config, books.progress.steps
+        lessons = config.teacher.steps
+        fitted = lessons + config.teacher.distil_steps
+        rollout = config.ppo.n_steps * config.num_envs
         if self._latest is None:
             self._latest = np.asarray(self.stack.outside.reset())
             self._stagger()
         while steps < config.total_steps:
-            books.before_rollout(steps)
-            taken, samples = self._collect(books, steps)
-            books.after_rollout()
-            steps += config.ppo.n_steps * config.num_envs
-            self._set_rate(steps / config.total_steps)
-            moved = improve(
-                self.learner, self.optimiser, samples, self.recipe, config.ppo.target_kl
-            )
-            self._report(steps, taken, samples, moved)
+            books.before_rollout(steps, ready=steps > lessons or not self.teacher)
+            done = steps + rollout
+            if steps < lessons:
+                row = self._teach(books, steps, done / lessons)
+            elif steps < fitted:
+                row = self._distil(books, steps, (done - lessons) / (fitted - lessons))
+                if done >= fitted and self.teacher:
+                    self.learner.value.load_state_dict(self.teacher.value.state_dict())
+            else:
+                row = self._practise(
+                    books, steps, (done - fitted) / max(config.total_steps - fitted, 1)
+                )
+            steps = done
+            self._report(steps, row)
         books.end(steps)
+
+    def _teach(self, books: Books, steps: int, share: float) -> dict[str, float]:
+        """Improves the teacher by a rollout of its own."""
+        assert self.teacher
+        taken, samples = self._collect(books, steps, self.teacher, privileged=True)
+        rate = _set_rate(self.teacher_optimiser, self.config.teacher.learning_rate, share)
+        kl = self.config.ppo.target_kl
+        moved = improve(self.teacher, self.teacher_optimiser, samples, self.lessons, kl)
+        return _row(self.teacher, taken, samples) | {"approx_kl": moved, "learning_rate": rate}
+
+    def _distil(self, books: Books, steps: int, share: float) -> dict[str, float]:
+        """Lets the policy swim, and fits it to what the teacher would have done."""
+        assert self.teacher and self._sight
+        taken, samples = self._collect(books, steps, self.learner, privileged=False)
+        with torch.no_grad():
+            wanted = self.teacher.mean(samples.judged[..., : self._sight.present])
+        rate = _set_rate(self.optimiser, self.config.teacher.distil_rate, share)
+        epochs = self.config.teacher.distil_epochs
+        error = follow(self.learner, self.optimiser, samples.observed, wanted, self.recipe, epochs)
+        return _row(self.learner, taken, samples) | {"distance": error, "learning_rate": rate}
+
+    def _practise(self, books: Books, steps: int, share: float) -> dict[str, float]:
+        """Improves the policy by a rollout of its own."""
+        taken, samples = self._collect(books, steps, self.learner, privileged=False)
+        rate = _set_rate(self.optimiser, self.config.ppo.learning_rate, share)
+        kl = self.config.ppo.target_kl
+        moved = improve(self.learner, self.optimiser, samples, self.recipe, kl)
+        return _row(self.learner, taken, samples) | {"approx_kl": moved, "learning_rate": rate}
 
     def _stagger(self) -> None:
         """Lets the fish begin their later episodes in turn."""
@@ -132,71 +190,70 @@ class TensorEngine:
             group = np.arange(env.num_envs) * GROUPS // env.num_envs
             env.set_elapsed(group * (env.max_episode_steps // GROUPS))
 
-    def _set_rate(self, done: float) -> None:
-        rate = self.config.ppo.learning_rate
-        end = rate.start if rate.end is None else rate.end
-        for group in self.optimiser.param_groups:
-            group["lr"] = rate.start + (end - rate.start) * min(done, 1.0)
+    def _collect(
+        self, books: Books, steps: int, actor: ActorCritic, privileged: bool
+    ) -> tuple[Taken, Samples]:
+        """Takes the steps of a rollout.
 
-    def _collect(self, books: Books, steps: int) -> tuple[Taken, Samples]:
-        """Takes the steps of a rollout; returns its rewards and ends, and samples for an update."""
+        Args:
+            books: told of every step.
+            steps: control steps before.
+            actor: what acts.
+            privileged: whether it sees what the teacher sees; otherwise what the policy sees.
+
+        Returns:
+            Rewards and ends, and samples for an update.
+        """
         count, outside = self.config.num_envs, self.stack.outside
-        rows: list[tuple[Tensor, Tensor, Tensor]] = []
-        known: list[np.ndarray] = []
-        ends: list[tuple[Tensor, Tensor, Tensor]] = []
-        assert self._latest is not None
+        rows: list[tuple[Tensor, ...]] = []
+        ends: list[tuple[Tensor, ...]] = []
         with torch.no_grad():
+            seen, judged = self._look()
             for step in range(self.recipe.steps):
-                seen = torch.from_numpy(self._latest)
-                if self._sight:
-                    known.append(self._sight.see(self._present()))
-                action, density = self.learner.act(seen)
-                rows.append((seen, action, density))
-                limited = action.clamp(-1.0, 1.0).numpy()
-                self._latest, reward, done, infos = outside.step(limited)
-                ends.append(_ends(reward, done, infos))
+                basis = judged[:, : self._present] if privileged else seen
+                action, density = actor.act(basis)
+                rows.append((basis, judged, action, density))
+                self._latest, *rest = outside.step(action.clamp(-1.0, 1.0).numpy())
+                ends.append(_ends(*rest))
+                self._succeeded += [info["is_success"] for info in rest[2] if "episode" in info]
                 books.stepped(steps + (step + 1) * count)
-            if self._sight:
-                known.append(self._sight.see(self._present()))
-            seen, action, density = (torch.stack(column) for column in zip(*rows, strict=True))
-            behind = torch.from_numpy(self._latest)[None]
-            judged = self._judged(known) if self._sight else torch.cat([seen, behind])
-            value = self.learner.value(judged).squeeze(-1)
-            taken = Taken(*(torch.stack(column) for column in zip(*ends, strict=True)))
+                seen, judged = self._look()
+            books.after_rollout()
+            basis, known, action, density = (torch.stack(column) for column in zip(*rows))
+            value = actor.value(torch.cat([known, judged[None]])).squeeze(-1)
+            taken = Taken(*(torch.stack(column) for column in zip(*ends)))
             # The value before a truncation stands for that behind it, where an episode has begun.
             advantage, returns = generalised(taken, value, value[:-1], self.recipe)
-        return taken, Samples(seen, judged[:-1], action, density, advantage, returns)
-
-    def _present(self) -> np.ndarray:
-        """The newest observations (N, 33) of the environment, not normalised."""
-        return self.stack.outside.get_original_obs()[:, : len(OBSERVATION)]
-
-    def _judged(self, known: list[np.ndarray]) -> Tensor:
-        """Normalises what the critic knows, (steps + 1, N, m)."""
-        rows = np.stack(known)
-        self._known.update(rows.reshape(-1, rows.shape[-1]))
-        normal = (rows - self._known.mean) / np.sqrt(self._known.var + 1e-8)
-        return torch.from_numpy(np.clip(normal, -LIMIT, LIMIT).astype(np.float32))
-
-    def _report(self, steps: int, taken: Taken, samples: Samples, moved: float) -> None:
-        if self._log is None:
-            return
-        spread = samples.returns.var()
-        unexplained = (samples.advantage).var() / (spread + 1e-8)
-        row = {
-            "rollout/reward": float(self._raw_reward),
-            "train/explained_variance": float(1.0 - unexplained),
-            "train/approx_kl": moved,
-            "train/std": float(self.learner.log_std.exp().mean()),
-            "train/learning_rate": self.optimiser.param_groups[0]["lr"],
-        }
-        for name, value in row.items():
-            self._log.record(name, value)
-        self._log.dump(steps)
+        if self._sight:
+            self._known.update(np.concatenate(self._raw))
+            self._raw = []
+        return taken, Samples(basis, known, action, density, advantage, returns)
 
     @property
-    def _raw_reward(self) -> float:
-        return float(np.mean(self.stack.outside.get_original_reward()))
+    def _present(self) -> int:
+        return self._sight.present if self._sight else 0
+
+    def _look(self) -> tuple[Tensor, Tensor]:
+        """What the policy and what the critic see now, normalised."""
+        assert self._latest is not None
+        seen = torch.from_numpy(self._latest)
+        if not self._sight:
+            return seen, seen
+        known = self._sight.see(self.stack.outside.get_original_obs()[:, : len(OBSERVATION)])
+        self._raw.append(known)
+        normal = (known - self._known.mean) / np.sqrt(self._known.var + 1e-8)
+        return seen, torch.from_numpy(np.clip(normal, -LIMIT, LIMIT).astype(np.float32))
+
+    def _report(self, steps: int, row: Mapping[str, float]) -> None:
+        succeeded, self._succeeded = self._succeeded, []
+        if self._log is None:
+            return
+        for name, value in row.items():
+            self._log.record(f"train/{name}", value)
+        if succeeded:
+            self._log.record("rollout/success_rate", float(np.mean(succeeded)))
+        self._log.record("rollout/reward", float(np.mean(self.stack.outside.get_original_reward())))
+        self._log.dump(steps)
 
     def policy(self, about: Mapping[str, Any]) -> PolicyFile:
         """Returns the present deterministic policy, with a card."""
@@ -218,8 +275,8 @@ class TensorEngine:
         """Returns plain values from which a later process continues with the same bits."""
         known = self._known
         return {
-            "weights": weights_state(self.learner.state_dict()),
-            "optimiser": optimiser_state(self.optimiser),
+            "weights": [weights_state(learner.state_dict()) for learner, _ in self._pairs()],
+            "optimisers": [optimiser_state(optimiser) for _, optimiser in self._pairs()],
             "latest": self._latest,
             "known": [known.mean, known.var, float(known.count)],
             "random": random_state(),
@@ -227,11 +284,17 @@ class TensorEngine:
 
     def restore(self, state: dict[str, Any]) -> None:
         """Restores a state; the state of the fish is restored before."""
-        self.learner.load_state_dict(weights_tensors(state["weights"]))
-        restore_optimiser(self.optimiser, state["optimiser"])
+        saved = zip(state["weights"], state["optimisers"], strict=True)
+        for (learner, optimiser), (weights, moments) in zip(self._pairs(), saved, strict=True):
+            learner.load_state_dict(weights_tensors(weights))
+            restore_optimiser(optimiser, moments)
         self._latest = state["latest"]
         self._known.mean, self._known.var, self._known.count = state["known"]
         restore_random(state["random"])
+
+    def _pairs(self) -> list[tuple[ActorCritic, torch.optim.Adam]]:
+        pairs = [(self.learner, self.optimiser)]
+        return pairs + [(self.teacher, self.teacher_optimiser)] if self.teacher else pairs
 
     def close(self) -> None:
         """Closes the log, which has a thread."""
@@ -239,7 +302,32 @@ class TensorEngine:
             self._log.close()
 
 
-def _ends(reward: np.ndarray, done: np.ndarray, infos: list[dict[str, Any]]) -> tuple[Tensor, ...]:
+def _adam(learner: ActorCritic) -> torch.optim.Adam:
+    return torch.optim.Adam(learner.parameters(), eps=1e-5)
+
+
+def _set_rate(optimiser: torch.optim.Optimizer, rate: LearningRate, share: float) -> float:
+    """Sets the step size after a share of a phase, and returns it."""
+    end = rate.start if rate.end is None else rate.end
+    now = rate.start + (end - rate.start) * min(share, 1.0)
+    for group in optimiser.param_groups:
+        group["lr"] = now
+    return now
+
+
+def _row(learner: ActorCritic, taken: Taken, samples: Samples) -> dict[str, float]:
+    """What is logged of a rollout."""
+    unexplained = samples.advantage.var() / (samples.returns.var() + 1e-8)
+    return {
+        "normalised_reward": float(taken.reward.mean()),
+        "explained_variance": 1.0 - float(unexplained),
+        "std": float(learner.log_std.detach().exp().mean()),
+    }
+
+
+def _ends(
+    reward: np.ndarray, done: np.ndarray, infos: Sequence[Mapping[str, Any]]
+) -> tuple[Tensor, ...]:
     """Rewards (N,) of a step, and whether episodes were terminated or truncated (1.0)."""
     truncated = np.zeros(len(done), np.float32)
     for lane in np.flatnonzero(done).tolist():

@@ -307,6 +307,41 @@ def improve(
     return moved
 
 
+def follow(
+    policy: ActorCritic,
+    optimiser: torch.optim.Optimizer,
+    observed: Tensor,
+    wanted: Tensor,
+    recipe: Recipe,
+    epochs: int,
+) -> float:
+    """Fit the mean actions of a policy to those of a teacher by least squares.
+
+    Args:
+        policy: changed.
+        optimiser: of its parameters.
+        observed: (steps, N, ...) what it saw.
+        wanted: (steps, N, actions) what the teacher would have done; clipped to [-1, 1].
+        recipe: minibatches and longest gradient.
+        epochs: passes.
+
+    Returns:
+        Mean squared distance of the last minibatch.
+    """
+    seen, targets = observed.flatten(0, 1), wanted.clamp(-1.0, 1.0).flatten(0, 1)
+    size, distance = len(seen) // recipe.minibatches, torch.zeros(())
+    for _ in range(epochs):
+        order = torch.randperm(len(seen), device=seen.device)
+        for first in range(0, size * recipe.minibatches, size):
+            chosen = order[first : first + size]
+            distance = nn.functional.mse_loss(policy.mean(seen[chosen]), targets[chosen])
+            optimiser.zero_grad(set_to_none=True)
+            torch.autograd.backward(distance)
+            nn.utils.clip_grad_norm_(policy.parameters(), recipe.largest_gradient)
+            optimiser.step()
+    return float(distance.detach())
+
+
 def train(env: Any, recipe: Recipe, seed: int) -> Trained:
     """Train a policy.
 

@@ -235,7 +235,7 @@ class FishBatch:
 
     @property
     def goal(self) -> FloatArray:
-        """(len(GOAL), N) goals of the present episodes (a view), see :mod:`fish_env.envs.layout`."""
+        """(len(GOAL), N) goals of the present episodes (a view), see ``layout.GOAL``."""
         return self._data[self._rows.ROW_GOAL : self._rows.ROW_GOAL + len(GOAL)]
 
     @property

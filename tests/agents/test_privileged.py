@@ -5,7 +5,15 @@ import pytest
 
 from fish_env.envs.layout import OBSERVATION, OUTPUTS
 from fish_env.envs.vector import RoboticFish3DVectorEnv
-from robofish_agents.training.privileged import AHEAD_S, SCALE, Sight, drawn, flow, future, reference
+from robofish_agents.training.privileged import (
+    AHEAD_S,
+    SCALE,
+    Sight,
+    drawn,
+    flow,
+    future,
+    reference,
+)
 
 COUNT = 24
 WATER = {
@@ -93,4 +101,4 @@ def test_the_true_depth_is_seen_in_place_of_the_noisy_one(randomised):
     true = output(randomised, "depth_error") / 0.3
     np.testing.assert_allclose(seen[:, 0], true, atol=1e-5)
     assert np.abs(batch.obs[:, 0] - true).max() > 0.05
-    assert [name for name, _ in OBSERVATION][0].startswith("depth error")
+    assert OBSERVATION[0][0].startswith("depth error")

@@ -1,4 +1,4 @@
-"""The engine of PPO over tensors: resumes to the bit, exports what it learnt, learns with a critic."""
+"""The engine of PPO over tensors: resumes to the bit, exports what it learnt, uses its critic."""
 
 from dataclasses import replace
 
@@ -169,7 +169,9 @@ def test_ends_tell_failures_from_time_limits():
 
 def test_a_truncated_episode_counts_as_going_on():
     """By the value before its end; a failed one is worth nothing afterwards."""
-    taken = Taken(torch.ones(1, 3), torch.tensor([[0.0, 1.0, 0.0]]), torch.tensor([[0.0, 0.0, 1.0]]))
+    taken = Taken(
+        torch.ones(1, 3), torch.tensor([[0.0, 1.0, 0.0]]), torch.tensor([[0.0, 0.0, 1.0]])
+    )
     value = torch.tensor([[2.0, 2.0, 2.0], [5.0, 5.0, 5.0]])
     recipe = engine(TENSOR).recipe
     advantage, _ = generalised(taken, value, value[:-1], recipe)

@@ -166,7 +166,8 @@ class TensorEngine:
 
     def _distil(self, books: Books, steps: int, share: float) -> dict[str, float]:
         """Lets the policy swim, and fits it to what the teacher would have done."""
-        assert self.teacher and self._sight
+        assert self.teacher
+        assert self._sight
         taken, samples = self._collect(books, steps, self.learner, privileged=False)
         with torch.no_grad():
             wanted = self.teacher.mean(samples.judged[..., : self._sight.present])
@@ -219,9 +220,11 @@ class TensorEngine:
                 books.stepped(steps + (step + 1) * count)
                 seen, judged = self._look()
             books.after_rollout()
-            basis, known, action, density = (torch.stack(column) for column in zip(*rows))
+            basis, known, action, density = (
+                torch.stack(column) for column in zip(*rows, strict=True)
+            )
             value = actor.value(torch.cat([known, judged[None]])).squeeze(-1)
-            taken = Taken(*(torch.stack(column) for column in zip(*ends)))
+            taken = Taken(*(torch.stack(column) for column in zip(*ends, strict=True)))
             # The value before a truncation stands for that behind it, where an episode has begun.
             advantage, returns = generalised(taken, value, value[:-1], self.recipe)
         if self._sight:
@@ -294,7 +297,7 @@ class TensorEngine:
 
     def _pairs(self) -> list[tuple[ActorCritic, torch.optim.Adam]]:
         pairs = [(self.learner, self.optimiser)]
-        return pairs + [(self.teacher, self.teacher_optimiser)] if self.teacher else pairs
+        return [*pairs, (self.teacher, self.teacher_optimiser)] if self.teacher else pairs
 
     def close(self) -> None:
         """Closes the log, which has a thread."""

@@ -18,7 +18,6 @@ from typing import Any, NamedTuple
 import torch
 from torch import Tensor, nn
 
-
 ACTIVATION: dict[str, type[nn.Module]] = {"tanh": nn.Tanh, "relu": nn.ReLU}
 
 
@@ -152,7 +151,7 @@ class Taken(NamedTuple):
 class Samples(NamedTuple):
     """What an update learns from, (steps, N, ...) or (samples, ...) each.
 
-    ``judged`` is what the critic sees; ``log_probability`` that of the actions when they were taken.
+    ``judged`` is what the critic sees; ``log_probability`` that of the actions when taken.
     """
 
     observed: Tensor

@@ -159,6 +159,16 @@ def test_the_rate_falls_to_its_end():
     assert rates == pytest.approx([1e-2, 5.5e-3, 1e-3, 1e-3])
 
 
+def test_the_teacher_explores_less_and_less():
+    teacher = Teaching(768, 768, (16,), log_std_init=-0.5, log_std_end=-2.5)
+    learner = engine(replace(TAUGHT, teacher=teacher))
+    learner._limit_noise(0.25)
+    assert learner.teacher.log_std.tolist() == pytest.approx([-1.0] * 5)
+    learner.teacher.log_std.data[:] = -3.0
+    learner._limit_noise(1.0)
+    assert learner.teacher.log_std.tolist() == [-3.0] * 5
+
+
 def test_ends_tell_failures_from_time_limits():
     infos = [{}, {"TimeLimit.truncated": True}, {"TimeLimit.truncated": False}]
     reward, terminated, truncated = _ends(np.ones(3), np.array([False, True, True]), infos)

@@ -107,6 +107,7 @@ class Teaching:
         distil_steps: control steps after them in which the policy is fitted to the teacher.
         layers: widths of the teacher's hidden layers.
         log_std_init: logarithm of its first standard deviation of actions.
+        log_std_end: an upper limit of that logarithm falls to it in a straight line; None: no limit.
         learning_rate: of its PPO.
         distil_rate: of the fit.
         distil_epochs: passes of the fit through each rollout.
@@ -116,6 +117,7 @@ class Teaching:
     distil_steps: int = 0
     layers: tuple[int, ...] = (64, 64)
     log_std_init: float = -0.5
+    log_std_end: float | None = None
     learning_rate: LearningRate = field(default_factory=LearningRate)
     distil_rate: LearningRate = field(default_factory=LearningRate)
     distil_epochs: int = 4
@@ -125,6 +127,8 @@ class Teaching:
         _check(self.distil_steps == 0 or self.steps > 0, "teacher.distil_steps: needs steps")
         _check(bool(self.layers) and min(self.layers) > 0, "teacher.layers: positive widths")
         _check(self.distil_epochs > 0, "teacher.distil_epochs: positive")
+        end = self.log_std_init if self.log_std_end is None else self.log_std_end
+        _check(end <= self.log_std_init, "teacher.log_std_end: at most log_std_init")
 
 
 @dataclass(frozen=True)

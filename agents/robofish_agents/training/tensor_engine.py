@@ -162,7 +162,16 @@ class TensorEngine:
         rate = _set_rate(self.teacher_optimiser, self.config.teacher.learning_rate, share)
         kl = self.config.ppo.target_kl
         moved = improve(self.teacher, self.teacher_optimiser, samples, self.lessons, kl)
+        self._limit_noise(share)
         return _row(self.teacher, taken, samples) | {"approx_kl": moved, "learning_rate": rate}
+
+    def _limit_noise(self, share: float) -> None:
+        """Lets the teacher explore less, the more of its lessons are over."""
+        settings = self.config.teacher
+        if self.teacher and settings.log_std_end is not None:
+            first, last = settings.log_std_init, settings.log_std_end
+            with torch.no_grad():
+                self.teacher.log_std.clamp_(max=first + (last - first) * min(share, 1.0))
 
     def _distil(self, books: Books, steps: int, share: float) -> dict[str, float]:
         """Lets the policy swim, and fits it to what the teacher would have done."""

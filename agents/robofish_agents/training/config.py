@@ -107,7 +107,7 @@ class Teaching:
         distil_steps: control steps after them in which the policy is fitted to the teacher.
         layers: widths of the teacher's hidden layers.
         log_std_init: logarithm of its first standard deviation of actions.
-        log_std_end: an upper limit of that logarithm falls to it in a straight line; None: no limit.
+        log_std_end: an upper limit of that logarithm falls to it in a straight line; None: none.
         learning_rate: of its PPO.
         distil_rate: of the fit.
         distil_epochs: passes of the fit through each rollout.

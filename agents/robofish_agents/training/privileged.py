@@ -90,10 +90,12 @@ def future(batch: FishBatch) -> list[FloatArray]:
     goal = batch.goal
     return [
         np.stack(
-            [reference(goal, name, batch.time + ahead) for ahead in AHEAD_S]
-            - reference(goal, name, batch.time)
+            [
+                (reference(goal, name, batch.time + ahead) - reference(goal, name, batch.time))
+                / SCALE[name]
+                for ahead in AHEAD_S
+            ]
         )
-        / SCALE[name]
         for name in ("depth", "heading")
     ]
 

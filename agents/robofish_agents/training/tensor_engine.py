@@ -214,7 +214,7 @@ class TensorEngine:
         Returns:
             Rewards and ends, and samples for an update.
         """
-        count, outside = self.config.num_envs, self.stack.outside
+        count, outside = self.config.num_envs, self._outside
         rows: list[tuple[Tensor, ...]] = []
         ends: list[tuple[Tensor, ...]] = []
         with torch.no_grad():
@@ -242,6 +242,11 @@ class TensorEngine:
         return taken, Samples(basis, known, action, density, advantage, returns)
 
     @property
+    def _outside(self) -> Any:
+        """The outermost wrapper of the fish."""
+        return self.stack.outside
+
+    @property
     def _present(self) -> int:
         return self._sight.present if self._sight else 0
 
@@ -251,7 +256,7 @@ class TensorEngine:
         seen = torch.from_numpy(self._latest)
         if not self._sight:
             return seen, seen
-        known = self._sight.see(self.stack.outside.get_original_obs()[:, : len(OBSERVATION)])
+        known = self._sight.see(self._outside.get_original_obs()[:, : len(OBSERVATION)])
         self._raw.append(known)
         normal = (known - self._known.mean) / np.sqrt(self._known.var + 1e-8)
         return seen, torch.from_numpy(np.clip(normal, -LIMIT, LIMIT).astype(np.float32))
@@ -264,12 +269,12 @@ class TensorEngine:
             self._log.record(f"train/{name}", value)
         if succeeded:
             self._log.record("rollout/success_rate", float(np.mean(succeeded)))
-        self._log.record("rollout/reward", float(np.mean(self.stack.outside.get_original_reward())))
+        self._log.record("rollout/reward", float(np.mean(self._outside.get_original_reward())))
         self._log.dump(steps)
 
     def policy(self, about: Mapping[str, Any]) -> PolicyFile:
         """Returns the present deterministic policy, with a card."""
-        outside: Any = self.stack.outside
+        outside = self._outside
         layers = [layer for layer in self.learner.mean if isinstance(layer, nn.Linear)]
         network = Network(
             np.array(outside.obs_rms.mean, float),

@@ -68,7 +68,7 @@ def test_every_phase_goes_on_to_the_same_bits(stop_at, taught, tmp_path):
 
 def test_a_policy_is_evaluated_once_it_is_fitted(taught, whole):
     assert whole.progress.evaluations[0]["steps"] == 768
-    assert [row["steps"] for row in taught.progress.evaluations] == [1408, 2048]
+    assert [row["steps"] for row in taught.progress.evaluations] == [1536, 2048]
 
 
 def test_the_policy_comes_near_its_teacher():

@@ -139,14 +139,14 @@ class TensorEngine:
             self._latest = np.asarray(self.stack.outside.reset())
             self._stagger()
         while steps < config.total_steps:
-            books.before_rollout(steps, ready=steps > lessons or not self.teacher)
+            books.before_rollout(steps, ready=steps >= fitted)
             done = steps + rollout
             if steps < lessons:
                 row = self._teach(books, steps, done / lessons)
             elif steps < fitted:
                 row = self._distil(books, steps, (done - lessons) / (fitted - lessons))
-                if done >= fitted and self.teacher:
-                    self.learner.value.load_state_dict(self.teacher.value.state_dict())
+                if done >= fitted:
+                    self._graduate()
             else:
                 row = self._practise(
                     books, steps, (done - fitted) / max(config.total_steps - fitted, 1)
@@ -164,6 +164,16 @@ class TensorEngine:
         moved = improve(self.teacher, self.teacher_optimiser, samples, self.lessons, kl)
         self._limit_noise(share)
         return _row(self.teacher, taken, samples) | {"approx_kl": moved, "learning_rate": rate}
+
+    def _graduate(self) -> None:
+        """Ends the lessons: the policy gets the values of the teacher, and an optimiser of its own.
+
+        The moments of Adam are those of small squared distances. With them the first steps of PPO
+        would be far too long.
+        """
+        assert self.teacher
+        self.learner.value.load_state_dict(self.teacher.value.state_dict())
+        self.optimiser = _adam(self.learner)
 
     def _limit_noise(self, share: float) -> None:
         """Lets the teacher explore less, the more of its lessons are over."""

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fish_env.envs.layout import OBSERVATION, OUTPUTS
+from fish_env.envs.layout import GOAL, OBSERVATION, OUTPUTS, REFERENCE
 from fish_env.envs.vector import RoboticFish3DVectorEnv
 from robofish_agents.training.privileged import (
     AHEAD_S,
@@ -11,6 +11,7 @@ from robofish_agents.training.privileged import (
     Sight,
     drawn,
     flow,
+    foreseeable,
     future,
     reference,
 )
@@ -56,6 +57,28 @@ def test_the_future_of_a_goal_comes(name):
     assert moved > 1000
 
 
+def test_a_teacher_foresees_sines_but_no_steps():
+    """Before a step it expects none; a sine it knows; a ramp that goes on, as long as it goes on."""
+    env = fish(60)
+    goal, ahead = env.batch.goal, AHEAD_S.index(4.0)
+    row = {name: goal[GOAL.index(f"depth_{name}")] for name in REFERENCE}
+    step, sine, ramp = (row[name] != 0.0 for name in ("step", "sine_amplitude", "ramp_rate"))
+    unexpected = foreseen = followed = 0
+    for _ in range(150):
+        env.batch.step(np.zeros((60, 5)))
+        now = env.batch.time
+        expected, comes = foreseeable(env.batch)[0][ahead], future(env.batch)[0][ahead]
+        assert not expected[step].any()
+        unexpected += np.sum(comes[step] != 0.0)
+        np.testing.assert_allclose(expected[sine], comes[sine], atol=1e-9)
+        foreseen += np.sum(comes[sine] != 0.0)
+        going = ramp & (now >= row["ramp_start"]) & (now + 4.0 < row["ramp_end"])
+        np.testing.assert_allclose(expected[going], comes[going], atol=1e-9)
+        followed += np.sum(going)
+        assert not expected[ramp & (now < row["ramp_start"])].any()
+    assert min(unexpected, foreseen, followed) > 100
+
+
 def test_the_goal_of_now_is_that_of_the_environment():
     env = fish()
     for _ in range(120):
@@ -91,8 +114,10 @@ def test_batches_that_draw_different_parameters_stand_side_by_side(randomised):
     seen = sight.see(np.concatenate([calm.batch.obs, randomised.batch.obs]))
     assert seen.shape == (4 + COUNT, sight.width)
     assert seen.dtype == np.float32
-    assert not seen[:4, -3:].any()
-    assert seen[4:, -3:].all()
+    own = seen[:, sight.present - len(sight.paths) : sight.present]
+    assert own.shape == (4 + COUNT, 3)
+    assert not own[:4].any()
+    assert own[4:].all()
 
 
 def test_the_true_depth_is_seen_in_place_of_the_noisy_one(randomised):

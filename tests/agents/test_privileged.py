@@ -58,7 +58,7 @@ def test_the_future_of_a_goal_comes(name):
 
 
 def test_a_teacher_foresees_sines_but_no_steps():
-    """Before a step it expects none; a sine it knows; a ramp that goes on, as long as it goes on."""
+    """It expects no step, knows a sine, and takes a ramp to go on."""
     env = fish(60)
     goal, ahead = env.batch.goal, AHEAD_S.index(4.0)
     row = {name: goal[GOAL.index(f"depth_{name}")] for name in REFERENCE}

@@ -14,7 +14,7 @@ import numpy as np
 from fish_env.arrays import FloatArray
 from fish_env.envs.batch import FishBatch
 from fish_env.envs.layout import GOAL, OBSERVATION, REFERENCE
-from robofish_agents.training.teacher import true_observations
+from robofish_agents.training.teacher import Float32Array, true_observations
 
 AHEAD_S = (0.5, 1.0, 2.0, 4.0)
 """Times from now (s) at which the critic knows the goals."""
@@ -46,7 +46,7 @@ class Sight:
         self.present = known
         """The first of them know nothing of steps and ramps to come: what a teacher may see."""
 
-    def see(self, observations: FloatArray) -> np.ndarray:
+    def see(self, observations: Float32Array) -> Float32Array:
         """Returns privileged observations (N, m), float32.
 
         Args:
@@ -56,7 +56,7 @@ class Sight:
         rows = zip(np.split(observations, ends), self._batches, strict=True)
         return np.concatenate([self._of(*row) for row in rows]).astype(np.float32)
 
-    def _of(self, observations: FloatArray, batch: FishBatch) -> FloatArray:
+    def _of(self, observations: Float32Array, batch: FishBatch) -> FloatArray:
         true = true_observations(observations, batch)
         own = np.reshape([drawn(batch, path) for path in self.paths], (-1, batch.count))
         now = (true.T, *foreseeable(batch), flow(batch), own)

@@ -28,6 +28,7 @@ KINDS = (
     {"forces"},
     {"inertia"},
     {"commands", "tail", "corners"},
+    {"tail", "water"},
     {"water", "forces"},
 )
 """Groups that are computed together, besides all of them: small kinds first."""

@@ -234,6 +234,11 @@ class FishBatch:
         return self._data[self._rows.ROW_INPUTS : self._rows.ROW_SLEW]
 
     @property
+    def goal(self) -> FloatArray:
+        """(len(GOAL), N) goals of the present episodes (a view), see ``layout.GOAL``."""
+        return self._data[self._rows.ROW_GOAL : self._rows.ROW_GOAL + len(GOAL)]
+
+    @property
     def records(self) -> FloatArray:
         """(parameters, N) parameter records (a view)."""
         return self._data[self._rows.ROW_PAR : self._rows.ROW_TIME]

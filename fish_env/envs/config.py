@@ -90,6 +90,7 @@ class EnvConfig:
         array[Setup.TUMBLE_COSINE] = np.cos(tree["tumble_angle"])
         names: tuple[str, ...] = ("depth", "heading", "speed", "power", "action")
         array[Setup.WEIGHT_DEPTH : Setup.WEIGHT_ACTION + 1] = [weights[n] for n in names]
+        array[Setup.WEIGHT_WITHIN] = weights["within"]
         array[Setup.MARGIN_DEPTH : Setup.MARGIN_SPEED + 1] = [margins[n] for n in names[:3]]
         array[Setup.POWER_SCALE] = tree["reward"]["power_scale"]
         limits = ("depth", "heading", "speed", "speed_floor", "time")

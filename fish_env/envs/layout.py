@@ -213,6 +213,7 @@ class Setup(IntEnum):
     STATION_GAIN = 39
     STATION_CIRCLE = 40
     STATION_CALM = 41
+    WEIGHT_WITHIN = 42
 
 
 SETUP_SIZE = len(Setup) + 8

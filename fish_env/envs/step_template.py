@@ -74,6 +74,7 @@ WEIGHT_PLACE = int(Setup.WEIGHT_PLACE)
 MARGIN_PLACE = int(Setup.MARGIN_PLACE)
 TOLERANCE_CROSS_TRACK = int(Setup.TOLERANCE_CROSS_TRACK)
 TOLERANCE_PLACE = int(Setup.TOLERANCE_PLACE)
+WEIGHT_WITHIN = int(Setup.WEIGHT_WITHIN)
 
 
 @kernel
@@ -205,7 +206,8 @@ def judge(data, lane, ring, newest, offset, energy_before, change, period, setup
     data[out + 24, lane] = data[ROW_GUIDE + 6, lane]
     data[out + 25, lane] = place_error
     terms = data[out, lane] + data[out + 1, lane] + data[out + 2, lane] + data[out + 22, lane]
-    data[ROW_REWARD, lane] = terms - data[out + 3, lane] - data[out + 4, lane]
+    bonus = setup[WEIGHT_WITHIN] if inside else 0.0
+    data[ROW_REWARD, lane] = terms - data[out + 3, lane] - data[out + 4, lane] + bonus
 
 
 @kernel

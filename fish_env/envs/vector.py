@@ -168,6 +168,26 @@ class RoboticFish3DVectorEnv(Watched, VectorEnv[Float32Array, Float32Array, npt.
         infos = self._infos(np.ones(self.num_envs, bool)) | self._drawn(fresh) | final
         return batch.obs.copy(), reward, terminated, truncated, infos
 
+    def set_elapsed(self, steps: npt.ArrayLike) -> None:
+        """Count control steps as taken already, so that present episodes are truncated earlier.
+
+        Fish that begin together then begin their later episodes at different times.
+
+        Args:
+            steps: (num_envs,) control steps, from 0 to max_episode_steps - 1.
+
+        Raises:
+            ConfigError: other numbers.
+        """
+        given = np.asarray(steps)
+        whole = given.dtype.kind in "iu" and given.shape == (self.num_envs,)
+        if not whole or given.min() < 0 or given.max() >= self.max_episode_steps:
+            raise ConfigError(
+                f"elapsed steps: {self.num_envs} whole numbers from 0 to "
+                f"{self.max_episode_steps - 1}"
+            )
+        self._steps[:] = given
+
     def save_state(self) -> dict[str, Any]:
         """All that steps change, as arrays and plain values; :meth:`load_state` takes it."""
         return {

@@ -55,6 +55,13 @@ def test_a_shipped_configuration_reads_and_writes(name, tmp_path):
         ({"imitate": {"gains": {"depht": 1.0}}}, "unknown gain .depht."),
         ({"imitate": {"gains": {"hurry": "much"}}}, "finite number"),
         ({"imitate": {"stretch": 0.0}}, "stretch > 0"),
+        ({"engine": "tensor", "critic": {"layers": [0]}}, "critic.layers: positive"),
+        ({"engine": "tensor", "teacher": {"distil_steps": 9}}, "teacher.distil_steps: needs steps"),
+        (
+            {"engine": "tensor", "teacher": {"log_std_end": 0.0}},
+            "log_std_end: at most log_std_init",
+        ),
+        ({"teacher": {"steps": 9}}, "teacher: engine sb3 has none"),
         ({"history": {"frames": 0}}, "frames"),
         ({"history": {"low_pass_s": [0.01]}}, "low_pass_s"),
         ({"environment": {"curent": [0, 0, 0]}}, "unknown key 'curent'"),

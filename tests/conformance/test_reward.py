@@ -98,6 +98,21 @@ def test_costs_are_small_and_grow_with_what_they_cost():
     assert infos[-1]["cost_action"] == pytest.approx(WEIGHTS["action"])
 
 
+def test_the_bonus_is_paid_within_the_limits_of_success():
+    """Exactly there, and all else stays the same; by default there is none."""
+    bonus = {"config": {"reward": {"weights": {"within": 0.5}}}}
+    options = {"state": REST, "goal": {**STEADY, "cruise_speed": 0.0}}
+    actions = np.repeat(REST_ACTION[None], 30, axis=0)
+    actions[10:, 1:3] = 1.0  # it swims off, so that the speed leaves its limits
+    _, plain, infos = run(RoboticFish3DEnv(), actions, **options)
+    _, paid, _ = run(RoboticFish3DEnv(**bonus), actions, **options)
+    inside = np.array([info["within_tolerance_s"] > 0.0 for info in infos])
+    assert inside.any()
+    assert not inside.all()
+    np.testing.assert_allclose(np.subtract(paid, plain), 0.5 * inside, atol=1e-12)
+    assert WEIGHTS["within"] == 0.0
+
+
 def test_the_power_is_the_mean_over_the_step():
     """Energy of the tail servo gained in a control step, over its length."""
     env = RoboticFish3DEnv()

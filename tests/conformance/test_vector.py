@@ -136,6 +136,23 @@ def test_episode_statistics_can_be_recorded(mode):
     np.testing.assert_array_equal(ours.length_queue, theirs.length_queue)
 
 
+def test_elapsed_steps_let_episodes_end_in_turn():
+    """They shorten the present episode alone."""
+    env = RoboticFish3DVectorEnv(3, max_episode_steps=5, autoreset_mode="SameStep")
+    env.reset(seed=0)
+    env.set_elapsed(np.array([0, 2, 4]))
+    ended = [env.step(np.zeros((3, 5), np.float32))[3].tolist() for _ in range(8)]
+    expected = [[step in (4,), step in (2, 7), step in (0, 5)] for step in range(8)]
+    assert ended == expected
+
+
+@pytest.mark.parametrize("steps", [[0, 1], [0, -1, 2], [0, 1, 5], [0.0, 1.0, 2.0]])
+def test_elapsed_steps_are_those_of_an_episode(steps):
+    env = RoboticFish3DVectorEnv(3, max_episode_steps=5)
+    with pytest.raises(ConfigError, match="3 whole numbers from 0 to 4"):
+        env.set_elapsed(steps)
+
+
 def test_a_fish_that_fails_at_its_last_step_is_not_truncated():
     """Never both: a learner must not bootstrap through a crash."""
     env = RoboticFish3DVectorEnv(2, max_episode_steps=1)

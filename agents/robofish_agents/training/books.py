@@ -66,11 +66,16 @@ class Books:
         if self.config.imitate.rounds and not self.progress.evaluations:
             self.evaluate()
 
-    def before_rollout(self, steps: int) -> None:
-        """Evaluates and saves if it is due after this number of control steps."""
+    def before_rollout(self, steps: int, ready: bool = True) -> None:
+        """Evaluates and saves if it is due after this number of control steps.
+
+        Args:
+            steps: control steps of all fish so far.
+            ready: whether the policy has begun to learn; otherwise it is not evaluated.
+        """
         self._count()
         self.progress.steps = steps
-        if self._due(self.config.evaluation.every, self._evaluated_at()):
+        if ready and self._due(self.config.evaluation.every, self._evaluated_at()):
             self.evaluate()
         if self._due(self.config.checkpoint_every, self._saved_at):
             self._save()

@@ -22,7 +22,7 @@ from robofish_agents.training.schema import build
 from robofish_agents.training.teacher_gains import TEACHER_GAIN_NAMES
 
 SCHEDULES = ("constant", "linear")
-ENGINES = ("sb3", "rllib")
+ENGINES = ("sb3", "rllib", "tensor")
 DEFAULT_ENGINE = "sb3"
 NOT_BY_FILE = "no file can say that it is trusted; remove the key and give --trust-effects"
 MOST_FISH = 1000
@@ -70,6 +70,23 @@ class NetworkSettings:
 
 
 @dataclass(frozen=True)
+class Critic:
+    """The network of values (engine ``tensor``), which a policy file does not hold.
+
+    Attributes:
+        privileged: it sees the true state, the parameters of the fish and the future of the goal
+            instead of the inputs of the policy.
+        layers: widths of its hidden layers; empty: those of ``network``.
+    """
+
+    privileged: bool = False
+    layers: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        _check(min(self.layers, default=1) > 0, "critic.layers: positive widths")
+
+
+@dataclass(frozen=True)
 class LearningRate:
     """Step size of Adam: constant, or falling in a straight line from ``start`` to ``end``."""
 
@@ -79,6 +96,39 @@ class LearningRate:
     def __post_init__(self) -> None:
         _check(self.start > 0, "learning_rate.start must be positive")
         _check(self.end is None or self.end >= 0, "learning_rate.end must not be negative")
+
+
+@dataclass(frozen=True)
+class Teaching:
+    """A teacher that sees the true state and learns by PPO, before the policy (engine ``tensor``).
+
+    Attributes:
+        steps: control steps in which the teacher learns, of ``total_steps``; 0: none.
+        distil_steps: control steps after them in which the policy is fitted to the teacher.
+        layers: widths of the teacher's hidden layers.
+        log_std_init: logarithm of its first standard deviation of actions.
+        log_std_end: an upper limit of that logarithm falls to it in a straight line; None: none.
+        learning_rate: of its PPO.
+        distil_rate: of the fit.
+        distil_epochs: passes of the fit through each rollout.
+    """
+
+    steps: int = 0
+    distil_steps: int = 0
+    layers: tuple[int, ...] = (64, 64)
+    log_std_init: float = -0.5
+    log_std_end: float | None = None
+    learning_rate: LearningRate = field(default_factory=LearningRate)
+    distil_rate: LearningRate = field(default_factory=LearningRate)
+    distil_epochs: int = 4
+
+    def __post_init__(self) -> None:
+        _check(min(self.steps, self.distil_steps) >= 0, "teacher: steps, distil_steps >= 0")
+        _check(self.distil_steps == 0 or self.steps > 0, "teacher.distil_steps: needs steps")
+        _check(bool(self.layers) and min(self.layers) > 0, "teacher.layers: positive widths")
+        _check(self.distil_epochs > 0, "teacher.distil_epochs: positive")
+        end = self.log_std_init if self.log_std_end is None else self.log_std_end
+        _check(end <= self.log_std_init, "teacher.log_std_end: at most log_std_init")
 
 
 @dataclass(frozen=True)
@@ -199,6 +249,8 @@ class TrainConfig:
             such as sharper rewards or faster goals; evaluations go without.
         history: past observations that the policy sees.
         network: see :class:`NetworkSettings`.
+        critic: see :class:`Critic`.
+        teacher: see :class:`Teaching`.
         ppo: see :class:`Ppo`.
         sac: see :class:`Sac`.
         imitate: see :class:`Imitation`.
@@ -206,7 +258,8 @@ class TrainConfig:
         evaluation: see :class:`Evaluation`.
         checkpoint_every: steps between two checkpoints.
         threads: see :class:`Threads`.
-        engine: the library that learns, ``sb3`` (Stable-Baselines3) or ``rllib`` (Ray).
+        engine: what learns: ``sb3`` (Stable-Baselines3), ``rllib`` (Ray), or ``tensor``
+            (:mod:`robofish_agents.training.tensor_engine`).
         trust_effects: run the effect files that the fish's file names, see ``load_fish``; only a
             caller says so, never a file.
     """
@@ -222,6 +275,8 @@ class TrainConfig:
     settings: Mapping[str, Any] = field(default_factory=dict)
     history: History = field(default_factory=History)
     network: NetworkSettings = field(default_factory=NetworkSettings)
+    critic: Critic = field(default_factory=Critic)
+    teacher: Teaching = field(default_factory=Teaching)
     ppo: Ppo = field(default_factory=Ppo)
     sac: Sac = field(default_factory=Sac)
     imitate: Imitation = field(default_factory=Imitation)
@@ -242,6 +297,11 @@ class TrainConfig:
         _check(self.engine in ENGINES, f"engine: one of {', '.join(ENGINES)}")
         if self.engine == "rllib":
             self._check_rllib()
+        if self.engine == "tensor":
+            self._check_tensor()
+        else:
+            _check(self.critic == Critic(), f"critic: engine {self.engine} has none of its own")
+            _check(self.teacher == Teaching(), f"teacher: engine {self.engine} has none")
         _check(0 <= self.seed < 1_000_000, "seed: 0 to 999999")
         _check(1 <= self.num_envs <= MOST_FISH, f"num_envs: 1 to {MOST_FISH}")
         _check(min(self.total_steps, self.checkpoint_every) > 0, "steps must be positive")
@@ -287,6 +347,16 @@ class TrainConfig:
         _check(self.ppo.target_kl is None, "ppo.target_kl: " + without.format("remove it"))
         _check(not self.ppo.use_sde, "ppo.use_sde: " + without.format("remove it"))
 
+    def _check_tensor(self) -> None:
+        """Refuses settings that PPO over tensors does not have."""
+        without = "engine tensor has no equal; {}, or train with --engine sb3"
+        _check(self.algorithm == "ppo", "algorithm: " + without.format("choose ppo"))
+        _check(not self.ppo.use_sde, "ppo.use_sde: " + without.format("remove it"))
+        _check(not self.imitate.rounds, "imitate: " + without.format("remove it"))
+        taught = self.teacher.steps + self.teacher.distil_steps
+        _check(taught <= self.total_steps, "teacher: steps and distil_steps within total_steps")
+        _check(not taught or self.critic.privileged, "teacher: needs critic.privileged: true")
+
     def history_spec(self, period_s: float) -> HistorySpec:
         """Returns the past observations that the policy sees, for a control period (s)."""
         return HistorySpec(self.history.frames, self.history.low_pass_s, period_s)
@@ -296,6 +366,8 @@ class TrainConfig:
         left_out = ["sac" if self.algorithm == "ppo" else "ppo", TRUST]
         if self.engine == DEFAULT_ENGINE:
             left_out.append("engine")  # configurations of before there was a choice stay the same
+        if self.engine != "tensor":
+            left_out += ["critic", "teacher"]
         tree = {key: value for key, value in asdict(self).items() if key not in left_out}
         return dict(yaml.safe_load(yaml.safe_dump(_plain(tree))))
 

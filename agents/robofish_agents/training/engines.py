@@ -55,6 +55,10 @@ def make_engine(config: TrainConfig, stack: Stack) -> Engine:
             package = str(error.name).partition(".")[0]
             raise missing_extra("engine rllib", package, "ray") from error
         return RllibEngine(config, stack)
+    if config.engine == "tensor":
+        from robofish_agents.training.tensor_engine import TensorEngine
+
+        return TensorEngine(config, stack)
     from robofish_agents.training.sb3_engine import Sb3Engine
 
     return Sb3Engine(config, stack)

@@ -18,6 +18,8 @@ from typing import Any, NamedTuple
 import torch
 from torch import Tensor, nn
 
+ACTIVATION: dict[str, type[nn.Module]] = {"tanh": nn.Tanh, "relu": nn.ReLU}
+
 
 @dataclass(frozen=True)
 class Recipe:
@@ -34,6 +36,11 @@ class Recipe:
         clip: largest change of the ratio of probabilities that is rewarded.
         layers: widths of hidden layers, of policy and value each.
         log_std: logarithm of the deviation of actions at the start.
+        critic_layers: widths of hidden layers of the value; None: as ``layers``.
+        activation: of hidden layers, ``tanh`` or ``relu``.
+        entropy: weight of the entropy of actions in the loss.
+        value_weight: weight of the squared error of values in the loss.
+        largest_gradient: longer gradients are shortened to this norm.
     """
 
     iterations: int = 40
@@ -46,6 +53,11 @@ class Recipe:
     clip: float = 0.2
     layers: tuple[int, ...] = (64, 64)
     log_std: float = -0.5
+    critic_layers: tuple[int, ...] | None = None
+    activation: str = "tanh"
+    entropy: float = 0.0
+    value_weight: float = 0.5
+    largest_gradient: float = 0.5
 
     def shortened(self, iterations: int) -> Recipe:
         """The same with fewer iterations."""
@@ -59,19 +71,24 @@ HOLD_FISH = 2048
 
 
 class ActorCritic(nn.Module):
-    """A normal policy of actions, and the value of an observation."""
+    """A normal policy of actions, and the value of what the critic sees."""
 
-    def __init__(self, observed: int, actions: int, recipe: Recipe) -> None:
+    def __init__(
+        self, observed: int, actions: int, recipe: Recipe, judged: int | None = None
+    ) -> None:
         """Draw the weights.
 
         Args:
             observed: numbers of an observation.
             actions: numbers of an action.
             recipe: layers and deviation.
+            judged: numbers that the critic sees; None: it sees the observation.
         """
         super().__init__()
-        self.mean = _perceptron(observed, recipe.layers, actions, 0.01)
-        self.value = _perceptron(observed, recipe.layers, 1, 1.0)
+        widths = recipe.layers if recipe.critic_layers is None else recipe.critic_layers
+        between = ACTIVATION[recipe.activation]
+        self.mean = _perceptron(observed, recipe.layers, actions, 0.01, between)
+        self.value = _perceptron(judged or observed, widths, 1, 1.0, between)
         self.log_std = nn.Parameter(torch.full((actions,), recipe.log_std))
 
     def log_probability(self, observed: Tensor, actions: Tensor) -> Tensor:
@@ -90,10 +107,16 @@ class ActorCritic(nn.Module):
         return mean + noise * torch.exp(self.log_std), density
 
 
-def _perceptron(inputs: int, widths: tuple[int, ...], outputs: int, gain: float) -> nn.Sequential:
+def _perceptron(
+    inputs: int,
+    widths: tuple[int, ...],
+    outputs: int,
+    gain: float,
+    between: type[nn.Module] = nn.Tanh,
+) -> nn.Sequential:
     layers: list[nn.Module] = []
     for width in widths:
-        layers += [_linear(inputs, width, math.sqrt(2.0)), nn.Tanh()]
+        layers += [_linear(inputs, width, math.sqrt(2.0)), between()]
         inputs = width
     return nn.Sequential(*layers, _linear(inputs, outputs, gain))
 
@@ -115,6 +138,28 @@ class Rollout(NamedTuple):
     terminated: Tensor
     truncated: Tensor
     final: Tensor
+
+
+class Taken(NamedTuple):
+    """Rewards of a rollout and where episodes ended (1.0), (steps, N) each."""
+
+    reward: Tensor
+    terminated: Tensor
+    truncated: Tensor
+
+
+class Samples(NamedTuple):
+    """What an update learns from, (steps, N, ...) or (samples, ...) each.
+
+    ``judged`` is what the critic sees; ``log_probability`` that of the actions when taken.
+    """
+
+    observed: Tensor
+    judged: Tensor
+    actions: Tensor
+    log_probability: Tensor
+    advantage: Tensor
+    returns: Tensor
 
 
 class Trained(NamedTuple):
@@ -175,6 +220,20 @@ def advantages(policy: ActorCritic, taken: Rollout, recipe: Recipe) -> tuple[Ten
     with torch.no_grad():
         value = policy.value(taken.observed).squeeze(-1)
         cut_off = policy.value(taken.final).squeeze(-1)
+    return generalised(taken, value, cut_off, recipe)
+
+
+def generalised(
+    taken: Rollout | Taken, value: Tensor, cut_off: Tensor, recipe: Recipe
+) -> tuple[Tensor, Tensor]:
+    """Generalised advantages and returns, (steps, N) each, from values.
+
+    Args:
+        taken: rewards and ends of episodes, (steps, N) each.
+        value: (steps + 1, N) values before each step and behind the last.
+        cut_off: (steps, N) value of the state where a truncated episode ended.
+        recipe: discount and decay.
+    """
     goes_on = 1.0 - torch.maximum(taken.terminated, taken.truncated)
     following = torch.where(taken.truncated > 0.0, cut_off, goes_on * value[1:])
     surprise = taken.reward + recipe.gamma * following - value[:-1]
@@ -186,16 +245,18 @@ def advantages(policy: ActorCritic, taken: Rollout, recipe: Recipe) -> tuple[Ten
     return found, found + value[:-1]
 
 
-def loss_of(policy: ActorCritic, batch: list[Tensor], recipe: Recipe) -> Tensor:
-    """Loss of a minibatch: observations, actions, their densities, advantages and returns."""
-    observed, actions, before, advantage, returns = batch
-    advantage = (advantage - advantage.mean()) / (advantage.std() + 1e-8)
-    ratio = torch.exp(policy.log_probability(observed, actions) - before)
+def loss_of(policy: ActorCritic, batch: Samples, recipe: Recipe) -> tuple[Tensor, Tensor]:
+    """Loss of a minibatch, and an estimate of how far the policy has moved (its KL divergence)."""
+    advantage = (batch.advantage - batch.advantage.mean()) / (batch.advantage.std() + 1e-8)
+    change = policy.log_probability(batch.observed, batch.actions) - batch.log_probability
+    ratio = torch.exp(change)
     clipped = torch.clamp(ratio, 1.0 - recipe.clip, 1.0 + recipe.clip)
     gain = torch.minimum(ratio * advantage, clipped * advantage).mean()
-    error = policy.value(observed).squeeze(-1) - returns
-    loss: Tensor = 0.5 * (error * error).mean() - gain
-    return loss
+    error = policy.value(batch.judged).squeeze(-1) - batch.returns
+    loss: Tensor = recipe.value_weight * (error * error).mean() - gain
+    if recipe.entropy:
+        loss = loss - recipe.entropy * policy.log_std.sum()  # that of a normal but for a constant
+    return loss, (ratio.detach() - 1.0 - change.detach()).mean()
 
 
 def update(
@@ -203,18 +264,81 @@ def update(
 ) -> None:
     """Improve policy and values by one rollout."""
     advantage, returns = advantages(policy, taken, recipe)
-    whole = (taken.observed[:-1], taken.actions, taken.log_probability, advantage, returns)
-    flat = [rows.flatten(0, 1) for rows in whole]
-    size = len(flat[0]) // recipe.minibatches
+    seen = taken.observed[:-1]
+    whole = Samples(seen, seen, taken.actions, taken.log_probability, advantage, returns)
+    improve(policy, optimiser, whole, recipe)
+
+
+def improve(
+    policy: ActorCritic,
+    optimiser: torch.optim.Optimizer,
+    whole: Samples,
+    recipe: Recipe,
+    target_kl: float | None = None,
+) -> float:
+    """Take the gradient steps of an update.
+
+    Args:
+        policy: changed.
+        optimiser: of its parameters.
+        whole: a rollout, (steps, N, ...) each.
+        recipe: epochs, minibatches and weights of the loss.
+        target_kl: the update ends where the policy has moved by 1.5 times this; None: never.
+
+    Returns:
+        How far the policy had moved in the last minibatch.
+    """
+    flat = Samples(*(rows.flatten(0, 1) for rows in whole))
+    size, moved = len(flat.returns) // recipe.minibatches, 0.0
     for _ in range(recipe.epochs):
-        order = torch.randperm(len(flat[0]), device=returns.device)
+        order = torch.randperm(len(flat.returns), device=flat.returns.device)
         for first in range(0, size * recipe.minibatches, size):
             chosen = order[first : first + size]
+            loss, distance = loss_of(policy, Samples(*(rows[chosen] for rows in flat)), recipe)
+            if target_kl is not None:
+                moved = float(distance)
+                if moved > 1.5 * target_kl:
+                    return moved
             optimiser.zero_grad(set_to_none=True)
-            loss = loss_of(policy, [rows[chosen] for rows in flat], recipe)
             torch.autograd.backward(loss)
-            nn.utils.clip_grad_norm_(policy.parameters(), 0.5)
+            nn.utils.clip_grad_norm_(policy.parameters(), recipe.largest_gradient)
             optimiser.step()
+    return moved
+
+
+def follow(
+    policy: ActorCritic,
+    optimiser: torch.optim.Optimizer,
+    observed: Tensor,
+    wanted: Tensor,
+    recipe: Recipe,
+    epochs: int,
+) -> float:
+    """Fit the mean actions of a policy to those of a teacher by least squares.
+
+    Args:
+        policy: changed.
+        optimiser: of its parameters.
+        observed: (steps, N, ...) what it saw.
+        wanted: (steps, N, actions) what the teacher would have done; clipped to [-1, 1].
+        recipe: minibatches and longest gradient.
+        epochs: passes.
+
+    Returns:
+        Mean squared distance of the last minibatch.
+    """
+    seen, targets = observed.flatten(0, 1), wanted.clamp(-1.0, 1.0).flatten(0, 1)
+    size, distance = len(seen) // recipe.minibatches, torch.zeros(())
+    for _ in range(epochs):
+        order = torch.randperm(len(seen), device=seen.device)
+        for first in range(0, size * recipe.minibatches, size):
+            chosen = order[first : first + size]
+            distance = nn.functional.mse_loss(policy.mean(seen[chosen]), targets[chosen])
+            optimiser.zero_grad(set_to_none=True)
+            torch.autograd.backward(distance)
+            nn.utils.clip_grad_norm_(policy.parameters(), recipe.largest_gradient)
+            optimiser.step()
+    return float(distance.detach())
 
 
 def train(env: Any, recipe: Recipe, seed: int) -> Trained:

@@ -28,14 +28,25 @@ def today() -> str:
     return datetime.date.today().isoformat()
 
 
-def write_dated(folder: Path, kind: str, content: Mapping[str, Any], page: str = "") -> Path:
+def write_dated(
+    folder: Path, kind: str, content: Mapping[str, Any], page: str = "", beside: bool = False
+) -> Path:
     """Writes ``<kind>-<date>.json`` with date and commit and, where there is a page, ``.md``.
+
+    Args:
+        folder: where.
+        kind: of the result.
+        content: of the JSON file.
+        page: of the Markdown file.
+        beside: number the file where there is one of that day, instead of replacing it.
 
     Returns:
         The JSON file.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    file = folder / f"{kind}-{today()}.json"
+    file, number = folder / f"{kind}-{today()}.json", 2
+    while beside and file.exists():
+        file, number = folder / f"{kind}-{today()}-{number}.json", number + 1
     whole = {"date": today(), "commit": commit(), **content}
     file.write_text(json.dumps(whole, indent=1) + "\n", encoding="utf-8")
     if page:

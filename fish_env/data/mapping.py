@@ -120,7 +120,7 @@ class Section:
         try:
             return located(self.text(key), self.place.file.parent)
         except Unreadable as error:
-            raise self.at(key).refuse(error.reason, error.remedy.capitalize()) from None
+            raise self.at(key).unreadable(error) from None
 
     def holds_section(self, key: str) -> bool:
         """Whether the value of a key is a section of its own."""

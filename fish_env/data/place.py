@@ -6,7 +6,7 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from fish_env.errors import DatasetError
-from fish_env.reading import printable
+from fish_env.reading import Unreadable, printable
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,15 @@ class Place:
     def refuse(self, reason: str, remedy: str) -> DatasetError:
         """Words the error for this place; the caller raises it."""
         return DatasetError(printable(f"{self}: {reason}. {remedy}."))
+
+    def unreadable(self, error: Unreadable, about: str = "") -> DatasetError:
+        """Words the error of a file or path that cannot be read; the caller raises it.
+
+        Args:
+            error: Why.
+            about: What comes before the reason.
+        """
+        return self.refuse(f"{about}{error.reason}", error.remedy.capitalize())
 
     def __str__(self) -> str:
         parts = [str(self.file)]

@@ -211,7 +211,7 @@ def read_text(place: Place, most: int = reading.MOST_TEXT_BYTES) -> str:
             closest(place.file.name, beside) if beside else "Check the path",
         ) from error
     except reading.Unreadable as error:
-        raise place.refuse(f"it {error.reason}", error.remedy.capitalize()) from error
+        raise place.unreadable(error, "it ") from error
 
 
 def _neighbours(path: Path) -> list[Path]:

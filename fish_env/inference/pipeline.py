@@ -22,7 +22,7 @@ from fish_env.inference.attribution import Attribution, attribute, extended
 from fish_env.inference.budget import Budget, error_budget
 from fish_env.inference.effort import FULL, Effort
 from fish_env.inference.estimate.again import finished
-from fish_env.inference.estimate.fit import Fit, fit
+from fish_env.inference.estimate.fit import FEWER_STEPS, Fit, fit
 from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.gain import gap_closed
 from fish_env.inference.parallel import both
@@ -76,7 +76,7 @@ def refit_baseline(problem: Problem) -> Fit:
     Raises:
         LinAlgError: the simulation diverges with the nominal coefficients.
     """
-    own = fit(problem, rounds=2, iterations=3)
+    own = fit(problem, rounds=2, iterations=FEWER_STEPS)
     if problem.drive.in_step and disturbance_at_limit(own):
         return own
     own = Explanation((), own).varied(beside_misfit=problem.drive.uneven).fit

@@ -7,9 +7,10 @@ how detectable it is, how alike two causes are, and how much of the misfit it ex
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
+from typing import TypeVar
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause
 from fish_env.inference.tails import chi2_log_tail
 
+T = TypeVar("T")
 AT_ONCE = 16
 """Signals that are projected together: a tall product costs little more than a slim one."""
 SINGLE_PRECISION = 1e-6
@@ -201,8 +203,9 @@ class Projector:
                 first += len(own)
             return found
 
-        parts = side_by_side(partial(together, part) for part in _parts(tests))
-        return [signal for part in parts for signal in part]
+        parts = in_parts(tests, lambda test: len(test[2]), AT_ONCE)
+        found_of_parts = side_by_side(partial(together, part) for part in parts)
+        return [signal for part in found_of_parts for signal in part]
 
     def _signal(
         self,
@@ -248,16 +251,14 @@ class Projector:
         return largest
 
 
-def _parts(
-    tests: Sequence[tuple[Cause, int, Sequence[int]]],
-) -> list[list[tuple[Cause, int, Sequence[int]]]]:
-    """Tests in parts of at most :data:`AT_ONCE` rows, or of one test."""
-    parts: list[list[tuple[Cause, int, Sequence[int]]]] = []
+def in_parts(tests: Iterable[T], size: Callable[[T], int], most: int) -> list[list[T]]:
+    """Tests in their order, in parts whose sizes add up to no more than `most`, or of one test."""
+    parts: list[list[T]] = []
     room = 0
     for test in tests:
-        if not parts or len(test[2]) > room:
+        if not parts or size(test) > room:
             parts.append([])
-            room = AT_ONCE
+            room = most
         parts[-1].append(test)
-        room -= len(test[2])
+        room -= size(test)
     return parts

@@ -19,7 +19,7 @@ from fish_env.arrays import FloatArray, SingleArray
 from fish_env.inference.adequacy import beyond_plausible, implausible_estimates
 from fish_env.inference.elimination import allowed_loss, insignificant, off_values
 from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
-from fish_env.inference.estimate.fit import Fit, fit
+from fish_env.inference.estimate.fit import FEWER_STEPS, Fit, fit
 from fish_env.inference.estimate.products import inner
 from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.hypotheses import CauseId, Coefficient, EffectName, listed
@@ -219,7 +219,7 @@ def _fitted(current: Explanation, coarse: CoarseFit) -> Fit | None:
     """
     problem = current.fit.problem.without_refinement()
     start = (coarse.effects, coarse.point, current.fit.noise, coarse.released)
-    return reached(lambda: fit(problem, *start, rounds=2, iterations=3))
+    return reached(lambda: fit(problem, *start, rounds=2, iterations=FEWER_STEPS))
 
 
 def _led(

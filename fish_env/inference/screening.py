@@ -17,7 +17,7 @@ from fish_env.inference.parallel import side_by_side
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause, Probe, best_of_each, effect_values, finer, of_visible
 from fish_env.inference.problem import Problem
-from fish_env.inference.projection import Projector, Signal
+from fish_env.inference.projection import Projector, Signal, in_parts
 from fish_env.inference.tails import chi2_log_tail, noncentrality
 
 LANES_AT_ONCE = 96
@@ -94,16 +94,10 @@ def _effect_signals(fit: Fit, projector: Projector, causes: Sequence[Cause]) -> 
 def _parts(fit: Fit, tests: Sequence[tuple[Cause, int]]) -> list[list[int]]:
     """Tests in parts of which each is evaluated at once: their residuals take memory."""
     count = [len(cause.probes[index]) for cause, index in tests]
-    parts: list[list[int]] = []
-    for alike in _kinds(fit, [cause.effect for cause, _ in tests], sum(count)):
-        room = 0
-        for i in alike:
-            if room < count[i]:
-                parts.append([])
-                room = SETTINGS_AT_ONCE
-            parts[-1].append(i)
-            room -= count[i]
-    return parts
+    kinds = _kinds(fit, [cause.effect for cause, _ in tests], sum(count))
+    return [
+        part for alike in kinds for part in in_parts(alike, lambda i: count[i], SETTINGS_AT_ONCE)
+    ]
 
 
 def _signals_together(

@@ -17,7 +17,6 @@ from fish_env.model.jit import entry_point_of_file, kernel
 
 Packed = npt.NDArray[np.uint32]
 """(height, width) pixels of a surface of the drawing library, each one number."""
-MOST_CORNERS = 64
 
 
 def numbers(surface: pygame.Surface) -> Packed:
@@ -50,13 +49,13 @@ def fill(pixels: Packed, outlines: FloatArray, colours: IntArray, alphas: IntArr
 
     Args:
         pixels: (height, width), changed in place.
-        outlines: (n, corners, 2) on the picture, at most MOST_CORNERS corners.
+        outlines: (n, corners, 2) on the picture.
         colours: (n,) packed as the pixels are.
         alphas: (n,) 0 to 255; 255 replaces what is there.
     """
     height, width = pixels.shape
     corners = outlines.shape[1]
-    hits = np.empty(MOST_CORNERS)
+    hits = np.empty(max(corners, 2))
     for n in range(len(outlines)):
         left, right = outlines[n, 0, 0], outlines[n, 0, 0]
         top, bottom = outlines[n, 0, 1], outlines[n, 0, 1]

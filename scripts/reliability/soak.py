@@ -22,7 +22,7 @@ from typing import Any
 
 from scripts.bench import harness
 from scripts.reliability import soak_runs, watch
-from scripts.results import RESULTS
+from scripts.results import RESULTS, write_dated
 
 PARTS = ("batch", "turns")
 
@@ -83,7 +83,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             options.seed = earlier if given is None else given
             content = {"machine": harness.machine(), "seed": options.seed}
             content |= parts[name](options, stopped)
-            file = soak_runs.write_result(name, options.out, content)
+            file = write_dated(options.out, f"soak-{name}", content, beside=True)
             found = content["resources"]["grew"]
             print(f"{name}: {', '.join(found) or 'nothing grew'}; written: {file.name}")
             grew += found

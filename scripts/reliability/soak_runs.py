@@ -10,8 +10,6 @@ from pathlib import Path
 from types import FrameType
 from typing import Any
 
-from scripts.results import today, write_dated
-
 AMOUNT = {"batch": "steps", "turns": "hours"}
 """What a part of the soak counts."""
 
@@ -40,17 +38,6 @@ def until_stopped() -> Iterator[Callable[[], bool]]:
 def results_of(part: str, folder: Path) -> list[Path]:
     """The results of a part of the soak, the earliest first."""
     return sorted(folder.glob(f"soak-{part}-*.json"), key=lambda file: (len(file.stem), file.stem))
-
-
-def write_result(part: str, folder: Path, content: dict[str, Any]) -> Path:
-    """Writes the result of a run; of several in a day each has a file of its own."""
-    file = write_dated(folder / ".new", f"soak-{part}", content)
-    target, number = folder / file.name, 2
-    while target.exists():
-        target, number = folder / f"soak-{part}-{today()}-{number}.json", number + 1
-    file.rename(target)
-    file.parent.rmdir()
-    return target
 
 
 def added_up(part: str, folder: Path) -> list[str]:

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
+from fish_env.data.importing.limits import check_is_file
 from fish_env.data.place import Place
 from fish_env.reading import TextLoader, Unreadable, read_yaml
 
@@ -55,8 +56,7 @@ def check_bag(path: Path) -> None:
 def _check_database(file: Path) -> None:
     """Refuses a database with views, triggers or computed columns: reading them is computing."""
     place = Place(file)
-    if not file.is_file():
-        raise place.refuse("it is no file: a pipe, a device or a folder", "Name a file")
+    check_is_file(file)
     if set("?#%") & set(str(file.absolute())):
         raise place.refuse(
             "the library that reads bags cannot open paths with ?, # or %", "Rename the file"

@@ -47,11 +47,7 @@ def columns_of(
         names = [name or f"column {i + 1}" for i, name in enumerate(names)]
         units = _units_row(names, rows[header + 1]) if len(rows) > header + 1 else {}
         first = header + (2 if units else 1)
-    if len(names) > limits.MOST_COLUMNS:
-        raise place.refuse(
-            f"{len(names)} columns, more than {limits.MOST_COLUMNS}",
-            "Save one row for each sample, and one column for each quantity",
-        )
+    limits.check_columns(len(names), place)
     body = list(rows[first:])
     while body and not any(_label(cell) for cell in body[-1]):
         body.pop()

@@ -43,7 +43,7 @@ def content(file: Path, most: int = reading.MOST_TABLE_BYTES) -> bytes:
     try:
         return reading.read_bytes(file, most)
     except reading.Unreadable as error:
-        raise Place(file).refuse(error.reason, error.remedy.capitalize()) from None
+        raise Place(file).unreadable(error) from None
 
 
 def check_is_file(file: Path) -> None:
@@ -54,6 +54,23 @@ def check_is_file(file: Path) -> None:
     """
     if not file.is_file():
         raise Place(file).refuse("it is no file: a pipe, a device or a folder", "Name a file")
+
+
+def check_columns(count: int, place: Place) -> None:
+    """Refuses a table of too many columns.
+
+    Args:
+        count: Its columns.
+        place: The table, for the error.
+
+    Raises:
+        DatasetError: It has too many.
+    """
+    if count > MOST_COLUMNS:
+        raise place.refuse(
+            f"{count} columns, more than {MOST_COLUMNS}",
+            "Save one row for each sample, and one column for each quantity",
+        )
 
 
 @contextmanager

@@ -65,11 +65,7 @@ def _presentable(source: Source) -> Source:
         DatasetError: It has too many columns, too long names, or two that then are the same.
     """
     place = Place(source.file, column=one_line(source.part) or None)
-    if len(source.columns) > limits.MOST_COLUMNS:
-        raise place.refuse(
-            f"{len(source.columns)} columns, more than {limits.MOST_COLUMNS}",
-            "Save one row for each sample, and one column for each quantity",
-        )
+    limits.check_columns(len(source.columns), place)
     long = next((name for name in source.columns if len(name) > limits.LONGEST_NAME), None)
     if long is not None:
         raise place.refuse(f"the name of a column has {len(long)} characters", "Shorten it")
@@ -99,8 +95,7 @@ def _expand(logs: Iterable[str | Path]) -> list[Path]:
         try:
             path = located(log)
         except Unreadable as error:
-            place = Place(Path(printable(str(log))))
-            raise place.refuse(error.reason, error.remedy.capitalize()) from None
+            raise Place(Path(printable(str(log)))).unreadable(error) from None
         if path.exists():
             files += _inside(path)
             continue

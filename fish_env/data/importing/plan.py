@@ -282,4 +282,4 @@ def fish_path(fish: str, place: Place) -> str:
     try:
         return str(located(fish).resolve())
     except Unreadable as error:
-        raise place.refuse(f"fish: {error.reason}", error.remedy.capitalize()) from None
+        raise place.unreadable(error, "fish: ") from None

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fish_env.inference.estimate.fit import Fit, fit
+from fish_env.inference.estimate.fit import FEWER_STEPS, USUAL_STEPS, Fit, fit
 from fish_env.inference.estimate.free import DIFFERENCE, Free, linearise, spread_of
 from fish_env.inference.estimate.gauss_newton import predicted_decrease
 from fish_env.inference.estimate.information import gradient, information
@@ -18,8 +18,6 @@ from fish_env.inference.problem import Point, Problem
 
 MORE = 3
 """Most fits until one is converged."""
-FEWER, USUAL = 3, 5
-"""Most steps in a round of a fit that compares causes."""
 
 
 def finished(own: Fit) -> Fit:
@@ -54,7 +52,7 @@ def refined(own: Fit, rounds: int = 1) -> Fit:
     if not own.problem.is_coarse(own.point.effects):
         return own
     problem, start = own.problem.with_refinement(), (own.point, own.noise, own.released)
-    return fit(problem, own.effects, *start, rounds=rounds, iterations=FEWER)
+    return fit(problem, own.effects, *start, rounds=rounds, iterations=FEWER_STEPS)
 
 
 def to_publish(own: Fit) -> Fit:
@@ -73,7 +71,7 @@ def search_steps(problem: Problem) -> int:
     Where each run has a drive of its own a step moves its numbers too, which takes several times as
     long, and what is still missing moves estimates by more than further steps would.
     """
-    return FEWER if problem.drive.uneven else USUAL
+    return FEWER_STEPS if problem.drive.uneven else USUAL_STEPS
 
 
 def run_variation(own: Fit) -> Spread:

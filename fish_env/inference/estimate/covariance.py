@@ -30,10 +30,11 @@ def sandwich(
         clusters: (D,) number of the cluster of each residual; default: blocks of time.
     """
     index = block_index(lin.run_of, lin.time_of) if clusters is None else clusters
-    widened = np.maximum(_widened(lin, inverse, prior, index), 1.0)
+    scores = lin.slopes * lin.residuals[:, None]
+    widened = np.maximum(_widened(scores, inverse, prior, index), 1.0)
     count = len(np.unique(lin.run_of))
     if count >= POLICY.fewest_runs_for_interval:
-        by_run = _widened(lin, inverse, prior, lin.run_of)
+        by_run = _widened(scores, inverse, prior, lin.run_of)
         by_chance = chdtri(count - 1, POLICY.run_errors_level) / (count - 1)
         few = float(stdtrit(count - 1, 0.975) / ndtri(0.975)) ** 2
         widened = np.where(by_run > by_chance * widened, few * by_run, widened)
@@ -42,10 +43,10 @@ def sandwich(
 
 
 def _widened(
-    lin: Linearised, inverse: FloatArray, prior: FloatArray, index: IntArray
+    scores: FloatArray, inverse: FloatArray, prior: FloatArray, index: IntArray
 ) -> FloatArray:
-    """Variance (n,) over that in white residuals, by sums of scores over an index (D,)."""
-    sums = sums_over(index, lin.slopes * lin.residuals[:, None])
+    """Variance (n,) over that in white residuals, by sums of scores (D, n) over an index (D,)."""
+    sums = sums_over(index, scores)
     sums -= sums.mean(axis=0)
     meat = sums.T @ sums * len(sums) / max(len(sums) - 1, 1)
     robust = inverse @ (meat + np.diag(prior)) @ inverse

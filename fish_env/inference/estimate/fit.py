@@ -37,6 +37,8 @@ from fish_env.inference.problem import Point, Problem
 
 SAME = 0.01
 """Root mean square of the difference between whitened residuals below which they are the same."""
+USUAL_STEPS, FEWER_STEPS = 5, 3
+"""Most steps in a round; the fewer are enough to compare causes by, and to go on from a fit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,7 +161,7 @@ def fit(
     noise: Any | None = None,
     released: Sequence[Coefficient] = (),
     refit_noise: bool = True,
-    iterations: int = 5,
+    iterations: int = USUAL_STEPS,
     tolerance: float = 0.3,
     rounds: int = 4,
     give_up_above: float = np.inf,

@@ -27,6 +27,7 @@ FORBIDDEN = '/\\:*?"<>|'
 """What the names of files cannot hold on every system."""
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _LONGEST_STEM = 60
+_MARKED = 2000
 
 
 @contextmanager
@@ -211,17 +212,37 @@ def check_first_line(output: Path, first: str) -> None:
     Raises:
         OutputError: It is another file.
     """
-    if not output.exists():
-        return
-    wanted, begins = first.encode(), b""
-    if output.is_file():
-        with suppress(OSError), output.open("rb") as stream:
-            begins = stream.read(len(wanted))
-    if begins != wanted:
-        raise OutputError(
-            f"{output}: this program did not write it and would replace it; move it away, or give "
-            "another folder with --out"
-        )
+    if output.exists() and _begin(output, len(first.encode())) != first.encode():
+        raise _of_someone_else(output)
+
+
+def check_mark(output: Path, mark: str) -> None:
+    """Refuses to replace a file that does not hold, near its beginning, what this program writes.
+
+    Args:
+        output: The file, which need not be there.
+        mark: Words within its first two kilobytes.
+
+    Raises:
+        OutputError: It is another file.
+    """
+    if output.exists() and mark.encode() not in _begin(output, _MARKED):
+        raise _of_someone_else(output)
+
+
+def _begin(file: Path, count: int) -> bytes:
+    """The first bytes of a file; none of what is no file or cannot be read."""
+    if file.is_file():
+        with suppress(OSError), file.open("rb") as stream:
+            return stream.read(count)
+    return b""
+
+
+def _of_someone_else(output: Path) -> OutputError:
+    return OutputError(
+        f"{output}: this program did not write it and would replace it; move it away, or give "
+        "another folder with --out"
+    )
 
 
 def same_file(one: Path, other: Path) -> bool:

@@ -32,6 +32,7 @@ MOST_VALUES = 60_000
 LONGEST_SHOWN = 60
 LARGEST = sys.float_info.max
 _PAGE = 65_536
+_NO_FILE = "is a pipe or a device, not a file"
 _REPR = reprlib.Repr()
 _REPR.maxstring = _REPR.maxother = _REPR.maxlong = LONGEST_SHOWN
 _LARGEST_INT = 2**63
@@ -129,20 +130,23 @@ def plain_number(text: str) -> float:
 
 
 def located(name: str | Path, folder: Path | None = None) -> Path:
-    """Returns the path that a name in a file or an option means; it need not exist.
+    """Returns the path that a name in a file or an option means, to be read; it need not exist.
 
     Args:
         name: A path; `~` is the home folder.
         folder: What a relative path is relative to; default: the working folder.
 
     Raises:
-        Unreadable: No path can have this name, or its links lead round in a circle.
+        Unreadable: No path can have this name, its links lead round in a circle, or it is a pipe
+            or a device.
     """
     try:
         path = (folder or Path()) / Path(name).expanduser()
         with suppress(FileNotFoundError, NotADirectoryError, PermissionError):
-            path.stat()
+            mode = path.stat().st_mode
             path.resolve()
+            if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
+                raise Unreadable(f"{shown(str(name))} {_NO_FILE}", "name a file")
         return path
     except RuntimeError:
         raise Unreadable(
@@ -171,7 +175,7 @@ def read_bytes(path: Path, most: int = MOST_TEXT_BYTES) -> bytes:
         with os.fdopen(opened, "rb") as stream:
             about = os.fstat(opened)
             if not stat.S_ISREG(about.st_mode):
-                raise Unreadable("is a pipe or a device, not a file", "name a file")
+                raise Unreadable(_NO_FILE, "name a file")
             content = stream.read(min(most, max(about.st_size, _PAGE)) + 1)
     except FileNotFoundError:
         raise

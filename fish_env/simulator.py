@@ -88,7 +88,7 @@ def schedule(rows: Iterable[Mapping[str, float]]) -> CommandSteps:
     if not times:
         raise ScheduleError("the schedule is empty: give at least one row of commands")
     if np.any(np.diff(times) <= 0) or not np.all(np.isfinite(times)):
-        raise ScheduleError(f"schedule: times must be finite and increase, got {times}")
+        raise ScheduleError(f"schedule: times must be finite and increase, got {shown(times)}")
     if not np.all(np.isfinite(values)):
         raise ScheduleError("schedule: every command must be a finite number")
     return CommandSteps(np.array(times), np.array(values))

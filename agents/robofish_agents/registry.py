@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fish_env.errors import ConfigError
+from fish_env.reading import Unreadable, located
 
 Float32Array = npt.NDArray[np.float32]
 
@@ -52,13 +53,20 @@ def agent_files(name: str) -> list[Path]:
 def _policies(name: str, task: str) -> list[Agent]:
     from robofish_agents import policies
 
-    paths = policies.shipped(task) if name == "pretrained" else _files(Path(name))
+    paths = policies.shipped(task) if name == "pretrained" else _files(_located(name))
     if not paths:
         raise ConfigError(
             f"agent '{name}': give pid, mppi, pretrained, a policy file, or a folder with policy "
             "files; `robofish train` writes one"
         )
     return [policies.PretrainedPolicy.load(path) for path in paths]
+
+
+def _located(name: str) -> Path:
+    try:
+        return located(name)
+    except Unreadable as error:
+        raise ConfigError(f"agent {error}") from None
 
 
 def _files(path: Path) -> list[Path]:

@@ -59,7 +59,10 @@ def simulate_case(
     described = None if out is None or out.suffix != ".csv" else description_file(out)
     check_outputs([out, described, replay, json_file], [case_file, *fish_files(case.fish)])
     simulator = Simulator(case.fish, dt, case.effects)
-    trajectory = simulator.run(case.commands, case.duration_s, case.initial, rate_hz)
+    try:
+        trajectory = simulator.run(case.commands, case.duration_s, case.initial, rate_hz)
+    except ScheduleError as error:
+        raise ScheduleError(f"{case_file}: {error}") from error
     table = pose_table(trajectory)
     if out is not None or json_file is None or str(json_file) != STANDARD:
         write_table(table, out)

@@ -29,6 +29,16 @@ FEWEST = 5
 SLOWEST = 5.0
 """s. A fish whose motion is sampled less often than this cannot be compared with a simulation."""
 
+QUICKEST = 1e-4
+"""s. Mean sample interval below which a clock cannot be in its unit: 10,000 rows a second. A mean,
+because rows of several sensors may come in bursts."""
+
+USUAL = 1e-3
+"""s. Sample intervals from here up to :data:`SLOW` are usual."""
+
+DATES_S = (6.3e8, 4.1e9)
+"""s since 1970: 1990 to 2100."""
+
 _LARGER = (("ms", 1e3), ("us", 1e6), ("ns", 1e9))
 
 
@@ -51,7 +61,7 @@ def read_time(table: Table, clock: Clock) -> tuple[FloatArray, tuple[str, ...]]:
         first = table.text(clock.column)[0]
         return time, (f"{place}: the run begins at t = 0, which is {first}",)
     if begins:
-        stamp = _date(begins, table)
+        stamp = _date(begins, clock, table)
         return time, (f"{place}: the run begins at t = 0, which is {stamp} if 1970 is 0",)
     return time, ()
 
@@ -69,14 +79,32 @@ def _from_numbers(table: Table, factor: float) -> tuple[FloatArray, float]:
     return (time - time[0]) * factor, float(time[0] * factor)
 
 
-def _date(begins: float, table: Table) -> str:
+def _date(begins: float, clock: Clock, table: Table) -> str:
     """A time since 1970, s, as a date."""
     try:
         return datetime.fromtimestamp(begins, UTC).isoformat(timespec="milliseconds")
     except (ValueError, OverflowError, OSError):
-        raise table.at(TIME, table.rows[0]).refuse(
-            f"{begins:.4g} s is not a date", "Correct the time or its unit"
+        place, reason = table.at(TIME, table.rows[0]), f"{begins:.4g} s is not a date"
+        unit = _unit_of_stamp(begins, clock)
+        if unit is None:
+            raise place.refuse(reason, "Correct the time or its unit") from None
+        raise place.refuse(
+            f"{reason}; it looks like {unit} since 1970", _declare(clock, unit)
         ) from None
+
+
+def _unit_of_stamp(begins: float, clock: Clock) -> str | None:
+    """Unit in which a stamp, read as a time in s since 1970, is a date of our time."""
+    factor = clock.unit.factor if clock.unit is not None else 1.0
+    for unit, size in _LARGER:
+        if DATES_S[0] < begins / factor / size < DATES_S[1]:
+            return unit
+    return None
+
+
+def _declare(clock: Clock, unit: str) -> str:
+    """The remedy for a clock that is in another unit than it was read in."""
+    return f"Declare its unit in dataset.yaml: `time: {{column: {clock.column}, unit: {unit}}}`"
 
 
 def _from_text(table: Table) -> FloatArray:
@@ -137,17 +165,18 @@ def _check_order(time: FloatArray, table: Table) -> None:
 
 
 def check_clock(time: FloatArray, commands: FloatArray, clock: Clock, table: Table) -> None:
-    """Refuses a clock that nobody declared and that can hardly be in seconds.
+    """Refuses a clock that can hardly be in its unit.
 
     Args:
         time: Sample times as read, shape (n,), s.
         commands: Commands of each row, shape (n, 5), SI.
-        clock: The time column; one whose unit is declared is not questioned.
+        clock: The time column; one whose unit is declared may be as slow as it likes.
         table: The file and run.
 
     Raises:
-        DatasetError: The samples are too far apart for seconds.
+        DatasetError: The samples are too close for any log, or too far apart for seconds.
     """
+    _check_quickest(time, clock, table)
     if clock.declared or time.size < FEWEST:
         _check_span(time, table)
         return
@@ -155,13 +184,32 @@ def check_clock(time: FloatArray, commands: FloatArray, clock: Clock, table: Tab
     if interval < SLOW or (interval < SLOWER and _beats(commands) * interval < SLOW):
         _check_span(time, table)
         return
-    unit = _likely_unit(interval)
+    unit, counts = _likely_unit(interval), bool(np.all(np.diff(time) == 1.0))
     raise table.at(TIME).refuse(
         f"the samples are {interval:.4g} s apart (median) if this clock is in seconds; "
-        f"it looks like {unit}",
-        f"Declare its unit in dataset.yaml: `time: {{column: {clock.column}, unit: {unit}}}`, or "
-        "`unit: s` if it is in seconds",
+        f"it looks like {unit}{' or like a count of the rows' if counts else ''}",
+        f"{_declare(clock, unit)}, or `unit: s` if it is in seconds"
+        f"{', or divide a count by the number of rows a second' if counts else ''}",
     )
+
+
+def _check_quickest(time: FloatArray, clock: Clock, table: Table) -> None:
+    interval = float(time[-1] - time[0]) / (time.size - 1)
+    if clock.unit is None or time.size < FEWEST or interval >= QUICKEST:
+        return
+    raise table.at(TIME).refuse(
+        f"the samples are {interval:.4g} s apart (mean) if this clock is in {clock.unit.name}, "
+        "which is quicker than any log",
+        f"Declare a larger unit in dataset.yaml, such as `time: {{column: {clock.column}, unit: "
+        f"{_usual_unit(interval, clock.unit.factor)}}}`, or correct the times",
+    )
+
+
+def _usual_unit(interval: float, factor: float) -> str:
+    """Unit in which an interval, read by a factor to s that is too small, is a usual one."""
+    larger = [(name, 1.0 / size) for name, size in reversed(_LARGER) if factor * size < 1.0]
+    usual = (name for name, size in larger if USUAL <= interval / factor * size < SLOW)
+    return next(usual, "s")
 
 
 def _check_span(time: FloatArray, table: Table) -> None:

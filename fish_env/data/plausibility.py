@@ -98,7 +98,12 @@ def check_turning(
         remedy = ", or subtract the whole turns it had made before the run"
         raise _refuse_degrees(reason, unit, place.at(rows[measured[wound[0]]]), remedy)
     rate, first = _turning_rate(time, angle)
-    check_rate(rate, unit, [rows[index] for index in measured[first]], place)
+    check_rate(rate, unit, [rows[index] for index in measured[first]], place, or_clock(time_s))
+
+
+def or_clock(time_s: FloatArray) -> str:
+    """The other remedy for what changes too fast: the times, by how far samples are apart."""
+    return f", or the times if the samples are not {np.median(np.diff(time_s)):.3g} s apart"
 
 
 def _turning_rate(time: FloatArray, angle: FloatArray) -> tuple[FloatArray, NDArray[np.intp]]:
@@ -110,7 +115,9 @@ def _turning_rate(time: FloatArray, angle: FloatArray) -> tuple[FloatArray, NDAr
     return step / (time[later[first]] - time[first]), first
 
 
-def check_rate(rate: FloatArray, unit: Unit, rows: list[int], place: Place) -> None:
+def check_rate(
+    rate: FloatArray, unit: Unit, rows: list[int], place: Place, remedy: str = ""
+) -> None:
     """Refuses angular rates in radians that can only be degrees.
 
     Args:
@@ -118,6 +125,7 @@ def check_rate(rate: FloatArray, unit: Unit, rows: list[int], place: Place) -> N
         unit: The unit of the file; degrees are not questioned.
         rows: Line of the file of each rate.
         place: The file, run and column.
+        remedy: What else may be corrected.
 
     Raises:
         DatasetError: A tenth of the run is faster than any fish turns.
@@ -129,7 +137,7 @@ def check_rate(rate: FloatArray, unit: Unit, rows: list[int], place: Place) -> N
     if fast > FASTEST_TURNING:
         reason = f"a tenth of the run turns at {fast:.3g} rad/s or faster"
         first = int(np.argmax(np.abs(rate) > FASTEST_TURNING))
-        raise _refuse_degrees(reason, unit, place.at(rows[first]))
+        raise _refuse_degrees(reason, unit, place.at(rows[first]), remedy)
 
 
 def check_travel(
@@ -160,7 +168,7 @@ def check_travel(
         raise place.at(row).refuse(
             f"a tenth of the run moves at {fast:.3g} m/s or faster, which no such fish does",
             f"Declare a smaller unit than '{unit.name}' for it in dataset.yaml, or correct the "
-            "cells",
+            f"cells{or_clock(time_s)}",
         )
 
 
@@ -182,11 +190,12 @@ def check_progress(
         return
     spans = {name: float(np.nanmax(a) - np.nanmin(a)) for name, a in channels.items()}
     if all(span < LITTLE_WAY * units[name].factor for name, span in spans.items()):
-        name = max(spans, key=lambda n: spans[n])
-        raise place.at(column=name).refuse(
-            f"it stays within {1e3 * spans[name]:.2g} mm while the tail beats for "
-            f"{beating_s:.3g} s",
-            f"Declare the unit 'm' instead of '{units[name].name}' if the cells are in metres, or "
+        names = sorted(spans, key=lambda n: -spans[n])
+        ways = ", ".join(f"{name} {1e3 * spans[name]:.2g} mm" for name in names)
+        declared = ", ".join(dict.fromkeys(f"'{units[name].name}'" for name in names))
+        raise place.at(column=", ".join(names)).refuse(
+            f"the fish hardly moves while the tail beats for {beating_s:.3g} s: {ways}",
+            f"Declare the unit 'm' instead of {declared} where the cells are in metres, or "
             "leave out a run in which the fish is held",
         )
 

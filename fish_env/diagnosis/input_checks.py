@@ -92,7 +92,8 @@ def _check_length(place: str, run: Run) -> None:
     lasts = float(run.time_s[-1] - run.time_s[0])
     if lasts < beat:
         raise DatasetError(
-            f"{place}: lasts {lasts:.3g} s, less than one tail beat ({beat:.3g} s); leave it out"
+            f"{place}: lasts {lasts:.3g} s, less than one tail beat ({beat:.3g} s); leave it out, "
+            "or give `time` a larger unit in dataset.yaml"
         )
 
 

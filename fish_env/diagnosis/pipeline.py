@@ -23,9 +23,9 @@ from fish_env.diagnosis.report import ReportSeries, series_from, write_report
 from fish_env.diagnosis.residual_model import ResidualModel, residual_model
 from fish_env.diagnosis.result import Diagnosis
 from fish_env.diagnosis.tables.pipeline import diagnose_steady
-from fish_env.diagnosis.writing import outputs, write_answer
+from fish_env.diagnosis.writing import check_own, outputs, write_answer
 from fish_env.errors import DatasetError
-from fish_env.files import check_no_links, check_outputs
+from fish_env.files import check_outputs
 from fish_env.heap import give_back_large_arrays
 from fish_env.identification.beats import with_measured_beats
 from fish_env.identification.copies import without_copies
@@ -91,7 +91,7 @@ def diagnose(
     if out is not None:
         read = [] if isinstance(folder, Dataset | SteadyDataset) else dataset_files(folder)
         check_outputs(outputs(chosen, Path(out)), [*read, *fish_files(chosen)])
-        check_no_links(outputs(chosen, Path(out)))
+        check_own(chosen, Path(out))
     if not isinstance(dataset, Dataset):
         if measured_beats:
             raise DatasetError(f"{dataset.name}: means hold no beat; leave out --measured-beats")

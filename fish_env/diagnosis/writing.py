@@ -3,17 +3,34 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from fish_env.diagnosis.entries import FORMAT
 from fish_env.diagnosis.headline import EXPERIMENT_FILE
 from fish_env.diagnosis.written import replace_part
-from fish_env.files import write_text
+from fish_env.files import check_mark, check_no_links, write_text
 from fish_env.params.io import fish_outputs, save_fish
 from fish_env.params.schema import FishParams
+from fish_env.version import WRITER
 
-EXTENDED = "extended.yaml"
+ANSWER, REPORT, EXTENDED = "diagnosis.json", "report.html", "extended.yaml"
+FIGURES = "figures"
+PROGRAM = WRITER.split()[0]
+MARKS = {
+    ANSWER: f'"format": "{FORMAT.split("/")[0]}/',
+    REPORT: PROGRAM,
+    EXTENDED: PROGRAM,
+    EXPERIMENT_FILE: "t,",
+}
+"""File of a diagnosis -> what stands near its beginning, of whichever version."""
+FIGURE = re.compile(
+    r"(paths|budget|regimes|ranking|confusability|misfit|gain|next_experiment|steady|run_.*)"
+    r"\.(svg|png)"
+)
+"""Names of figures."""
 
 
 def outputs(fish: FishParams, folder: Path) -> list[Path]:
@@ -23,8 +40,27 @@ def outputs(fish: FishParams, folder: Path) -> list[Path]:
         fish: the fish; the extended one has the same tables.
         folder: where they go.
     """
-    names = ("diagnosis.json", "report.html", EXPERIMENT_FILE)
+    names = (ANSWER, REPORT, EXPERIMENT_FILE)
     return [*(folder / name for name in names), *fish_outputs(fish, folder / EXTENDED).values()]
+
+
+def check_own(fish: FishParams, folder: Path) -> None:
+    """Refuses a folder in which a diagnosis would replace what no diagnosis wrote.
+
+    Args:
+        fish: the fish, see :func:`outputs`.
+        folder: where the diagnosis will be written.
+
+    Raises:
+        OutputError: names a link, or a file of the user with the name of one of a diagnosis.
+    """
+    check_no_links(outputs(fish, folder))
+    for name, mark in MARKS.items():
+        check_mark(folder / name, mark)
+    for picture in sorted((folder / FIGURES).glob("*")):
+        if FIGURE.fullmatch(picture.name):
+            check_no_links([picture])
+            check_mark(picture, PROGRAM)
 
 
 def write_answer(answer: Mapping[str, Any], extended: FishParams | None, folder: Path) -> None:
@@ -40,6 +76,6 @@ def write_answer(answer: Mapping[str, Any], extended: FishParams | None, folder:
         OutputError: a file cannot be written.
     """
     text = json.dumps(answer, indent=1, allow_nan=False)
-    write_text(folder / "diagnosis.json", text + "\n")
+    write_text(folder / ANSWER, text + "\n")
     written = [] if extended is None else save_fish(extended, folder / EXTENDED)
     replace_part(folder, "extended model", written)

@@ -146,6 +146,10 @@ def load_env_config(
     _merge(tree, source or {}, label, "")
     rates = {"control": control_hz, "physics": physics_hz}
     given = {key: value for key, value in rates.items() if value is not None}
+    for key, value in given.items():
+        # The file that `source` names has no part in it.
+        if not (is_number(value) and value > 0.0):
+            raise ConfigError(f"{key}_hz {shown(value)}: a number above 0 (Hz)")
     _merge(tree["rates"], given, label, "rates.")
     return _check(tree, label)
 

@@ -11,6 +11,7 @@ import atexit
 import hashlib
 import io
 import os
+import re
 import shutil
 import stat
 import tempfile
@@ -24,6 +25,8 @@ from typing import Any
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 NAMED = "ROBOFISH_CACHE_DIR"
+_OF_FUNCTION = re.compile(r"cannot cache function '[^']*': ")
+"""How numba's reason begins."""
 _DIGEST = hashlib.sha256().digest_size
 
 
@@ -118,7 +121,8 @@ def keep_machine_code(dispatcher: Any, folder: Path | None = None) -> None:
     try:
         dispatcher._cache = KernelCache(dispatcher.py_func, folder)
     except (OSError, RuntimeError) as error:
-        _not_kept(str(error))
+        # Told once, not for each function.
+        _not_kept(_OF_FUNCTION.sub("", str(error)))
 
 
 class KernelCache(FunctionCache):

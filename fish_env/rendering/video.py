@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -37,13 +39,14 @@ def write(
         raise ConfigError(f"a video of {size[0]} x {size[1]} pixels: both must be even")
     moments = in_between(scenes, fps)
     view = View(setting, size)
-    with replacing(path) as part:
+    with replacing(path) as part, _in_one_line():
         writer = write_frames(
             str(part),
             size,
             fps=fps,
             quality=QUALITY,
             macro_block_size=2,
+            ffmpeg_log_level="quiet",
             output_params=[*ENCODER, "-metadata", f"comment={WRITER}"],
         )
         writer.send(None)
@@ -59,6 +62,17 @@ def write(
             next(opened)
             opened.close()
     return path
+
+
+@contextmanager
+def _in_one_line() -> Iterator[None]:
+    """Words the failure of ffmpeg, which imageio-ffmpeg tells with its command on many lines."""
+    try:
+        yield
+    except (OSError, RuntimeError) as error:
+        if "\n" not in str(error):
+            raise
+        raise OSError(errno.EIO, "ffmpeg ended early, perhaps on a full disk") from error
 
 
 def in_between(scenes: Sequence[Scene], fps: float) -> Iterator[Scene]:

@@ -2,6 +2,7 @@
 
 import io
 import json
+import math
 import pickle
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fish_env.archives import digest
 from fish_env.envs.layout import OBSERVATION
 from fish_env.errors import ConfigError
 from robofish_agents.policies import (
@@ -220,6 +222,27 @@ def test_a_network_that_cannot_be_is_refused(policy_file, tmp_path, broken):
     write_policy(replace(policy, network=replace(network, **wrong)), tmp_path / "wrong.npz")
     with pytest.raises(ConfigError, match="damaged"):
         read_policy(tmp_path / "wrong.npz")
+
+
+@pytest.mark.parametrize(
+    ("forged", "words"),
+    [
+        ({"low_pass_s": [math.nan]}, "history.low_pass_s"), ({"frames": 10**9}, "history.frames"),
+        ({"period_s": math.nan}, "history.period_s"), ({"limit": math.nan}, "limit of nan"),
+        ({"layers": 10**400}, "layers"), ({"card": 5}, "not iterable"),
+    ],
+)  # fmt: skip
+def test_a_forged_description_is_refused_with_its_file(policy_file, tmp_path, forged, words):
+    """Its checksum fits: whoever forges a file computes it too."""
+    arrays = dict(np.load(policy_file))
+    about = json.dumps(json.loads(str(arrays.pop("about"))) | forged, sort_keys=True)
+    del arrays["digest"]
+    file = tmp_path / "forged.npz"
+    np.savez(file, about=np.array(about), digest=np.array(digest(about, arrays)), **arrays)
+    with pytest.raises(ConfigError, match=words) as caught:
+        read_policy(file)
+    assert str(caught.value).startswith(str(file))
+    assert len(str(caught.value)) < 500
 
 
 def test_an_unknown_task_has_no_shipped_policy():

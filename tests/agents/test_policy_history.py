@@ -1,5 +1,7 @@
 """What a policy sees of the past: frames and filters, fish by fish."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -62,7 +64,17 @@ def test_the_last_observation_is_seen_with_its_own_past():
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"frames": 0}, {"frames": 51}, {"low_pass_s": (0.05,)}, {"period_s": 0.0}]
+    "wrong",
+    [
+        {"frames": 0},
+        {"frames": 51},
+        {"low_pass_s": (0.05,)},
+        {"period_s": 0.0},
+        {"low_pass_s": (math.nan,)},
+        {"low_pass_s": (math.inf,)},
+        {"period_s": math.nan},
+        {"period_s": math.inf, "low_pass_s": ()},
+    ],
 )
 def test_impossible_pasts_are_refused(wrong):
     with pytest.raises(ConfigError, match=next(iter(wrong))):

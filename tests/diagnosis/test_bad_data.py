@@ -192,7 +192,7 @@ MISLEADING: dict[str, tuple[Spoil, list[str]]] = {
     "zeros": (zeros, ["run r2", "x is stuck at 0 for 40 samples in a row", "t = 3.2 s"]),
     "stuck": (stuck, ["run r3", "q is", "30 samples in a row"]),
     "constant": (constant, ["run r1", "pitch is 0.1 in every sample"]),
-    "short": (short, ["run r4", "less than one tail beat"]),
+    "short": (short, ["run r4", "less than one tail beat", "`time` a larger unit"]),
     "renamed": (renamed, ["runs r1 and r4 have the same samples"]),
     "shifted": (shifted, ["runs r1 and r4 have the same samples"]),
     "cut": (cut, ["runs r1 and r4 have the same samples"]),

@@ -4,8 +4,9 @@ import json
 
 import pytest
 
+from fish_env.diagnosis.entries import FORMAT
 from fish_env.diagnosis.report import write_report
-from fish_env.diagnosis.writing import write_answer
+from fish_env.diagnosis.writing import FIGURE, MARKS, check_own, write_answer
 from fish_env.diagnosis.written import LIST
 from fish_env.params import load_fish
 from tests.diagnosis.report_cases import answer
@@ -35,6 +36,20 @@ def test_what_an_earlier_diagnosis_wrote_goes(folder):
     assert not (folder / "figures" / "ranking.svg").exists()
     assert not (folder / "figures" / "ranking.png").exists()
     assert list((folder / "figures").glob("*.svg"))
+
+
+def test_what_an_earlier_diagnosis_wrote_may_be_replaced(folder):
+    write_answer({"format": FORMAT}, FISH, folder)
+    (folder / "next_experiment.csv").write_text("t,tail_offset\n0,0\n")
+    # A kill leaves unfinished files, and no list.
+    (folder / "figures" / ".gain-0123.part.svg").write_text("")
+    (folder / LIST).unlink()
+    check_own(FISH, folder)
+    (folder / "figures" / ".gain-0123.part.svg").unlink()
+    assert {file.name for file in folder.glob("*.*")} >= set(MARKS)
+    figures = [file.name for file in (folder / "figures").iterdir()]
+    assert figures
+    assert all(map(FIGURE.fullmatch, figures))
 
 
 def test_what_a_user_put_there_stays(folder):

@@ -261,10 +261,10 @@ ORDINARY: dict[str, Maker] = {
 """Logs that are as they should be, to be damaged."""
 
 LOGS: dict[str, tuple[str, Maker, str]] = {
-    "a pipe": ("x.csv", os.mkfifo, "is no file"),
-    "a pipe as a bag": ("x.bag", os.mkfifo, "is no file"),
-    "a pipe as MATLAB": ("x.mat", os.mkfifo, "is no file"),
-    "a device": ("x.csv", lambda file: file.symlink_to("/dev/zero"), "is no file"),
+    "a pipe": ("x.csv", os.mkfifo, "not a file"),
+    "a pipe as a bag": ("x.bag", os.mkfifo, "not a file"),
+    "a pipe as MATLAB": ("x.mat", os.mkfifo, "not a file"),
+    "a device": ("x.csv", lambda file: file.symlink_to("/dev/zero"), "not a file"),
     "a circle of links": ("x.csv", lambda file: file.symlink_to(file), "x.csv"),
     "a wide table": ("x.csv", text(numbered(200_000)), "columns"),
     "a long name": ("x.csv", text("t," + "x " * 50_000 + "\n0,1\n1,2\n2,3\n"), "characters"),

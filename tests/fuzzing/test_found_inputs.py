@@ -16,7 +16,7 @@ from fish_env.params import load_fish
 from fish_env.simulator import Simulator
 from fish_env.steady import steady_motion
 from tests.command_line import run
-from tests.fixtures.measured_data import DESCRIPTION, good_folder
+from tests.fixtures.measured_data import DESCRIPTION, RUN, good_folder
 from tests.fuzzing.found_inputs import (
     DESCRIPTIONS,
     FISH,
@@ -58,6 +58,28 @@ def test_every_reader_refuses_what_is_no_file(reader, tmp_path):
     loop.symlink_to(loop)
     for path in (pipe, folder, loop, *map(type(tmp_path), PATHS)):
         assert fault(read, path), path
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "info --fish {}", "plot forces --fish {}", "simulate {}", "compare {}", "diagnose {}",
+        "compare msu-steady --fish {}", "replay {} --out page.html", "train {}", "sweep {}",
+        "import {} --out out", "import x.csv --mapping {} --out out", "swim --agent {}",
+        "evaluate --agent pid --suite {}", "evaluate --agent {}", "export {} --c x.h",
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("device", [False, True])
+def test_a_command_says_that_it_was_given_no_file(command, device, tmp_path, capsys, monkeypatch):
+    """It does not say that there is no such file."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "x.csv").write_text(RUN)
+    file = tmp_path / ("pipe.csv" if "import" in command else "pipe.yaml")
+    file.symlink_to("/dev/zero") if device else os.mkfifo(file)
+    status, _, error = run(capsys, *command.format(file.name).split())
+    assert status == 2
+    assert error.count("\n") == 1
+    assert "pipe or a device, not a file" in error
 
 
 @pytest.mark.parametrize("change", FISH.values(), ids=FISH)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from imageio_ffmpeg import count_frames_and_secs, read_frames
 
-from fish_env.errors import ConfigError, MissingExtraError
+from fish_env.errors import ConfigError, MissingExtraError, OutputError
 from fish_env.rendering import write_video
 from fish_env.rendering.video import in_between
 from tests.rendering.scenes import SETTING, changed, scene
@@ -60,6 +60,15 @@ def test_odd_sizes_and_frame_rates_are_refused(tmp_path):
         write_video(tmp_path / "swim.mp4", swim(), SETTING, size=(161, 120))
     with pytest.raises(ConfigError, match="fps"):
         write_video(tmp_path / "swim.mp4", swim(), SETTING, fps=0.0)
+
+
+def test_a_film_that_ffmpeg_cannot_write_is_refused_in_one_line(tmp_path, capfd):
+    """A device that is full stands for the disk."""
+    (tmp_path / "swim.mp4").symlink_to("/dev/full")
+    with pytest.raises(OutputError, match="ffmpeg ended early") as caught:
+        write_video(tmp_path / "swim.mp4", swim(), SETTING)
+    assert "\n" not in str(caught.value)
+    assert capfd.readouterr() == ("", "")
 
 
 def test_a_missing_ffmpeg_is_named(tmp_path, monkeypatch):

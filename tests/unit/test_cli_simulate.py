@@ -114,12 +114,14 @@ def test_a_fish_file_is_found_beside_the_case(tmp_path: Path) -> None:
         ({"duration_s": "5"}, ["duration_s", "finite number"]),
         ({"duration_s": True}, ["duration_s", "finite number"]),
         ({"duration_s": -1}, ["duration"]),
+        ({"duration_s": 1e12}, ["lower the duration"]),
         ({"fish": 3}, ["fish", "preset"]),
         ({"schedule": {}}, ["schedule", "list of rows"]),
         ({"schedule": []}, ["schedule is empty"]),
         ({"schedule": [{"t": 0, "tail": 1}]}, ["unknown command", "tail"]),
         ({"schedule": [{"t": 0, "tail_offset": None}]}, ["schedule[0].tail_offset"]),
         ({"schedule": [{"t": 1}, {"t": 1}]}, ["increase"]),
+        ({"schedule": [{"t": 1}] * 9999}, ["increase"]),
         ({"initial": {"euler": [0, 0, 0]}}, ["initial", "unknown key 'euler'"]),
         ({"initial": {"velocity_body": [0, 0]}}, ["initial.velocity_body", "three numbers"]),
         ({"initial": {"velocity_body": [0, 0, "a"]}}, ["initial.velocity_body[2]"]),
@@ -132,8 +134,9 @@ def test_refusals_name_file_and_key(
     case = written(tmp_path, **changes)
     with pytest.raises(ScheduleError) as caught:
         simulate_case(case, 0.01, 10.0, None)
-    for word in words:
+    for word in [case.name, *words]:
         assert word in str(caught.value)
+    assert len(str(caught.value)) < 1000
 
 
 @pytest.mark.parametrize("key", ["fish", "duration_s", "schedule"])

@@ -238,6 +238,46 @@ def test_a_clock_that_cannot_be_in_seconds_is_refused(tmp_path, capsys, subcomma
         assert words in err
 
 
+def test_a_clock_that_counts_rows_is_named(tmp_path):
+    assert "count of the rows" in refusal(good_folder(tmp_path, swim(1)))
+    assert "count of" not in refusal(good_folder(tmp_path, swim(40)))
+
+
+@pytest.mark.parametrize(
+    ("interval", "declared", "unit"),
+    [(0.04, "ms", "s"), (40, "us", "ms"), (40, "ns", "ms"), (4e4, "ns", "us"), (4e-5, "s", "s")],
+)
+def test_a_clock_that_is_quicker_than_any_log_is_refused(tmp_path, interval, declared, unit):
+    """It comes before speeds that such a clock makes impossible are taken for millimetres."""
+    text = refusal(good_folder(tmp_path, swim(interval, 600), time={"unit": declared}))
+    assert f"apart (mean) if this clock is in {declared}" in text
+    assert f"unit: {unit}}}" in text
+    assert "column t:" in text
+
+
+def test_rows_of_sensors_in_bursts_are_no_quick_clock(tmp_path):
+    lines = swim(0.02).splitlines()
+    bursts = [f"{float(a) + (0.02 - 5e-5) * (i % 2 == 0):.6f},{b}" for i, line in
+              enumerate(lines[1:]) for a, b in [line.split(",", 1)]]  # fmt: skip
+    time = first_run(good_folder(tmp_path, "\n".join([lines[0], *bursts]) + "\n")).time_s
+    assert np.diff(time).min() < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("stamp", "declared", "unit"),
+    [
+        ("170000000{:04d}", None, "ms"), ("170000000{:04d}000", None, "us"),
+        ("170000000{:04d}000000", None, "ns"), ("170000000{:04d}", "s", "ms"),
+        ("170000000{:04d}000", "ms", "us"),
+    ],
+)  # fmt: skip
+def test_the_unit_of_a_stamp_that_is_no_date_is_named(tmp_path, stamp, declared, unit):
+    time = {"column": "stamp"} | ({"unit": declared} if declared else {})
+    message = refusal(clocked(tmp_path, [stamp.format(ms) for ms in (0, 100, 250, 300)], time))
+    assert f"it looks like {unit} since 1970" in message
+    assert f"time: {{column: stamp, unit: {unit}}}" in message
+
+
 @pytest.mark.parametrize("time", [{"column": "t", "unit": "ms"}, None])
 def test_a_clock_in_its_unit_is_read(tmp_path, time):
     interval = 0.04 if time is None else 40

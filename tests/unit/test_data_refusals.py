@@ -161,6 +161,27 @@ def test_positions_in_another_unit(tmp_path, scale, unit, expected):
     assert all(words in message for words in ("run r01", "column x", expected))
 
 
+def test_positions_that_hardly_move_are_all_named(tmp_path):
+    """Which of them has the wrong unit cannot be told: a depth in cm may well stay where it is."""
+    run, changes = positions(1.0, unit="mm")
+    lines = [f"{line},{'depth' if i == 0 else 40 + i % 2}" for i, line in enumerate(run.split())]
+    changes["channels"]["depth"] = "cm"
+    message = refusal(good_folder(tmp_path, "\n".join(lines) + "\n", **changes))
+    for words in ("column depth, x", "depth 10 mm, x 0.59 mm", "'m' instead of 'cm', 'mm'"):
+        assert words in message
+
+
+def test_what_moves_too_fast_may_be_due_to_the_clock(tmp_path):
+    run, changes = positions(1000.0)
+    assert "or the times if the samples are not 0.1 s apart" in refusal(
+        good_folder(tmp_path, run, **changes)
+    )
+    yaw = "".join(f"{0.1 * i:.1f},{1.5 * (-1) ** i},0.4\n" for i in range(40))
+    _, changes = positions(1.0, "yaw", "rad")
+    message = refusal(good_folder(tmp_path, f"t,yaw,tail_amplitude\n{yaw}", **changes))
+    assert "or the times if the samples are not 0.1 s apart" in message
+
+
 def test_a_depth_above_the_surface(tmp_path):
     run, changes = positions(-1.0, "depth")
     assert "is outside -0.5 to inf" in refusal(

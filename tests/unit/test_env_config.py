@@ -84,10 +84,13 @@ def test_wrong_settings_are_refused_by_name(change, message):
 
 
 @pytest.mark.parametrize("rate", [float("inf"), float("nan"), "fast", True, -10.0])
-def test_rates_must_be_numbers(rate):
-    """The two rates that the constructor takes are checked like the file."""
-    with pytest.raises(ConfigError, match="rates"):
-        load_env_config(None, None, rate)
+def test_rates_must_be_numbers(rate, tmp_path):
+    """A rate that the constructor takes is not blamed on the file."""
+    path = tmp_path / "mine.yaml"
+    path.write_text(yaml.safe_dump({"rates": {"control": 10}}))
+    for given, name in (((path, rate), "control_hz"), ((path, None, rate), "physics_hz")):
+        with pytest.raises(ConfigError, match=f"^{name} "):
+            load_env_config(*given)
 
 
 @pytest.mark.parametrize(

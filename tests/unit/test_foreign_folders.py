@@ -81,6 +81,22 @@ def test_a_diagnosis_writes_through_no_link(name, mine, tmp_path):
     assert mine.read_text() == "of the user"
 
 
+@pytest.mark.parametrize(
+    "name",
+    [
+        "report.html", "diagnosis.json", "extended.yaml", "next_experiment.csv",
+        "figures/gain.svg", "figures/run_r01.png",
+    ],
+)  # fmt: skip
+def test_a_diagnosis_does_not_replace_a_file_of_the_user(name, tmp_path):
+    file = tmp_path / "out" / name
+    file.parent.mkdir(parents=True)
+    file.write_text("of the user")
+    with pytest.raises(OutputError, match=rf"{file.name}: this program did not write it"):
+        diagnose(good_folder(tmp_path / "data"), tmp_path / "out")
+    assert file.read_text() == "of the user"
+
+
 def test_a_campaign_does_not_replace_a_run(tmp_path):
     data = good_folder(tmp_path / "data", runs=[{"id": "a", "file": TABLE, "start": "rest"}])
     (data / "r01.csv").rename(data / TABLE)

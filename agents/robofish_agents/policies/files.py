@@ -100,6 +100,8 @@ def read_policy(path: str | Path) -> PolicyFile:
         raise ConfigError(f"{file}: its checksum does not fit; it was changed or is damaged")
     try:
         return _build(about, numbers)
+    except ConfigError as error:
+        raise ConfigError(f"{file}: {error}; it is damaged") from None
     except (KeyError, TypeError, ValueError, OverflowError) as error:
         raise ConfigError(f"{file}: {error!r} in its description; it is damaged") from None
 
@@ -146,7 +148,7 @@ def _build(about: Mapping[str, Any], arrays: Arrays) -> PolicyFile:
     )
     layers = int(about["layers"])
     if not 1 <= layers <= MOST_LAYERS:
-        raise ValueError(f"{layers} layers")
+        raise ValueError(f"{shown(layers)} layers")
     weights = tuple(arrays[f"weight_{i}"] for i in range(layers))
     biases = tuple(arrays[f"bias_{i}"] for i in range(layers))
     network = Network(

@@ -7,6 +7,7 @@ recurrent network.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -43,9 +44,9 @@ class HistorySpec:
         """
         if not 1 <= self.frames <= MOST_FRAMES:
             raise ConfigError(f"history.frames = {self.frames}: choose 1 to {MOST_FRAMES}")
-        if self.period_s <= 0.0:
+        if not 0.0 < self.period_s < math.inf:
             raise ConfigError(f"history.period_s = {self.period_s}: more than 0 s")
-        if any(constant < self.period_s for constant in self.low_pass_s):
+        if not all(self.period_s <= constant < math.inf for constant in self.low_pass_s):
             raise ConfigError(
                 f"history.low_pass_s = {list(self.low_pass_s)}: each at least the control period, "
                 f"{self.period_s:g} s"

@@ -106,7 +106,7 @@ def test_the_bonus_is_paid_within_the_limits_of_success():
     actions[10:, 1:3] = 1.0  # it swims off, so that the speed leaves its limits
     _, plain, infos = run(RoboticFish3DEnv(), actions, **options)
     _, paid, _ = run(RoboticFish3DEnv(**bonus), actions, **options)
-    inside = np.array([info["within_tolerance_s"] > 0.0 for info in infos])
+    inside = np.array([info["within_tolerance_s"] > 0.0 for info in infos[1:]])
     assert inside.any()
     assert not inside.all()
     np.testing.assert_allclose(np.subtract(paid, plain), 0.5 * inside, atol=1e-12)

@@ -134,7 +134,7 @@ def test_every_effect_has_a_small_kind():
         assert len(together_with({name})) < len(moving) / 3
     assert {group_of(e) for e in moving.values()} == set().union(*KINDS)
     loaded = {name for name, e in moving.items() if e.loaded}
-    assert {e.name for e in together_with({"servo_lag", "current"})} == set(moving) - loaded
+    assert {e.name for e in together_with({"servo_backlash", "current"})} == set(moving) - loaded
     assert loaded <= {e.name for e in together_with(loaded)}
 
 

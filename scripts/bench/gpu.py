@@ -132,7 +132,8 @@ def tried(make: Callable[[], harness.Contender]) -> Callable[[], harness.Contend
 def trainings() -> list[dict[str, Any]]:
     """Times and successes of the training on the device, under five seeds."""
     from fish_env.gpu.vector import RoboticFish3DDeviceEnv
-    from robofish_agents.training.tensor_ppo import HOLD, HOLD_FISH, success_rate, train
+    from robofish_agents.training.actor_critic import HOLD, HOLD_FISH
+    from robofish_agents.training.tensor_ppo import success_rate, train
 
     env, judge = RoboticFish3DDeviceEnv(HOLD_FISH), RoboticFish3DDeviceEnv(1024)
     train(env, HOLD.shortened(2), 0)  # compiles

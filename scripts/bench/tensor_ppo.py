@@ -15,7 +15,8 @@ from typing import Any
 import gymnasium as gym
 
 import fish_env  # noqa: F401  (registers the environment)
-from robofish_agents.training.tensor_ppo import HOLD, HOLD_FISH, HostEnv, success_rate, train
+from robofish_agents.training.actor_critic import HOLD, HOLD_FISH
+from robofish_agents.training.tensor_ppo import HostEnv, success_rate, train
 from scripts.bench.harness import machine, versions
 from scripts.results import RESULTS, write_dated
 

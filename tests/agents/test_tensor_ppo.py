@@ -9,6 +9,7 @@ from torch.distributions import Normal
 
 import fish_env  # noqa: F401  (registers the environment)
 from robofish_agents.training import tensor_ppo
+from robofish_agents.training.actor_critic import HOLD, HOLD_FISH
 from robofish_agents.training.tensor_ppo import ActorCritic, HostEnv, Recipe, Rollout
 
 
@@ -176,6 +177,6 @@ def test_an_environment_of_the_host_gives_the_same_numbers_as_tensors():
 @pytest.mark.long
 def test_the_recipe_learns_to_hold():
     """A minute or two."""
-    fish = HostEnv(vector(tensor_ppo.HOLD_FISH))
-    trained = tensor_ppo.train(fish, tensor_ppo.HOLD, seed=0)
+    fish = HostEnv(vector(HOLD_FISH))
+    trained = tensor_ppo.train(fish, HOLD, seed=0)
     assert tensor_ppo.success_rate(HostEnv(vector(256)), trained.policy, seed=1000) >= 0.95

@@ -78,7 +78,7 @@ def test_the_extended_model_swims(lagging):
 def test_nothing_is_found_where_nothing_is_hidden(tmp_path):
     small_case(tmp_path / "data", {}, runs=3, duration=8.0)
     out = tmp_path / "out"
-    write_answer({}, load_fish("zheng-2021-a"), out)  # of an earlier diagnosis
+    write_answer({"format": FORMAT}, load_fish("zheng-2021-a"), out)  # of an earlier diagnosis
     steps = []
     answer = diagnose(tmp_path / "data", out=out, quick=True, progress=steps.append)
     assert answer["verdict"] in ("no_misfit", "not_excited")

@@ -7,7 +7,7 @@ import json
 
 import pytest
 
-from robofish_agents.training import tensor_ppo
+from robofish_agents.training import actor_critic, tensor_ppo
 from scripts.bench import gpu, gpu_contenders
 
 SHORT = ["--counts", "2", "--rounds", "1", "--seconds", "0.01"]
@@ -16,9 +16,9 @@ SHORT = ["--counts", "2", "--rounds", "1", "--seconds", "0.01"]
 @pytest.fixture
 def written(monkeypatch, tmp_path):
     monkeypatch.setattr(gpu, "RESULTS", tmp_path)
-    recipe = tensor_ppo.Recipe(iterations=1, steps=2, epochs=1, minibatches=1)
-    monkeypatch.setattr(tensor_ppo, "HOLD", recipe)
-    monkeypatch.setattr(tensor_ppo, "HOLD_FISH", 2)
+    recipe = actor_critic.Recipe(iterations=1, steps=2, epochs=1, minibatches=1)
+    monkeypatch.setattr(actor_critic, "HOLD", recipe)
+    monkeypatch.setattr(actor_critic, "HOLD_FISH", 2)
     monkeypatch.setattr(gpu, "SEEDS", range(1))
     monkeypatch.setattr(tensor_ppo, "success_rate", lambda env, policy, seed: 0.5)
     monkeypatch.setattr(gpu_contenders, "mjx_swimmer", missing)

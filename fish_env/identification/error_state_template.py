@@ -41,6 +41,7 @@ from fish_env.model.history import HEARD, RECORD
 # --- end ---
 
 BLOCK = 24  # lanes: a fish's coefficients, an effect or two; 20 states; whole vector registers
+VECTOR = 4  # lanes that processors compute at once: part of a vector takes as long as all of it
 WRENCH = PAR + N_PARAMETERS - 6
 DIVERGED = 1e4
 MOST_SWING = 1.2  # swing of a soft tail over the told one, below its resonance
@@ -215,9 +216,12 @@ def initialise_effects(work):
 
 
 @kernel
-def start_effects(work, width, begin, swimming, pace, late, history, tables):
-    """Which effects are on, and their states where the start of a run or beating before it has."""
-    switch_effects(width, work)
+def start_effects(work, lanes, width, begin, swimming, pace, late, history, tables):
+    """Which effects are on, and their states where the start of a run or beating before it has.
+
+    Only so many lanes will move; the others stay where they are.
+    """
+    switch_effects(min(width, VECTOR * ((lanes + VECTOR - 1) // VECTOR)), width, work)
     initialise_effects(work)
     if swimming & past_matters(width, work):
         base = work[X0 * width : (X0 + BASE) * width].copy()

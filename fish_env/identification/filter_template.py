@@ -153,7 +153,7 @@ def ekf_run(
         load_lane(work, width, k, state0, par, 0, values[0])
     late = LATE_TAIL & (history_rows > 0)
     history = np.zeros((history_rows, width))
-    start_effects(work, width, clock[0], swimming, pace, late, history, tables)
+    start_effects(work, N_ERROR + 1, width, clock[0], swimming, pace, late, history, tables)
     channels = codes.shape[0]
     p = widened(covariance0)
     scratch, turned, s, w, seen, k_gain = room(channels)
@@ -284,7 +284,7 @@ def filter_block(
             gain[i, k], bias[i, k] = gain_all[i, lane], bias_all[i, lane]
     late = LATE_TAIL & (history_rows > 0)
     history = np.zeros((history_rows, width))
-    start_effects(work, width, clock[0], swimming, pace, late, history, tables)
+    start_effects(work, count, width, clock[0], swimming, pace, late, history, tables)
     pushed = push_basis.shape[0] > 0
     e = np.zeros((channels, width))
     white = np.zeros((channels, width))

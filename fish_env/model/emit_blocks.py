@@ -66,6 +66,7 @@ MOVED = ("body_drag", "tail_force", "wrench")
 """Stages whose hooks read the motion."""
 ARGUMENTS = "k, width, elapsed, shift, work"
 BLOCK = "width, elapsed, shift, work, tables"
+SWITCH = "lanes, width, work"
 
 
 class BlockEmitter(CornerEmitter):
@@ -75,13 +76,13 @@ class BlockEmitter(CornerEmitter):
         super().__init__(composition)
         switched = any(not effect.varies for effect in self.effects)
         self.parted = composition.common_steps and switched
-        self.flags = len(self.effects)
+        self.flags = len(self.effects) if self.parted else 0
         self.first: dict[str, int] = {}
         kept = self.flags + 4
         for name, kind in KEPT.items():
             self.first[name] = kept
             kept += len(_fields(kind))
-        self.kept = kept if self.parted else 0
+        self.kept = kept if self.parted else int(composition.common_steps)
 
     def text(self) -> str:
         """All functions of one composition."""
@@ -92,11 +93,12 @@ class BlockEmitter(CornerEmitter):
         """The derivative where all lanes compute all effects."""
         call = "lane_derivative(k, width, elapsed, shift, work, tables)"
         past = any(map(_has_past, self.effects))
+        count, told = (self.lanes, f"{self.counted} = lanes") if self.kept else ("width", "pass")
         return [
-            self.function("switch_effects", "width, work", ["pass"]),
+            self.function("switch_effects", SWITCH, [told]),
             self.function("memory_matters", "width, work", ["return N_MEMORY > 0"]),
             self.function("past_matters", "width, work", [f"return {past}"]),
-            self.function("derive_lanes", BLOCK, ["for k in range(width):", f"    {call}"]),
+            self.function("derive_lanes", BLOCK, [f"for k in range({count}):", f"    {call}"]),
         ]
 
     def in_loops(self) -> list[str]:
@@ -111,9 +113,14 @@ class BlockEmitter(CornerEmitter):
     # What is on.
 
     @property
+    def counted(self) -> str:
+        """How many lanes are computed. No compiler knows it: else it would write the loops out."""
+        return f"work[(KEPT + {self.flags}) * width]"
+
+    @property
     def lanes(self) -> str:
-        """Number of lanes, which no compiler knows: else it would write the loops out."""
-        return f"int(work[(KEPT + {self.flags}) * width])"
+        """The same as a whole number."""
+        return f"int({self.counted})"
 
     @property
     def remembering(self) -> int:
@@ -139,8 +146,11 @@ class BlockEmitter(CornerEmitter):
         return self.function(name, "width, work", [f"return work[(KEPT + {row}) * width] > 0.0"])
 
     def switching(self) -> str:
-        """Which effects are on in any lane: to be called when all lanes have their parameters."""
-        lines = [f"work[(KEPT + {self.flags}) * width] = width"]
+        """Which effects are on in any lane: to be called when all lanes have their parameters.
+
+        Lanes behind those that are computed have no slopes.
+        """
+        lines = [f"{self.counted} = lanes"]
         lines += [f"{name} = 0.0" for name in ("remembering", "past", "bent")]
         for effect in self.effects:
             lines += self.found_on(effect)
@@ -150,7 +160,7 @@ class BlockEmitter(CornerEmitter):
             lines += ["bent = max(bent, on)"] if "inertia" in effect.hooks else []
         found = {"remembering": self.remembering, "past": self.past, "bent": self.bent}
         lines += [f"work[(KEPT + {row}) * width] = {name}" for name, row in found.items()]
-        return self.function("switch_effects", "width, work", lines)
+        return self.function("switch_effects", SWITCH, lines)
 
     def found_on(self, effect: Effect) -> list[str]:
         """Whether an effect is on in any lane: whether it is not neutral there."""

@@ -28,6 +28,7 @@ from fish_env.model.composed import (
     lane_turns,
     memory_matters,
     step_in_parts,
+    switch_effects,
 )
 from fish_env.model.history import HEARD, RECORD, assume_running, recall, remember
 from fish_env.model.jit import entry_point, kernel, lean_entry_point
@@ -219,6 +220,7 @@ def advance_block(
     gather(work, width, U, 5, inputs, first, count)
     gather(work, width, SLEW, 5, slew, first, count)
     gather(work, width, PAR, N_PARAMETERS, par, first, count)
+    switch_effects(width, width, work)
     for k in range(width):
         lane = first + min(k, count - 1)
         work[TIME * width + k] = time[lane]

@@ -77,7 +77,7 @@ def block(module, effects, on, rng):
 def in_loops(module, work, tables):
     """Slopes (states, lanes) as the loops of the block find them."""
     work = work.copy()
-    module.switch_effects(WIDTH, work)
+    module.switch_effects(WIDTH, WIDTH, work)
     module.derive_lanes(WIDTH, 0.02, 0.005, work, tables)
     return slopes(module, work)
 
@@ -126,12 +126,12 @@ def test_a_block_that_overlooks_effects_is_noticed(effects, tables):
 def test_one_lane_switches_an_effect_on_for_its_block(module, effects):
     """And a memory or a past counts only where an effect with one is on."""
     work = block(module, effects, (), np.random.default_rng(0))
-    module.switch_effects(WIDTH, work)
+    module.switch_effects(WIDTH, WIDTH, work)
     assert not module.memory_matters(WIDTH, work)
     assert not module.past_matters(WIDTH, work)
     names = [f"{e.name}.{p.name}" for e in effects for p in e.parameters]
     row = module.PAR + len(RECORD_FIELDS) + names.index("servo_backlash.gap")
     work[row * WIDTH + 17] = 0.05
-    module.switch_effects(WIDTH, work)
+    module.switch_effects(WIDTH, WIDTH, work)
     assert module.memory_matters(WIDTH, work)
     assert module.past_matters(WIDTH, work)

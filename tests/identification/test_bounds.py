@@ -16,6 +16,7 @@ from fish_env.inference.estimate.bounds import (
     parameter_bounds,
 )
 from fish_env.inference.estimate.fit import fit, gauss_newton
+from fish_env.inference.estimate.slopes import Slopes
 from fish_env.inference.estimate.free import Free, objective
 from fish_env.inference.hypotheses import Coefficient
 from fish_env.inference.policy import POLICY
@@ -127,7 +128,7 @@ def test_no_fit_goes_where_no_fish_can_be():
     assert problem.baseline.all_possible(several).tolist() == [False, True, False, True]
     assert objective(problem, free, impossible, noise) == (np.inf, [])
     with pytest.raises(np.linalg.LinAlgError):
-        gauss_newton(problem, free, impossible, noise, 3, 0.1)
+        gauss_newton(problem, Slopes(free, noise), impossible, 3, 0.1)
 
 
 def test_what_is_infinite_begins_at_its_mildest_plausible_value():

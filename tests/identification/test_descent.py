@@ -101,3 +101,42 @@ def test_a_start_without_an_objective_is_an_error():
     bounds = box([-1.0], [1.0])
     with pytest.raises(np.linalg.LinAlgError, match="diverges"):
         descend(np.zeros(1), lambda x: (np.inf, None), lambda x, known: None, bounds, 3, 0.1)
+
+
+def asked_for(rough_slopes):
+    """How often a descent down the valley asks for exact slopes; where it ends."""
+    problem, count = Counted(*VALLEY), []
+
+    def exact(x, r):
+        count.append(x)
+        return problem.linearise(x, r)
+
+    limits = (box([-2.0, -2.0], [3.0, 3.0]), 60, 1e-4)
+    start = np.array([-1.2, 1.0])
+    found, _, _ = descend(start, problem.evaluate, exact, *limits, quickly=rough_slopes)
+    return len(count), found
+
+
+def test_rough_slopes_end_no_descent():
+    """It ends where exact slopes say so, and asks for fewer of them where the others are of use."""
+
+    def rough(x, r):
+        jacobian = VALLEY[1](x) + 0.3 * np.eye(2)
+        return jacobian.T @ jacobian, jacobian.T @ r
+
+    count, found = asked_for(rough)
+    np.testing.assert_allclose(found, [1.0, 1.0], atol=1e-3)
+    assert count < asked_for(None)[0] / 2
+
+
+def test_slopes_of_no_use_change_no_step():
+    """Those that lead uphill are followed nowhere, so the descent is that of exact ones alone."""
+
+    def uphill(x, r):
+        jacobian = VALLEY[1](x)
+        return jacobian.T @ jacobian, -jacobian.T @ r
+
+    count, found = asked_for(uphill)
+    alone, expected = asked_for(None)
+    assert count == alone
+    np.testing.assert_array_equal(found, expected)

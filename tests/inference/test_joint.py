@@ -9,6 +9,7 @@ import pytest
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.estimate.free import Free
 from fish_env.inference.estimate.joint import descend_jointly
+from fish_env.inference.estimate.slopes import Slopes
 from fish_env.inference.estimate.run_variation import RunVariation
 from fish_env.inference.estimate.settle import predicted_variation
 from fish_env.inference.problem import Point
@@ -73,8 +74,8 @@ class Differing(Stated):
 
 
 def descended(problem, iterations=8, start=0.0):
-    free = Free(problem, (), ())
-    return descend_jointly(problem, free, np.array([start]), Spreading(), iterations, 0.01)
+    slopes = Slopes(Free(problem, (), ()), Spreading())
+    return descend_jointly(problem, slopes, np.array([start]), iterations, 0.01)
 
 
 def likelihood_of(problem, vector):

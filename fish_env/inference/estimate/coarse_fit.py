@@ -12,12 +12,12 @@ from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.free import (
     Free,
-    linearise,
     objective_of,
     objectives_with_gains,
     quadratic,
 )
 from fish_env.inference.estimate.gauss_newton import descend
+from fish_env.inference.estimate.slopes import Slopes
 from fish_env.inference.hypotheses import Coefficient
 from fish_env.inference.problem import Point, Problem
 
@@ -112,7 +112,7 @@ class CoarseFitter:
         free = Free(few, effects, released)
         vectors = [free.bounds.clip(free.pack(start)) for start in starts]
         few, vector = self._best(few, free, vectors)
-        survey = partial(self._surveyed, few, free)
+        survey = partial(self._surveyed, few, Slopes(free, self.fit.noise))
         vector, value, _ = descend(
             vector, survey, lambda _, known: known, free.bounds, STEPS, TOLERANCE, give_up_above
         )
@@ -161,13 +161,14 @@ class CoarseFitter:
         return min(pairs, key=lambda pair: self._objectives(pair[0], free, [pair[1]])[0])
 
     def _surveyed(
-        self, problem: Problem, free: Free, vector: FloatArray
+        self, problem: Problem, slopes: Slopes, vector: FloatArray
     ) -> tuple[float, tuple[FloatArray, FloatArray]]:
         """The objective with its half Hessian and gradient, which the next step asks for.
 
         A whole step is hardly ever refused, and the slopes' lanes hold the objective's.
         """
-        lin = linearise(problem, free, vector, self.fit.noise, self.filtered, self.marginal)
+        free = slopes.free
+        lin = slopes.quick(problem, vector, self.filtered, self.marginal)
         return objective_of(problem, free, vector, lin.residuals), quadratic(free, vector, lin)
 
     def _objectives(

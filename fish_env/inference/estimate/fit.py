@@ -16,7 +16,6 @@ from fish_env.inference.estimate.covariance import sandwich
 from fish_env.inference.estimate.free import (
     Free,
     Linearised,
-    linearise,
     marginal_of,
     objective,
     objective_of,
@@ -30,6 +29,7 @@ from fish_env.inference.estimate.information import gradient, information, lever
 from fish_env.inference.estimate.joint import descend_jointly
 from fish_env.inference.estimate.run_variation import Marginal
 from fish_env.inference.estimate.settle import predicted_variation
+from fish_env.inference.estimate.slopes import Slopes
 from fish_env.inference.evaluation import Evaluation
 from fish_env.inference.hypotheses import Coefficient, ParameterId
 from fish_env.inference.policy import POLICY
@@ -194,15 +194,18 @@ def fit(
     last = noise
     for round_ in range(rounds if refit_noise else 1):
         report(f"fitting parameters, round {round_ + 1}")
-        limits = (noise, iterations, tolerance, give_up_above)
+        limits = (iterations, tolerance, give_up_above)
         try:
             begun = problem.settled(free.unpack(vector), noise)
+            slopes = Slopes(free, noise)
             if spread_of(begun, noise).any():
                 problem, vector, value, filtered, marginal = descend_jointly(
-                    begun, free, vector, *limits
+                    begun, slopes, vector, *limits
                 )
             else:
-                vector, value, filtered = gauss_newton(begun, free, vector, *limits, near=filtered)
+                vector, value, filtered = gauss_newton(
+                    begun, slopes, vector, *limits, near=filtered
+                )
                 problem = begun
         except np.linalg.LinAlgError:
             if round_ == 0:
@@ -213,27 +216,26 @@ def fit(
             break
         report(f"fitting the noise, round {round_ + 1}")
         last = noise
-        followed = partial(_leverage, problem, free, vector, noise, filtered)
+        followed = partial(_leverage, slopes, problem, vector, filtered)
         point = free.unpack(vector)
         noise = problem.fitted_noise(point, noise, round_ > 0, filtered, followed)
         if last.is_close(noise, POLICY.same_noise):
             break
     if refit_noise:
-        point = free.unpack(vector)
+        point, slopes = free.unpack(vector), Slopes(free, noise)
         # The numbers of runs were those that suit the noise before.
         problem, marginal = predicted_variation(problem, point, noise, nearby=True)
         value, filtered = objective(problem, free, vector, noise, near=filtered)
         if marginal is not None:
             marginal = marginal_of(problem, point, noise, filtered)
             value = objective_with(free, vector, filtered, marginal)
-    return _finish(problem, free, names, tuple(released), vector, noise, value, filtered, marginal)
+    return _finish(problem, slopes, names, vector, value, filtered, marginal)
 
 
 def gauss_newton(
     problem: Problem,
-    free: Free,
+    slopes: Slopes,
     vector: FloatArray,
-    noise: Any,
     iterations: int,
     tolerance: float,
     give_up_above: float = np.inf,
@@ -244,9 +246,8 @@ def gauss_newton(
 
     Args:
         problem: the problem.
-        free: its free parameters.
+        slopes: its free parameters and noise model, and the slopes on the way.
         vector: (n,) where to begin.
-        noise: noise model.
         iterations: most steps.
         tolerance: stop when no combination of parameters would move by more of its standard
             deviation.
@@ -260,24 +261,30 @@ def gauss_newton(
     Raises:
         LinAlgError: the simulation diverges where the steps begin.
     """
-    last = near
+    free, last = slopes.free, near
 
     def evaluate(at: FloatArray) -> tuple[float, Sequence[Evaluation]]:
-        return objective(problem, free, at, noise, marginal, last)
+        return objective(problem, free, at, slopes.noise, marginal, last)
 
-    def linearised(at: FloatArray, filtered: Sequence[Evaluation]) -> tuple[FloatArray, FloatArray]:
+    def exactly(at: FloatArray, filtered: Sequence[Evaluation]) -> tuple[FloatArray, FloatArray]:
         nonlocal last
         last = filtered
-        return quadratic(free, at, linearise(problem, free, at, noise, filtered, marginal))
+        return quadratic(free, at, slopes.exact(problem, at, filtered, marginal))
 
-    return descend(vector, evaluate, linearised, free.bounds, iterations, tolerance, give_up_above)
+    def quickly(at: FloatArray, filtered: Sequence[Evaluation]) -> tuple[FloatArray, FloatArray]:
+        nonlocal last
+        last = filtered
+        return quadratic(free, at, slopes.quick(problem, at, filtered, marginal))
+
+    limits = (free.bounds, iterations, tolerance, give_up_above)
+    return descend(vector, evaluate, exactly, *limits, quickly=quickly)
 
 
 def _leverage(
-    problem: Problem, free: Free, vector: FloatArray, noise: Any, filtered: Sequence[Evaluation]
+    slopes: Slopes, problem: Problem, vector: FloatArray, filtered: Sequence[Evaluation]
 ) -> FloatArray:
     """Share of each residual that the free parameters follow (D,)."""
-    return leverage(linearise(problem, free, vector, noise, filtered).slopes, free.prior)
+    return leverage(slopes.exact(problem, vector, filtered).slopes, slopes.free.prior)
 
 
 def _extrapolated(own: Fit) -> Fit:
@@ -326,16 +333,16 @@ def objective_at(
 
 def _finish(
     problem: Problem,
-    free: Free,
+    slopes: Slopes,
     effects: tuple[str, ...],
-    released: tuple[Coefficient, ...],
     vector: FloatArray,
-    noise: Any,
     value: float,
     filtered: Sequence[Evaluation],
     marginal: Marginal | None,
 ) -> Fit:
-    lin = linearise(problem, free, vector, noise, filtered, marginal)
+    free, noise = slopes.free, slopes.noise
+    released = free.released
+    lin = slopes.exact(problem, vector, filtered, marginal)
     hessian = information(lin.slopes, free.prior)
     pull = gradient(lin.slopes, lin.residuals, free.prior, vector)
     inverse = np.asarray(np.linalg.inv(hessian), float)

@@ -184,14 +184,44 @@ def linearise(
         filtered: evaluation whose weighting is held.
         marginal: integrates out what the runs differ in.
     """
+    found = residuals_and_rows(problem, free, vector, noise, filtered)
+    return linearised(problem, *found, marginal)
+
+
+def residuals_and_rows(
+    problem: Problem,
+    free: Free,
+    vector: FloatArray,
+    noise: Any,
+    filtered: Sequence[Evaluation],
+    first: int = 0,
+) -> tuple[FloatArray, FloatArray]:
+    """Residuals (D,) at a vector, and slopes (n - first, D) by its parameters from one on.
+
+    Args as for :func:`linearise`, with ``first``, number of the first parameter that has a slope.
+    """
     lanes, steps = free.lanes(vector)
-    innovations = residuals_at(problem, free, lanes, noise, filtered)
+    chosen = np.r_[0, 1 + first : lanes.shape[1]]
+    innovations = residuals_at(problem, free, lanes[:, chosen], noise, filtered)
     rows = innovations[1:]
     # In place: memory fresh from the system costs as much as the arithmetic.
     rows -= innovations[0]
-    rows /= steps[:, None]
+    rows /= steps[first:, None]
     rows[diverged(rows)] = 0.0
-    residuals = innovations[0]
+    return innovations[0], rows
+
+
+def linearised(
+    problem: Problem, residuals: FloatArray, rows: FloatArray, marginal: Marginal | None
+) -> Linearised:
+    """The linearisation from residuals (D,) and slopes (n, D), which are changed in place.
+
+    Args:
+        problem: the problem.
+        residuals: whitened.
+        rows: slopes by each free parameter.
+        marginal: integrates out what the runs differ in.
+    """
     if marginal is not None:
         residuals, rows = marginal.residuals(residuals), marginal.rows(rows)
     return Linearised(residuals, rows.T, *problem.groups(), marginal)

@@ -11,6 +11,7 @@ from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.bounds import LinearBounds
 
 T = TypeVar("T")
+Linearise = Callable[[FloatArray, T], tuple[FloatArray, FloatArray]]
 SHARES = (1.0, 0.5, 0.2)
 DAMPINGS = (0.1, 10.0)
 NEAR, SLIGHT = 1.0, 0.1
@@ -21,11 +22,12 @@ less than the second follows the objective's roughness."""
 def descend(
     start: FloatArray,
     evaluate: Callable[[FloatArray], tuple[float, T]],
-    linearise: Callable[[FloatArray, T], tuple[FloatArray, FloatArray]],
+    linearise: Linearise[T],
     bounds: LinearBounds,
     iterations: int,
     tolerance: float,
     give_up_above: float = np.inf,
+    quickly: Linearise[T] | None = None,
 ) -> tuple[FloatArray, float, T]:
     """Minimise a sum of squares, or what is nearly one.
 
@@ -40,6 +42,8 @@ def descend(
             deviation, the objective being -2 log likelihood.
         give_up_above: stop when the objective would stay above this if every step that is left
             gained the decrease predicted for the next one.
+        quickly: roughly the same as ``linearise``. Steps after the first follow it while it is of
+            use; it ends no descent that the other would go on with.
 
     Returns:
         The vector reached, the objective there, and what else was computed.
@@ -51,22 +55,28 @@ def descend(
     value, known = evaluate(vector)
     if not np.isfinite(value):
         raise np.linalg.LinAlgError("the simulation diverges at the start of the fit")
-    for left in range(iterations, 0, -1):
-        hessian, gradient = linearise(vector, known)
+    left, exact = iterations, True
+    while left:
+        found = linearise if exact or quickly is None else quickly
+        hessian, gradient = found(vector, known)
         whole = bounds.step(hessian, gradient, vector)
         predicted = predicted_decrease(hessian, gradient, whole)
-        if predicted < tolerance**2 or value - left * predicted > give_up_above:
+        if value - left * predicted > give_up_above:
             break
         before, tried = value, 0
-        for trial in _trials(hessian, gradient, vector, whole, bounds):
+        trials = _trials(hessian, gradient, vector, whole, bounds)
+        for trial in trials if predicted >= tolerance**2 else ():
             tried += 1
             trial_value, trial_known = evaluate(trial)
             if trial_value < value:
                 vector, value, known = trial, trial_value, trial_known
                 break
         rough = tried > 1 and predicted < NEAR and before - value < SLIGHT
-        if rough or value == before:
+        used_up = rough or value == before
+        left -= int(value != before)
+        if used_up and (exact or quickly is None):
             break
+        exact = used_up
     return vector, value, known
 
 

@@ -21,7 +21,6 @@ from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.free import (
     Free,
     least_of,
-    linearise,
     marginal_of,
     objective_with,
     own_objectives,
@@ -29,6 +28,7 @@ from fish_env.inference.estimate.free import (
     spread_of,
 )
 from fish_env.inference.estimate.run_variation import Marginal
+from fish_env.inference.estimate.slopes import Slopes
 from fish_env.inference.evaluation import Evaluation
 from fish_env.inference.problem import Problem
 
@@ -70,9 +70,8 @@ class Joint:
 
 def descend_jointly(
     problem: Problem,
-    free: Free,
+    slopes: Slopes,
     vector: FloatArray,
-    noise: Any,
     iterations: int,
     tolerance: float,
     give_up_above: float = np.inf,
@@ -81,9 +80,9 @@ def descend_jointly(
 
     Args:
         problem: the runs, with the numbers to begin from.
-        free: the shared parameters.
+        slopes: the shared parameters, the noise model with the spreads of the runs' numbers, and
+            the slopes on the way.
         vector: (n,) where they begin.
-        noise: noise model, with the spreads of the runs' numbers.
         iterations: most steps.
         tolerance: stop when no combination of parameters would move by more of its standard
             deviation.
@@ -96,22 +95,26 @@ def descend_jointly(
     Raises:
         LinAlgError: the simulation diverges where the steps begin.
     """
+    free, noise = slopes.free, slopes.noise
     at = _evaluated(problem, free, vector, noise)
     if not np.isfinite(at.value):
         raise np.linalg.LinAlgError("the simulation diverges at the start of the fit")
-    for left in range(iterations, 0, -1):
-        at = _agreed(at, free, noise)
-        model = _Model(free, noise, at)
-        predicted = at.value - model.foreseen(*model.step(0.0))
-        if predicted < tolerance**2 or at.value - left * predicted > give_up_above:
-            break
-        better = next(_descending(model, free, noise, at), None)
-        if better is None:
-            break
-        gained, at = at.value - better.value, better
-        if gained < max(ENOUGH, FORESEEN * predicted):
-            break
     at = _agreed(at, free, noise)
+    left, exact = iterations, True
+    while left:
+        model = _Model(slopes, at, exact)
+        predicted = at.value - model.foreseen(*model.step(0.0))
+        if at.value - left * predicted > give_up_above:
+            break
+        better = None
+        if predicted >= tolerance**2:
+            better = next(_descending(model, free, noise, at), None)
+        used_up = better is None or at.value - better.value < max(ENOUGH, FORESEEN * predicted)
+        if better is not None:
+            left, at = left - 1, _agreed(better, free, noise)
+        if used_up and exact:
+            break
+        exact = used_up
     marginal = marginal_of(at.problem, free.unpack(at.vector), noise, at.filtered)
     assert marginal is not None
     value = objective_with(free, at.vector, at.filtered, marginal)
@@ -150,8 +153,8 @@ def _agreed(at: Joint, free: Free, noise: Any) -> Joint:
 class _Model:
     """The linear model of residuals about a point, by shared parameters and by own numbers."""
 
-    def __init__(self, free: Free, noise: Any, at: Joint) -> None:
-        problem = at.problem
+    def __init__(self, slopes: Slopes, at: Joint, exact: bool) -> None:
+        problem, free, noise = at.problem, slopes.free, slopes.noise
         self.free, self.at = free, at
         self.active = np.flatnonzero(spread_of(problem, noise))
         self.spread = spread_of(problem, noise)[self.active]
@@ -159,7 +162,8 @@ class _Model:
         own = marginal_of(problem, free.unpack(at.vector), noise, at.filtered)
         assert own is not None
         self.own = own
-        self.lin = linearise(problem, free, at.vector, noise, at.filtered)
+        linearise = slopes.exact if exact else slopes.quick
+        self.lin = linearise(problem, at.vector, at.filtered)
         # A number that is held at zero is none that the shared parameters can count on.
         held = (own.at <= self.least) & (own.predicted(self.lin.residuals, 0.0, self.least) <= 0.0)
         movable = replace(own, slopes=np.where(held[own.run_of], 0.0, own.slopes))

@@ -18,6 +18,7 @@ from scipy.special import chdtri
 from fish_env.inference.estimate.fit import Fit, fit, gauss_newton
 from fish_env.inference.estimate.free import Free
 from fish_env.inference.estimate.information import information
+from fish_env.inference.estimate.slopes import Slopes
 from fish_env.inference.evaluation import Evaluation
 from fish_env.inference.hypotheses import EffectParameterId, ParameterId
 from fish_env.inference.problem import Point
@@ -160,7 +161,7 @@ def _held(own: Fit, parameter: EffectParameterId, value: float, near: Held) -> H
     vector = free.bounds.clip(free.pack(near.point))
     try:
         found, objective, filtered = gauss_newton(
-            own.problem, free, vector, own.noise, STEPS, TOLERANCE,
+            own.problem, Slopes(free, own.noise), vector, STEPS, TOLERANCE,
             marginal=own.linearised.marginal, near=near.filtered,
         )  # fmt: skip
     except np.linalg.LinAlgError:

@@ -16,8 +16,8 @@ from fish_env.inference.estimate.bounds import (
     parameter_bounds,
 )
 from fish_env.inference.estimate.fit import fit, gauss_newton
-from fish_env.inference.estimate.slopes import Slopes
 from fish_env.inference.estimate.free import Free, objective
+from fish_env.inference.estimate.slopes import Slopes
 from fish_env.inference.hypotheses import Coefficient
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point

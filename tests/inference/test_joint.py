@@ -9,9 +9,9 @@ import pytest
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.estimate.free import Free
 from fish_env.inference.estimate.joint import descend_jointly
-from fish_env.inference.estimate.slopes import Slopes
 from fish_env.inference.estimate.run_variation import RunVariation
 from fish_env.inference.estimate.settle import predicted_variation
+from fish_env.inference.estimate.slopes import Slopes
 from fish_env.inference.problem import Point
 from tests.inference.stated import Evaluated, Stated, White
 

@@ -9,6 +9,7 @@ from fish_env.data import load_dataset
 from fish_env.identification import SeriesProblem, fit
 from fish_env.inference.estimate.coarse_fit import CoarseFitter
 from fish_env.inference.estimate.free import Free, objective, objectives_with_gains
+from fish_env.inference.estimate.slopes import Slopes
 from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
 from tests.diagnosis.small_cases import small_case
@@ -73,11 +74,13 @@ def test_the_objective_that_comes_with_the_slopes_is_that_of_the_same_gains(base
     problem, free = baseline.problem, Free(baseline.problem, ["servo_lag"], ())
     fitter, tried = CoarseFitter(baseline), vectors(free, baseline)
     alone = objectives_with_gains(problem, free, tried, baseline.noise, baseline.filtered)
-    with_slopes = [fitter._surveyed(problem, free, vector)[0] for vector in tried]
+    with_slopes = [
+        fitter._surveyed(problem, Slopes(free, baseline.noise), vector)[0] for vector in tried
+    ]
     np.testing.assert_allclose(with_slopes, alone, rtol=1e-9)
     impossible = tried[0].copy()
     impossible[problem.baseline.paths.index("mass.total")] = -1e4
-    assert np.isinf(fitter._surveyed(problem, free, impossible)[0])
+    assert np.isinf(fitter._surveyed(problem, slopes, impossible)[0])
 
 
 class Counting(SeriesProblem):

@@ -21,6 +21,8 @@ from fish_env.inference.estimate.slopes import Slopes
 from fish_env.inference.hypotheses import Coefficient
 from fish_env.inference.problem import Point, Problem
 
+Quadratic = tuple[FloatArray, FloatArray]
+"""Half a Hessian (n, n) and half a gradient (n,)."""
 STEPS = 5
 TOLERANCE = 0.5
 """A coarse fit ends when no parameter moves by more of its standard deviation."""
@@ -112,10 +114,15 @@ class CoarseFitter:
         free = Free(few, effects, released)
         vectors = [free.bounds.clip(free.pack(start)) for start in starts]
         few, vector = self._best(few, free, vectors)
-        survey = partial(self._surveyed, few, Slopes(free, self.fit.noise))
+        slopes = Slopes(free, self.fit.noise)
+
+        def exactly(at: FloatArray, _: Quadratic) -> Quadratic:
+            return quadratic(free, at, slopes.exact(few, at, self.filtered, self.marginal))
+
         vector, value, _ = descend(
-            vector, survey, lambda _, known: known, free.bounds, STEPS, TOLERANCE, give_up_above
-        )
+            vector, partial(self._surveyed, few, slopes), exactly, free.bounds, STEPS, TOLERANCE,
+            give_up_above, quickly=lambda _, known: known,
+        )  # fmt: skip
         return CoarseFit(tuple(effects), tuple(released), free.unpack(vector), value)
 
     def promising(
@@ -162,8 +169,8 @@ class CoarseFitter:
 
     def _surveyed(
         self, problem: Problem, slopes: Slopes, vector: FloatArray
-    ) -> tuple[float, tuple[FloatArray, FloatArray]]:
-        """The objective with its half Hessian and gradient, which the next step asks for.
+    ) -> tuple[float, Quadratic]:
+        """The objective with roughly its half Hessian and gradient, which the next step asks for.
 
         A whole step is hardly ever refused, and the slopes' lanes hold the objective's.
         """

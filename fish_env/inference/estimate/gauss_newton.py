@@ -18,6 +18,10 @@ NEAR, SLIGHT = 1.0, 0.1
 """If the decrease predicted is below the first (in -2 log likelihood), a shortened step that gains
 less than the second follows the objective's roughness."""
 
+AS_PROMISED = 0.75
+"""Share of the predicted decrease that a step gains where the model is good (Nocedal and Wright,
+"Numerical Optimization", 2006, algorithm 4.1)."""
+
 
 def descend(
     start: FloatArray,
@@ -42,8 +46,8 @@ def descend(
             deviation, the objective being -2 log likelihood.
         give_up_above: stop when the objective would stay above this if every step that is left
             gained the decrease predicted for the next one.
-        quickly: roughly the same as ``linearise``. Steps after the first follow it while it is of
-            use; it ends no descent that the other would go on with.
+        quickly: roughly the same as ``linearise``. Steps after one that gained what was predicted
+            follow it; it ends no descent that the other would go on with.
 
     Returns:
         The vector reached, the objective there, and what else was computed.
@@ -71,12 +75,13 @@ def descend(
             if trial_value < value:
                 vector, value, known = trial, trial_value, trial_known
                 break
-        rough = tried > 1 and predicted < NEAR and before - value < SLIGHT
-        used_up = rough or value == before
-        left -= int(value != before)
-        if used_up and (exact or quickly is None):
+        gained, trusted = before - value, exact or quickly is None
+        rough = tried > 1 and predicted < NEAR and gained < SLIGHT
+        if trusted and (rough or not gained):
             break
-        exact = used_up
+        nearly_linear = gained >= AS_PROMISED * predicted
+        left -= int(trusted or nearly_linear)
+        exact = not nearly_linear
     return vector, value, known
 
 

@@ -27,6 +27,7 @@ from fish_env.inference.estimate.free import (
     quadratic,
     spread_of,
 )
+from fish_env.inference.estimate.gauss_newton import AS_PROMISED
 from fish_env.inference.estimate.run_variation import Marginal
 from fish_env.inference.estimate.slopes import Slopes
 from fish_env.inference.evaluation import Evaluation
@@ -109,12 +110,14 @@ def descend_jointly(
         better = None
         if predicted >= tolerance**2:
             better = next(_descending(model, free, noise, at), None)
-        used_up = better is None or at.value - better.value < max(ENOUGH, FORESEEN * predicted)
+        gained = 0.0 if better is None else at.value - better.value
         if better is not None:
-            left, at = left - 1, _agreed(better, free, noise)
-        if used_up and exact:
+            at = _agreed(better, free, noise)
+        if exact and gained < max(ENOUGH, FORESEEN * predicted):
             break
-        exact = used_up
+        nearly_linear = gained >= AS_PROMISED * predicted
+        left -= int(exact or nearly_linear)
+        exact = not nearly_linear
     marginal = marginal_of(at.problem, free.unpack(at.vector), noise, at.filtered)
     assert marginal is not None
     value = objective_with(free, at.vector, at.filtered, marginal)

@@ -78,7 +78,7 @@ def renumbered(
         noise: noise model.
         near: the runs filtered at numbers close by, with their slopes; what other errors do to
             samples then changes as that motion says, and where all runs keep their numbers it comes
-            nearer to what that motion says.
+            nearer to what that motion says, unless it agrees already.
 
     Raises:
         LinAlgError: a number is not finite, or the simulation diverges.
@@ -91,16 +91,20 @@ def renumbered(
     if near:
         numbered = [run.with_numbers(*n) for run, *n in zip(runs, own, errors, strict=True)]
         change = _undone if np.array_equal(values, _numbers(runs)) else _moved
-        pairs = zip(numbered, runs, near, strict=True)
-        return [change(run, before, f, problem.channels) for run, before, f in pairs]
-    changed = []
+        triples = zip(numbered, runs, near, strict=True)
+        changed = [change(run, before, f, problem.channels) for run, before, f in triples]
+        pairs = zip(runs, changed, strict=True)
+        if change is _undone and max(_apart(*p, problem.sensor_sd) for p in pairs) < AGREED:
+            return runs
+        return changed
+    other = []
     for i, run in enumerate(runs):
         if not np.array_equal(_numbers([run])[0], values[i]):
-            changed.append(i)
+            other.append(i)
             runs[i] = run.with_numbers(own[i], errors[i])
-    if not errors[changed].any():
+    if not errors[other].any():
         return runs
-    moved, seen = [runs[i] for i in changed], [problem.runs[i] for i in changed]
+    moved, seen = [runs[i] for i in other], [problem.runs[i] for i in other]
     for _ in range(MOST_TURNS):
         filtered = problem.with_runs(seen).filtered(point, noise, (), True)
         turn = zip(moved, seen, filtered, strict=True)
@@ -108,7 +112,7 @@ def renumbered(
         apart = [_apart(*p, problem.sensor_sd) for p in zip(before, seen, strict=True)]
         if max(apart) < AGREED:
             break
-    for i, run in zip(changed, seen, strict=True):
+    for i, run in zip(other, seen, strict=True):
         runs[i] = run
     return runs
 

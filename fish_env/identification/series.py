@@ -120,8 +120,9 @@ class SeriesProblem(Problem):
         return self.with_runs([run.until(end_s) for run in self.runs])
 
     def with_runs(self, runs: Sequence[RunData]) -> SeriesProblem:
-        """The same problem on other runs."""
-        return self._but(runs=tuple(runs), _filters={})
+        """The same problem on other runs; this one on its own."""
+        ours = [*map(id, runs)] == [*map(id, self.runs)]
+        return self if ours else self._but(runs=tuple(runs), _filters={})
 
     def neutral(self, names: Iterable[str]) -> dict[EffectParameterId, float]:
         """Values of effects as the fish's file has them, neutral where it says nothing."""
@@ -181,8 +182,9 @@ class SeriesProblem(Problem):
     def default_noise(self) -> NoiseModel:
         """Sensor noise from differences of the data, and a disturbance of a few millinewton."""
         noise = small_disturbance(self.sensor_sd)
-        uneven = replace(noise, phase_sd=UNEVEN_PHASE_SD, spread=USUAL)
-        return uneven if self.drive.uneven else noise
+        return (
+            replace(noise, phase_sd=UNEVEN_PHASE_SD, spread=USUAL) if self.drive.uneven else noise
+        )
 
     def fitted_noise(
         self,

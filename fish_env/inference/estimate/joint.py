@@ -147,7 +147,7 @@ def _agreed(at: Joint, free: Free, noise: Any) -> Joint:
     point = free.unpack(at.vector)
     try:
         moved = problem.with_variation(problem.variation, point, noise, at.filtered)
-        agreed = _evaluated(moved, free, at.vector, noise)
+        agreed = at if moved is problem else _evaluated(moved, free, at.vector, noise)
     except np.linalg.LinAlgError:
         return at
     return agreed if agreed.value < at.value + len(at.residuals) else at

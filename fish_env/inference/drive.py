@@ -16,6 +16,7 @@ import numpy as np
 
 from fish_env.inference.adequacy import disturbance_at_limit, implausible_estimates
 from fish_env.inference.effort import Effort
+from fish_env.inference.estimate.again import to_search
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.estimate.settle import usual_runs
 from fish_env.inference.explanation import FEW_RUNS, Explanation, fitted_again, reached
@@ -65,7 +66,7 @@ def measured(nothing: Explanation, report: Callable[[str], None]) -> Explanation
     noise = own.problem.default_noise()
     begin = [Point(z, values) for z in baselines(own)]
     # The runs' own numbers have gone far to make up for what was measured.
-    fresh = usual_runs(own.problem, begin[0], noise)
+    fresh = usual_runs(to_search(own.problem), begin[0], noise)
     few = fresh.subset(FEW_RUNS)
     tried = [reached(partial(fit, few, effects, point, noise, rounds=1)) for point in begin]
     best = min((f for f in tried if f), key=lambda f: f.objective, default=None)

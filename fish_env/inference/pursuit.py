@@ -18,6 +18,7 @@ import numpy as np
 from fish_env.arrays import FloatArray, SingleArray
 from fish_env.inference.adequacy import beyond_plausible, implausible_estimates
 from fish_env.inference.elimination import allowed_loss, insignificant, off_values
+from fish_env.inference.estimate.again import to_search
 from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
 from fish_env.inference.estimate.fit import FEWER_STEPS, Fit, fit
 from fish_env.inference.estimate.products import inner
@@ -217,7 +218,7 @@ def _fitted(current: Explanation, coarse: CoarseFit) -> Fit | None:
     In steps that are the same for all effects: finer ones, for those that are not smooth, are for
     estimates to be published.
     """
-    problem = current.fit.problem.without_refinement()
+    problem = to_search(current.fit.problem.without_refinement())
     start = (coarse.effects, coarse.point, current.fit.noise, coarse.released)
     return reached(lambda: fit(problem, *start, rounds=2, iterations=FEWER_STEPS))
 

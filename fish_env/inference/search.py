@@ -11,7 +11,7 @@ import numpy as np
 
 from fish_env.inference.adequacy import disturbance_at_limit
 from fish_env.inference.effort import FULL, Effort
-from fish_env.inference.estimate.again import search_steps
+from fish_env.inference.estimate.again import search_steps, to_search
 from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.explanation import FEW_RUNS, Explanation, fitted_again, reached
@@ -255,11 +255,9 @@ def _best_first(
 def in_full(problem: Problem, coarse: CoarseFit, noise: Any) -> Fit | None:
     """The full fit from a coarse one, first on a few runs; None where the simulation diverges.
 
-    Where each run has a drive of its own, in steps that are the same for all effects: finer ones,
-    for those that are not smooth, are for estimates to be published.
+    Where each run has a drive of its own, in the steps of a search.
     """
-    if problem.drive.uneven:
-        problem = problem.without_refinement()
+    problem = to_search(problem)
     few = problem.subset(FEW_RUNS)
     # The noise of the sensors is told in a second round only.
     rounds = 2 if few is problem else 1

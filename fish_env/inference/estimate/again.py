@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import replace
+from typing import TypeVar, cast
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from fish_env.inference.hypotheses import CauseId, of_effects
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
 
+P = TypeVar("P", bound=Problem)
 MORE = 3
 """Most fits until one is converged."""
 
@@ -72,6 +74,18 @@ def search_steps(problem: Problem) -> int:
     long, and what is still missing moves estimates by more than further steps would.
     """
     return FEWER_STEPS if problem.drive.uneven else USUAL_STEPS
+
+
+def to_search(problem: P) -> P:
+    """The problem in the steps of fits that only compare causes.
+
+    Where each run has a drive of its own such fits take longest, what is still missing moves
+    estimates by far more than long steps do, and all that is compared is in the same steps: finer
+    ones are for estimates to be published.
+    """
+    if not problem.drive.uneven:
+        return problem
+    return cast(P, problem.without_refinement().with_long_steps())
 
 
 def run_variation(own: Fit) -> Spread:

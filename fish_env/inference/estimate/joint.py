@@ -158,7 +158,7 @@ class _Model:
 
     def __init__(self, slopes: Slopes, at: Joint, exact: bool) -> None:
         problem, free, noise = at.problem, slopes.free, slopes.noise
-        self.free, self.at = free, at
+        self.free, self.at, self.exact = free, at, exact
         self.active = np.flatnonzero(spread_of(problem, noise))
         self.spread = spread_of(problem, noise)[self.active]
         self.least = least_of(problem, self.active)
@@ -206,8 +206,9 @@ class _Model:
 
 
 def _descending(model: _Model, free: Free, noise: Any, at: Joint) -> Iterator[Joint]:
-    """Points with a lower value, the boldest first."""
-    for damping, share in (*((0.0, s) for s in SHARES), *((d, 1.0) for d in DAMPINGS)):
+    """Points with a lower value, the boldest first; no damped ones by slopes that are not exact."""
+    dampings = DAMPINGS if model.exact else ()
+    for damping, share in (*((0.0, s) for s in SHARES), *((d, 1.0) for d in dampings)):
         vector, own = model.step(damping, share)
         if not at.problem.baseline.possible(vector[: free.count]):
             continue

@@ -16,7 +16,7 @@ from fish_env.arrays import FloatArray
 from fish_env.identification.filtering import Filtered, Measurement
 from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.runs import RunData
-from fish_env.identification.sensor_errors import sensor_slopes
+from fish_env.identification.sensor_errors import known_slopes
 from fish_env.identification.variation import VARIATIONS
 from fish_env.inference.problem import Point
 
@@ -126,7 +126,7 @@ def _undone(run: RunData, seen: RunData, filtered: Filtered, channels: Sequence[
         filtered: that motion, with its slopes.
         channels: names of its channels.
     """
-    slopes = sensor_slopes(seen.clock, filtered, channels, run.own_ages)
+    slopes = known_slopes(seen, filtered, channels)
     return replace(run, distortion=np.asarray(slopes @ run.sensor_errors))
 
 
@@ -139,7 +139,7 @@ def _moved(run: RunData, seen: RunData, filtered: Filtered, channels: Sequence[s
         filtered: its motion, with its slopes.
         channels: names of its channels.
     """
-    slopes = sensor_slopes(seen.clock, filtered, channels, run.own_ages)
+    slopes = known_slopes(seen, filtered, channels)
     change = slopes @ (run.sensor_errors - seen.sensor_errors)
     return replace(run, distortion=change if seen.distortion is None else seen.distortion + change)
 

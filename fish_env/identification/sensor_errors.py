@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
@@ -34,6 +35,8 @@ CUTOFF_HZ, FINE_S = 5.0, 0.004
 LATE_S = math.sqrt(2.0) / (2.0 * math.pi * CUTOFF_HZ)
 """By how much a Butterworth filter of second order makes slow signals late (s)."""
 _LOW_PASS = butter(2, CUTOFF_HZ, fs=1.0 / FINE_S, output="sos")
+_KNOWN: WeakKeyDictionary[Filtered, tuple[tuple[str | float, ...], FloatArray]]
+_KNOWN = WeakKeyDictionary()
 _INDEX = {error.name: i for i, error in enumerate(SENSOR_ERRORS)}
 _ROWS = {"velocity": [BY_NAME[n].index for n in "uvw"], "rate": [BY_NAME[n].index for n in "pqr"]}
 _ATTITUDE, _RATES, _PLACE = ("roll", "pitch", "yaw"), ("p", "q", "r"), ("x", "y", "z")
@@ -234,6 +237,28 @@ def _slopes(filtered: Filtered) -> Slopes:
     return filtered.slopes
 
 
+def known_slopes(run: RunData, filtered: Filtered, channels: Sequence[str]) -> FloatArray:
+    """Change of every sample of a run by every sensor error, shape (T, C, K), worked out once.
+
+    Every step from a filtered motion asks for it, and the linear model of these steps.
+
+    Args:
+        run: the run with the numbers that it was filtered with.
+        filtered: that, with its slopes.
+        channels: names of its channels.
+
+    Raises:
+        ValueError: the filter kept no slopes.
+        LinAlgError: the simulation has diverged.
+    """
+    key = (*channels, *run.own_ages.tolist())
+    before, found = _KNOWN.get(filtered, (None, None))
+    if found is None or before != key:
+        found = sensor_slopes(run.clock, filtered, channels, run.own_ages)
+        _KNOWN[filtered] = key, found
+    return found
+
+
 def slopes_of_runs(
     runs: Sequence[RunData],
     filtered: Sequence[Filtered],
@@ -251,7 +276,7 @@ def slopes_of_runs(
     parts = [
         innovation_slopes(
             run.clock, run.measured, one, correlation_s,
-            sensor_slopes(run.clock, one, channels, run.own_ages),
+            known_slopes(run, one, channels),
         )
         for run, one in zip(runs, filtered, strict=True)
     ]  # fmt: skip

@@ -74,9 +74,8 @@ def test_the_objective_that_comes_with_the_slopes_is_that_of_the_same_gains(base
     problem, free = baseline.problem, Free(baseline.problem, ["servo_lag"], ())
     fitter, tried = CoarseFitter(baseline), vectors(free, baseline)
     alone = objectives_with_gains(problem, free, tried, baseline.noise, baseline.filtered)
-    with_slopes = [
-        fitter._surveyed(problem, Slopes(free, baseline.noise), vector)[0] for vector in tried
-    ]
+    slopes = Slopes(free, baseline.noise)
+    with_slopes = [fitter._surveyed(problem, slopes, vector)[0] for vector in tried]
     np.testing.assert_allclose(with_slopes, alone, rtol=1e-9)
     impossible = tried[0].copy()
     impossible[problem.baseline.paths.index("mass.total")] = -1e4

@@ -102,8 +102,9 @@ def descend_jointly(
         raise np.linalg.LinAlgError("the simulation diverges at the start of the fit")
     at = _agreed(at, free, noise)
     left, exact = iterations, True
+    model: _Model | None = None
     while left:
-        model = _Model(slopes, at, exact)
+        model = _Model(slopes, at, None if exact else model)
         predicted = at.value - model.foreseen(*model.step(0.0))
         if at.value - left * predicted > give_up_above:
             break
@@ -154,19 +155,30 @@ def _agreed(at: Joint, free: Free, noise: Any) -> Joint:
 
 
 class _Model:
-    """The linear model of residuals about a point, by shared parameters and by own numbers."""
+    """The linear model of residuals about a point, by shared parameters and by own numbers.
 
-    def __init__(self, slopes: Slopes, at: Joint, exact: bool) -> None:
+    Args:
+        slopes: the shared parameters, the noise model, and the slopes on the way.
+        at: the point.
+        near: a model whose slopes by own numbers and coefficients are near enough; None to work
+            out all of them.
+    """
+
+    def __init__(self, slopes: Slopes, at: Joint, near: _Model | None) -> None:
         problem, free, noise = at.problem, slopes.free, slopes.noise
-        self.free, self.at, self.exact = free, at, exact
+        self.free, self.at, self.exact = free, at, near is None
         self.active = np.flatnonzero(spread_of(problem, noise))
         self.spread = spread_of(problem, noise)[self.active]
         self.least = least_of(problem, self.active)
-        own = marginal_of(problem, free.unpack(at.vector), noise, at.filtered)
-        assert own is not None
-        self.own = own
-        linearise = slopes.exact if exact else slopes.quick
+        linearise = slopes.exact if near is None else slopes.quick
         self.lin = linearise(problem, at.vector, at.filtered)
+        own: Marginal | None
+        if near is None:
+            own = marginal_of(problem, free.unpack(at.vector), noise, at.filtered)
+        else:
+            own = replace(near.own, at=problem.variation[:, self.active] / self.spread)
+        assert own is not None
+        self.own: Marginal = own
         # A number that is held at zero is none that the shared parameters can count on.
         held = (own.at <= self.least) & (own.predicted(self.lin.residuals, 0.0, self.least) <= 0.0)
         movable = replace(own, slopes=np.where(held[own.run_of], 0.0, own.slopes))

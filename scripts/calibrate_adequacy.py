@@ -27,7 +27,7 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "ROBOFISH_THREADS"):
 import numpy as np  # noqa: E402
 from rich.progress import track  # noqa: E402
 
-from fish_env.identification.series import Problem  # noqa: E402
+from fish_env.identification.series import SeriesProblem  # noqa: E402
 from fish_env.inference.adequacy import strongest_alarm  # noqa: E402
 from fish_env.inference.estimate.fit import fit  # noqa: E402
 from scripts.hidden_runs import hidden_runs  # noqa: E402
@@ -41,7 +41,7 @@ LEVELS = (0.8, 0.9, 0.95, 0.98)
 def ratio(seed: int) -> dict[str, object]:
     """Smallest log p-value of a case over the threshold for white residuals."""
     truth, dataset = hidden_runs(make_case, "null_strong", seed)
-    fitted = fit(Problem(dataset, None, dataset.ids[:6]), rounds=2)
+    fitted = fit(SeriesProblem(dataset, None, dataset.ids[:6]), rounds=2)
     smallest, threshold = strongest_alarm(fitted, np.random.default_rng(seed))
     return {"seed": seed, **truth.disturbance, "ratio": smallest / threshold}
 

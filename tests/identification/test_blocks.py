@@ -60,7 +60,8 @@ def block(module, effects, on, rng):
     state[:] = 0.1 * rng.standard_normal(state.shape)
     state[3:7] /= np.linalg.norm(state[3:7], axis=0)
     work[module.U : module.U + 5] = np.array([[0.1], [0.3], [1.2], [0.004], [0.1]])
-    work[module.PAST : module.PAST_END] = 0.1 * rng.standard_normal((7, WIDTH))
+    heard = work[module.PAST : module.PAST_END]
+    heard[:] = 0.1 * rng.standard_normal(heard.shape)
     parameters = work[module.PAR :]
     parameters[: len(RECORD_FIELDS)] = pack_values(as_fish("msu-tail-fish").values())
     row = len(RECORD_FIELDS)
@@ -135,3 +136,18 @@ def test_one_lane_switches_an_effect_on_for_its_block(module, effects):
     module.switch_effects(WIDTH, WIDTH, work)
     assert module.memory_matters(WIDTH, work)
     assert module.past_matters(WIDTH, work)
+
+
+@pytest.mark.parametrize("names", [(), NAMES])
+def test_lanes_behind_those_that_move_have_no_slopes(names, tables):
+    """And the others have the bits that they have in a full block."""
+    effects = tuple(effect for name, effect in catalogue().items() if name in names)
+    module = plain_module(Composition(effects).in_common_steps(TEMPLATES), {})
+    work = block(module, effects, names, np.random.default_rng(1))
+    whole = in_loops(module, work, tables)
+    part = work.copy()
+    module.switch_effects(8, WIDTH, part)
+    module.derive_lanes(WIDTH, 0.02, 0.005, part, tables)
+    np.testing.assert_array_equal(slopes(module, part)[:, :8], whole[:, :8])
+    assert not slopes(module, part)[:, 8:].any()
+    assert whole[:, 8:].any()

@@ -8,7 +8,12 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfilt
 
-from fish_env.identification.sensor_errors import LATE_S, innovation_slopes, sensor_slopes
+from fish_env.identification.sensor_errors import (
+    LATE_S,
+    innovation_slopes,
+    known_slopes,
+    sensor_slopes,
+)
 from fish_env.identification.series import SeriesProblem
 from fish_env.identification.variation import SENSOR_ERRORS
 from fish_env.inference.estimate.again import run_variation
@@ -45,6 +50,21 @@ def test_the_filter_takes_a_change_of_its_data_as_the_slopes_say(filtered, name)
     expected = size * slopes[:, k]
     assert np.linalg.norm(expected) > 0.0
     assert np.linalg.norm(after - before - expected) < 0.05 * np.linalg.norm(expected)
+
+
+def test_what_errors_do_is_worked_out_once_for_a_motion(filtered):
+    """And again for another one, or where devices have become later."""
+    problem, _, _, (result,) = filtered
+    (run,) = problem.runs
+    first = known_slopes(run, result, problem.channels)
+    np.testing.assert_array_equal(
+        first, sensor_slopes(run.clock, result, problem.channels, run.own_ages)
+    )
+    assert known_slopes(run, result, problem.channels) is first
+    late = replace(run, late=run.late + 0.05)
+    assert np.any(known_slopes(late, result, problem.channels) != first)
+    other = replace(result, states=result.states + 0.01)
+    assert np.any(known_slopes(run, other, problem.channels) != first)
 
 
 def test_samples_put_right_do_not_depend_on_the_way_there(filtered):

@@ -22,8 +22,6 @@ from fish_env.inference.starts import probed
 from fish_env.inference.substitution import in_parts, limit_at, limit_of, substituted, without
 from fish_env.inference.trials import tried_out
 
-LINEAR_DOUBT = 3.0 * POLICY.evidence_doubt
-"""Cost of a substitute in the linear model that a fit may yet make good."""
 ALONE = 3
 """Causes that are looked for one at a time, at most, while a large misfit is unexplained."""
 LIKES = 4
@@ -219,7 +217,7 @@ def _close(current: Explanation, shown: Screen) -> list[tuple[EffectName, Effect
     others: list[tuple[EffectName, EffectName]] = []
     for s in substitutes(current, shown):
         is_alike = s.name in problem.known[s.cause].confusable_with
-        if s.cost < LINEAR_DOUBT or (is_alike and problem.is_nonsmooth((s.cause, s.name))):
+        if s.cost < POLICY.linear_doubt or (is_alike and problem.is_nonsmooth((s.cause, s.name))):
             (alike if is_alike else others).append((s.cause, s.name))
     return [*alike, *others]
 

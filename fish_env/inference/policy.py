@@ -29,6 +29,8 @@ class DecisionPolicy:
         null_draws: number of draws of the smallest p-value's distribution.
         power: power at the smallest detectable sizes.
         evidence_doubt: difference of -2 log evidence below which explanations are rivals.
+        linear_doubt: difference of -2 log likelihood by which a linear model may be off where a fit
+            has yet to tell.
         disagreement: how often runs would agree on one of two explanations that predict alike.
         most_causes: largest number of causes in an explanation.
         worth_coarse_fit: statistic above which an effect is tried under relaxed noise.
@@ -76,6 +78,7 @@ class DecisionPolicy:
     evidence_doubt: float = _number(
         6.0, 0.0, 20.0, "strong evidence: Kass and Raftery (1995), JASA 90, section 3.2"
     )
+    linear_doubt: float = _number(18.0, 0.0, 100.0, EFFORT)
     disagreement: float = _number(0.05, 1e-4, 0.5, "convention (Fisher, 1925)")
     most_causes: int = _number(8, 1, 20, "specification of real robots: up to eight")
     worth_coarse_fit: float = _number(20.0, 0.0, 100.0, EFFORT)

@@ -28,8 +28,6 @@ from fish_env.inference.search import Report, at_noise, is_off
 from fish_env.inference.starts import baselines, probed
 
 Values = Mapping[EffectParameterId, float]
-STRAYED = 3.0 * POLICY.evidence_doubt
-"""What the log determinant of all estimates may change by as they move without a cause."""
 MOST_TURNS = 6
 """Sizes from which a coarse fit is tried in turn."""
 
@@ -181,7 +179,8 @@ def without(
     """
     own = current.fit
     effects, released, begin = _dropped(own, dropped)
-    enough = own.objective + least + current.narrowed_by(dropped) + STRAYED
+    # The log determinant of all estimates changes too as they move without a cause.
+    enough = own.objective + least + current.narrowed_by(dropped) + POLICY.linear_doubt
     smaller = reached(
         lambda: fit(
             own.problem, effects, begin, own.noise, released, refit_noise=False, iterations=4,

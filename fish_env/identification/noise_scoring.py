@@ -66,7 +66,10 @@ def climb(
     """
     at, here = start, replay(start)
     for _ in range(MOST_STEPS):
-        system = _system(replay, at, here, upper)
+        with np.errstate(over="ignore", invalid="ignore"):
+            system = _system(replay, at, here, upper)
+        if not np.isfinite(system.average).all():
+            break  # the simulation has all but diverged: no noise model makes up for that
         if np.any((at >= upper)[:watched] & (system.score[:watched] > BEYOND)):
             break
         low, high = np.maximum(lower - at, -LONGEST), np.minimum(upper - at, LONGEST)

@@ -1,5 +1,6 @@
 """The noise floor from data alone."""
 
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -65,6 +66,20 @@ def test_where_nothing_is_to_be_gained_it_ends_soon():
     found = fit_noise(toy((3e-3, 1e-4, 1.0), asked=asked), start, WIDE)
     assert found.force_sd == pytest.approx(3e-3, rel=0.01)
     assert len(asked) <= 5
+
+
+def test_beside_a_simulation_that_diverges_the_noise_stays_as_it_is():
+    """And nothing is printed about numbers that overflow."""
+    start, plain = NoiseModel(np.array([0.001]), 3e-3, 1e-4, 1.0), toy((0.02, 3e-4, 0.4))
+
+    def diverging(noise):
+        seen = plain(noise)
+        return replace(seen, innovations=1e200 * seen.innovations)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = fit_noise(diverging, start, WIDE)
+    assert three_sizes(found) == pytest.approx(three_sizes(start))
 
 
 def test_sensor_noise_only_goes_down_from_its_bound():

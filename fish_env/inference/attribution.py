@@ -22,6 +22,7 @@ from fish_env.inference.left_out import left_out_scores
 from fish_env.inference.many_causes import challenged, pursue
 from fish_env.inference.parallel import both, side_by_side
 from fish_env.inference.policy import POLICY
+from fish_env.inference.preconditions import Precondition, preconditions
 from fish_env.inference.probes import Cause
 from fish_env.inference.problem import Problem
 from fish_env.inference.projection import Signal
@@ -54,13 +55,14 @@ class Attribution:
 
     Attributes:
         baseline: refitted baseline.
-        first: screen of the baseline.
+        first: screen of the baseline, without what the causes change.
         shown: screen of the accepted explanation. Those between take much memory and tell no more.
         accepted: explanation of the last step (the baseline itself when nothing was added).
         rivals: explanations that fit as well as the accepted one.
         ranking: causes fitted in the first step, best first.
         gain: of all accepted causes together, in the same unit.
         failed: causes that were fitted beside the accepted ones and explained too little more.
+        preconditions: what the baseline says of each effect before any is fitted.
     """
 
     baseline: Explanation
@@ -71,6 +73,7 @@ class Attribution:
     ranking: tuple[Ranked, ...]
     gain: float
     failed: frozenset[CauseId] = frozenset()
+    preconditions: tuple[Precondition, ...] = ()
 
     @property
     def tolerated(self) -> float:
@@ -101,14 +104,30 @@ def attribute(
         effort: how much to spend.
         report: told what is being done.
     """
+    report("screening causes")
+    begun = partial(_begun, problem, baseline, causes, rng, effort, report)
+    return extended(begun(), causes, rng, effort, report)
+
+
+def _begun(
+    problem: Problem,
+    baseline: Fit,
+    causes: Sequence[Cause],
+    rng: np.random.Generator,
+    effort: Effort,
+    report: Callable[[str], None],
+) -> Attribution:
+    """What the baseline says, without a cause."""
     nothing = Explanation((), baseline)
     relax = effort.retries and disturbance_at_limit(baseline) and not problem.drive.known
-    first, _ = both(  # where the disturbance is at its limit, relaxed noise is tried in any case
-        partial(screen, baseline, causes, rng),
+    first = screen(baseline, causes, rng)
+    report("computing detectable sizes")
+    known, _ = both(  # where the disturbance is at its limit, relaxed noise is tried in any case
+        partial(preconditions, problem, first, causes, baseline if effort.retries else None),
         lambda: nothing.with_relaxed_noise if relax else None,
     )
-    begun = Attribution(nothing, first, first, nothing, (), (), 0.0)
-    return extended(begun, causes, rng, effort, report)
+    light = first.without_changes()
+    return Attribution(nothing, light, first, nothing, (), (), 0.0, preconditions=known)
 
 
 def extended(
@@ -132,6 +151,7 @@ def extended(
     """
     search = Search(causes, rng, effort, report, relaxed_log_p)
     found, together = search.hidden(search.measured(begun)), effort.retries
+    del begun  # its screen takes much memory
     while len(found.accepted.causes) < POLICY.most_causes:
         if found.accepted.causes and together:
             found, together = search.together(found), False

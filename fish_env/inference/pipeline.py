@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -25,10 +24,8 @@ from fish_env.inference.estimate.again import finished
 from fish_env.inference.estimate.fit import FEWER_STEPS, Fit, fit
 from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.gain import gap_closed
-from fish_env.inference.parallel import both
 from fish_env.inference.partial import Describe, confirmed, sustained
 from fish_env.inference.policy import POLICY
-from fish_env.inference.preconditions import preconditions
 from fish_env.inference.probes import Cause, causes_of
 from fish_env.inference.problem import Problem
 from fish_env.inference.result import ResidualModel, Result
@@ -104,15 +101,10 @@ def investigate(
         describe: models what no known cause explains; without it nothing is said of that.
     """
     problem = baseline.problem
-    report("screening causes")
     attribution = attribute(problem, baseline, causes, rng, effort, report)
-    report("computing detectable sizes")
+    shown = attribution.preconditions
     report("testing the residual")
-    where = baseline if effort.retries else None
-    left, shown = both(
-        partial(adequacy, attribution.accepted.fit, rng, attribution.tolerated),
-        partial(preconditions, problem, attribution.first, causes, where),
-    )
+    left = adequacy(attribution.accepted.fit, rng, attribution.tolerated)
     if effort.retries and left.slight and describe:
         left = cross_validated(attribution, left, describe, report)
     # A weaker cause may explain what is left, but no disturbance of implausible strength.

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.free import diverged
-from fish_env.inference.estimate.products import inner
+from fish_env.inference.estimate.products import gram, inner
 from fish_env.inference.hypotheses import Coefficient, effects_of
-from fish_env.inference.parallel import side_by_side
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause, Probe, best_of_each, effect_values, finer, of_visible
 from fish_env.inference.problem import Problem
@@ -39,6 +37,11 @@ class Screen:
     signals: tuple[Signal, ...]
     threshold: float
     level: float
+
+    def without_changes(self) -> Screen:
+        """The same tests without what each cause changes, which takes nearly all memory."""
+        signals = tuple(replace(signal, left=signal.left[:0].copy()) for signal in self.signals)
+        return replace(self, signals=signals)
 
     def best(self) -> list[Signal]:
         """The best alternative of each cause, most significant first."""
@@ -217,11 +220,9 @@ def null_threshold(
     size = rng.chisquare(freedom, POLICY.null_draws) / freedom if np.isfinite(freedom) else 1.0
     largest: dict[int, FloatArray] = {}  # statistic of as many degrees of freedom
     if effects:
-        stacked = np.concatenate([s.left for s in effects], axis=1)
-        halves = np.array_split(stacked, 2, axis=1)
-        gram = np.hstack(side_by_side(partial(inner, stacked, half) for half in halves))
-        scale = np.sqrt(np.diag(gram))
-        correlation = gram / np.outer(scale, scale)
+        products = gram([s.left for s in effects])
+        scale = np.sqrt(np.diag(products))
+        correlation = products / np.outer(scale, scale)
         values, vectors = np.linalg.eigh(correlation)
         root = vectors * np.sqrt(np.maximum(values, 0.0))
         draws = root @ rng.standard_normal((len(scale), POLICY.null_draws))

@@ -231,6 +231,8 @@ class RunData:
         long = min(long, fastest)
         longest = np.where(self.fresh, long / FINER, long)
         fewer = np.minimum(self.substeps, _steps(self.clock, longest))
+        if np.array_equal(fewer, self.substeps):
+            return self
         usual = self.substeps if self.usual_substeps is None else self.usual_substeps
         return replace(self, substeps=fewer, usual_substeps=usual)
 

@@ -121,8 +121,7 @@ class SeriesProblem(Problem):
 
     def with_runs(self, runs: Sequence[RunData]) -> SeriesProblem:
         """The same problem on other runs; this one on its own."""
-        ours = [*map(id, runs)] == [*map(id, self.runs)]
-        return self if ours else self._but(runs=tuple(runs), _filters={})
+        return self if self.runs == tuple(runs) else self._but(runs=tuple(runs), _filters={})
 
     def neutral(self, names: Iterable[str]) -> dict[EffectParameterId, float]:
         """Values of effects as the fish's file has them, neutral where it says nothing."""
@@ -347,9 +346,8 @@ class SeriesProblem(Problem):
 
     def with_refinement(self) -> SeriesProblem:
         """The same problem in usual steps, finer for effects that make the tail's rate jump."""
-        if not self.unrefined and all(run.usual_substeps is None for run in self.runs):
-            return self
-        return self.with_runs([run.in_usual_steps() for run in self.runs])._but(unrefined=False)
+        usual = self.with_runs([run.in_usual_steps() for run in self.runs])
+        return usual._but(unrefined=False) if usual.unrefined else usual
 
     def is_coarse(self, effects: Iterable[EffectParameterId]) -> bool:
         """Whether steps are longer than these effect parameters need (see the protocol)."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from fish_env.inference.estimate.again import with_run_variation
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.estimate.free import Free
 from fish_env.inference.estimate.joint import descend_jointly
@@ -198,3 +199,22 @@ def test_a_fit_keeps_the_noise_under_which_its_filter_is_stable():
     found = fit(Unstable(), noise=Spreading(), rounds=3)
     assert found.noise == Spreading()
     assert found.objective == pytest.approx(fit(Differing(), noise=Spreading()).objective, rel=1e-3)
+
+
+class Unmoved(Differing):
+    """A problem that is itself with the numbers that its runs have already."""
+
+    def with_variation(self, values, point, noise, near=()):
+        if np.array_equal(values, self.variation):
+            return self
+        return super().with_variation(values, point, noise, near)
+
+
+def test_a_spread_is_fitted_also_where_runs_begin_with_the_numbers_they_have():
+    """What runs differ in shows in the noise model, not in whether the problem is another one."""
+    own = fit(Unmoved(), noise=Spreading(spread=(0.0, 0.0)), refit_noise=False)
+    assert not own.problem.variation.any()
+    varied = with_run_variation(own)
+    assert max(varied.noise.spread) > 0.3
+    assert varied.problem.variation.any()
+    assert varied.objective < own.objective - 100.0

@@ -128,7 +128,7 @@ def with_run_variation(own: Fit, dropped: Collection[CauseId] = ()) -> Fit:
             numbers = np.where(found.sd > 0.0, problem.variation, 0.0)
             problem = problem.with_variation(numbers, own.point, own.noise)
             noise = replace(own.noise, spread=found.sd)
-    if problem is own.problem and not dropped:
+    if noise is own.noise and not dropped:
         return own
     effects = [name for name in own.effects if name not in dropped]
     start = Point(own.point.z, of_effects(own.point.effects, effects))

@@ -79,7 +79,7 @@ def descend(
         rough = tried > 1 and predicted < NEAR and gained < SLIGHT
         if trusted and (rough or not gained):
             break
-        nearly_linear = gained >= AS_PROMISED * predicted
+        nearly_linear = gained > 0.0 and gained >= AS_PROMISED * predicted
         left -= int(trusted or nearly_linear)
         exact = not nearly_linear
     return vector, value, known

@@ -116,7 +116,7 @@ def descend_jointly(
             at = _agreed(better, free, noise)
         if exact and gained < max(ENOUGH, FORESEEN * predicted):
             break
-        nearly_linear = gained >= AS_PROMISED * predicted
+        nearly_linear = gained > 0.0 and gained >= AS_PROMISED * predicted
         left -= int(exact or nearly_linear)
         exact = not nearly_linear
     marginal = marginal_of(at.problem, free.unpack(at.vector), noise, at.filtered)

@@ -152,14 +152,23 @@ def test_draws_from_the_posterior_are_other_fish_each_time(finished, tiny):
     assert np.all(abs(drawn / true - 1.0) < 0.03)
 
 
-def test_what_is_measured_does_not_give_the_answer_away(finished):
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory):
+    """The declared fish, each with what was measured of it, diagnosed by nobody; and the folder."""
+    folder, declared = tmp_path_factory.mktemp("measured"), load_declaration()
+    return [
+        (hidden, measure_and_diagnose(declared, hidden, folder / hidden.name, BLIND), folder)
+        for hidden in declared.fish
+    ]
+
+
+def test_what_is_measured_does_not_give_the_answer_away(measured):
     """Folder and names are all that a diagnosis sees."""
-    folder, record = finished
-    for entry in record["fish"]:
-        runs = folder / "work" / "fish" / entry["name"] / "runs"
-        text = (runs / "dataset.yaml").read_text()
+    for hidden, _, folder in measured:
+        text = (folder / hidden.name / "runs" / "dataset.yaml").read_text()
         assert "zheng-2021-a" in text
-        assert not any(name in text for name in entry["hidden"])
+        assert hidden.effects
+        assert not any(name in text for name in hidden.effects)
 
 
 def drift(fish) -> np.ndarray:
@@ -171,14 +180,12 @@ def drift(fish) -> np.ndarray:
     return np.array([info[key][0] for key in ("north", "east", "depth", "heading")])
 
 
-def test_the_declared_fish_load_and_swim_otherwise_than_the_printed_one(tmp_path):
+def test_the_declared_fish_load_and_swim_otherwise_than_the_printed_one(measured):
     declared = load_declaration()
     assert len(declared.fish) == len(declared.seeds) == 5
     printed = drift(declared.printed)
     assert np.array_equal(drift(load_fish(declared.printed)), printed)
-    for hidden in declared.fish:
-        folder = tmp_path / hidden.name
-        known = measure_and_diagnose(declared, hidden, folder, BLIND)
+    for hidden, known, _ in measured:
         assert set(known.truth.effects) == set(hidden.effects)
         moved = np.abs(drift(known.true) - printed)
         assert moved[:3].max() > 0.05, hidden.name

@@ -6,16 +6,21 @@ Imports inside functions run only when these are called, which for a benchmark m
 import ast
 import importlib
 import importlib.util
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
 
 import pytest
 
+from tests.docs.pages import all_blocks
+
 ROOT = Path(__file__).resolve().parents[2]
 OWN = ("fish_env", "robofish_agents", "scripts", "tests")
 LACKING = {"fish_env.model.composed"}
 """What the code generator completes."""
+SHELL_LINE = re.compile(r"^(\s*\w+ = |\s*)!.*$", re.MULTILINE)
+"""What a notebook hands to the shell."""
 FOLDERS = ("agents/robofish_agents", "examples", "fish_env", "scripts", "tests")
 FILES = [path for folder in FOLDERS for path in sorted((ROOT / folder).rglob("*.py"))]
 
@@ -68,6 +73,16 @@ def test_names_exist(folder):
         for path in FILES
         if path.is_relative_to(ROOT / folder)
         if (names := sorted(set(missing(ast.parse(path.read_text())))))
+    }
+    assert not found
+
+
+def test_names_in_the_code_of_pages_exist():
+    """Also in code that needs what the tests do not have, a GPU for one."""
+    found = {
+        block.name: names
+        for block in all_blocks("python")
+        if (names := list(missing(ast.parse(SHELL_LINE.sub(r"\1None", block.text)))))
     }
     assert not found
 

@@ -18,37 +18,19 @@ from robofish_agents.evaluation.suites import TRUST, environment_files, load_sui
 from robofish_agents.policies.history import HistorySpec
 from robofish_agents.training.schema import build
 from robofish_agents.training.settings import (
-    Critic as Critic,
-)
-from robofish_agents.training.settings import (
-    Evaluation as Evaluation,
-)
-from robofish_agents.training.settings import (
-    History as History,
-)
-from robofish_agents.training.settings import (
-    Imitation as Imitation,
+    Critic,
+    Evaluation,
+    History,
+    Imitation,
+    NetworkSettings,
+    Ppo,
+    Sac,
+    Teaching,
+    Threads,
+    check,
 )
 from robofish_agents.training.settings import (
     LearningRate as LearningRate,
-)
-from robofish_agents.training.settings import (
-    NetworkSettings as NetworkSettings,
-)
-from robofish_agents.training.settings import (
-    Ppo as Ppo,
-)
-from robofish_agents.training.settings import (
-    Sac as Sac,
-)
-from robofish_agents.training.settings import (
-    Teaching as Teaching,
-)
-from robofish_agents.training.settings import (
-    Threads as Threads,
-)
-from robofish_agents.training.settings import (
-    check,
 )
 
 SCHEDULES = ("constant", "linear")

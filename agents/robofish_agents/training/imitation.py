@@ -20,7 +20,8 @@ from torch import nn
 from fish_env.arrays import BoolArray, FloatArray
 from fish_env.envs.layout import OBSERVATION
 from fish_env.envs.registration import MAX_EPISODE_STEPS
-from robofish_agents.training.config import Imitation, TrainConfig
+from robofish_agents.training.config import TrainConfig
+from robofish_agents.training.settings import Imitation
 from robofish_agents.training.stack import Stack
 from robofish_agents.training.teacher import Teacher
 

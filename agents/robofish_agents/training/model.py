@@ -8,12 +8,12 @@ from typing import Any
 import torch
 from stable_baselines3 import PPO, SAC
 from stable_baselines3.common.utils import LinearSchedule
-from torch import nn
 
-from robofish_agents.training.config import LearningRate, TrainConfig
+from robofish_agents.training.actor_critic import ACTIVATION
+from robofish_agents.training.config import TrainConfig
+from robofish_agents.training.settings import LearningRate
 from robofish_agents.training.stack import Stack
 
-ACTIVATION = {"tanh": nn.Tanh, "relu": nn.ReLU}
 Model = PPO | SAC
 
 

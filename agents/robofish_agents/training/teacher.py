@@ -16,8 +16,8 @@ from fish_env.envs.layout import OBSERVATION, OUTPUTS
 from fish_env.envs.sb3 import FishVecEnv
 from robofish_agents.controllers.pid import PIDController
 from robofish_agents.controllers.seen import Seen
-from robofish_agents.training.config import Imitation
 from robofish_agents.training.course import Course
+from robofish_agents.training.settings import Imitation
 from robofish_agents.training.teacher_gains import TeacherGains, teacher_gains
 
 Float32Array = npt.NDArray[np.float32]
@@ -99,7 +99,7 @@ class Teacher:
 
     Args:
         parts: the fish, in the order of the observations.
-        settings: see :class:`robofish_agents.training.config.Imitation`.
+        settings: see :class:`robofish_agents.training.settings.Imitation`.
     """
 
     def __init__(self, parts: tuple[FishVecEnv, ...], settings: Imitation) -> None:

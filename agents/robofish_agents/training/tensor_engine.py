@@ -28,8 +28,9 @@ from fish_env.envs.layout import OBSERVATION
 from fish_env.envs.registration import ENV_ID
 from robofish_agents.policies.files import ACTIONS, PolicyFile
 from robofish_agents.policies.network import Network
+from robofish_agents.training.actor_critic import ActorCritic, Recipe
 from robofish_agents.training.books import Books
-from robofish_agents.training.config import LearningRate, TrainConfig
+from robofish_agents.training.config import TrainConfig
 from robofish_agents.training.learner_state import (
     optimiser_state,
     random_state,
@@ -39,10 +40,9 @@ from robofish_agents.training.learner_state import (
     weights_tensors,
 )
 from robofish_agents.training.privileged import Sight
+from robofish_agents.training.settings import LearningRate
 from robofish_agents.training.stack import Stack
 from robofish_agents.training.tensor_ppo import (
-    ActorCritic,
-    Recipe,
     Samples,
     Taken,
     follow,

@@ -16,8 +16,7 @@ from typing import Any, NamedTuple
 import torch
 from torch import Tensor, nn
 
-from robofish_agents.training.actor_critic import ActorCritic as ActorCritic
-from robofish_agents.training.actor_critic import Recipe as Recipe
+from robofish_agents.training.actor_critic import ActorCritic, Recipe
 
 
 class Rollout(NamedTuple):

@@ -11,7 +11,7 @@ from ray.rllib.core.rl_module.apis.value_function_api import ValueFunctionAPI
 from ray.rllib.core.rl_module.torch import TorchRLModule
 from torch import nn
 
-from robofish_agents.training.model import ACTIVATION
+from robofish_agents.training.actor_critic import ACTIVATION
 
 
 class FishModule(TorchRLModule, ValueFunctionAPI):  # type: ignore[misc]

@@ -90,29 +90,26 @@ def renumbered(
     own, errors = np.split(values, [len(VARIATIONS)], axis=1)
     if near:
         numbered = [run.with_numbers(*n) for run, *n in zip(runs, own, errors, strict=True)]
-        change = _undone if np.array_equal(values, _numbers(runs)) else _moved
+        kept = np.array_equal(values, _numbers(runs))
+        change = _undone if kept else _moved
         triples = zip(numbered, runs, near, strict=True)
-        changed = [change(run, before, f, problem.channels) for run, before, f in triples]
-        pairs = zip(runs, changed, strict=True)
-        if change is _undone and max(_apart(*p, problem.sensor_sd) for p in pairs) < AGREED:
-            return runs
-        return changed
-    other = []
+        found = [change(run, before, f, problem.channels) for run, before, f in triples]
+        return runs if kept and _agree(runs, found, problem.sensor_sd) else found
+    changed = []
     for i, run in enumerate(runs):
         if not np.array_equal(_numbers([run])[0], values[i]):
-            other.append(i)
+            changed.append(i)
             runs[i] = run.with_numbers(own[i], errors[i])
-    if not errors[other].any():
+    if not errors[changed].any():
         return runs
-    moved, seen = [runs[i] for i in other], [problem.runs[i] for i in other]
+    moved, seen = [runs[i] for i in changed], [problem.runs[i] for i in changed]
     for _ in range(MOST_TURNS):
         filtered = problem.with_runs(seen).filtered(point, noise, (), True)
         turn = zip(moved, seen, filtered, strict=True)
         before, seen = seen, [_undone(run, s, f, problem.channels) for run, s, f in turn]
-        apart = [_apart(*p, problem.sensor_sd) for p in zip(before, seen, strict=True)]
-        if max(apart) < AGREED:
+        if _agree(before, seen, problem.sensor_sd):
             break
-    for i, run in zip(other, seen, strict=True):
+    for i, run in zip(changed, seen, strict=True):
         runs[i] = run
     return runs
 
@@ -147,6 +144,11 @@ def _moved(run: RunData, seen: RunData, filtered: Filtered, channels: Sequence[s
 def _numbers(runs: Sequence[RunData]) -> FloatArray:
     """(R, K) numbers of runs."""
     return np.array([np.r_[run.variation, run.sensor_errors] for run in runs])
+
+
+def _agree(before: Sequence[RunData], after: Sequence[RunData], sensor_sd: FloatArray) -> bool:
+    """Whether samples of runs are the same, but for a small part of the noise (C,)."""
+    return max(_apart(*pair, sensor_sd) for pair in zip(before, after, strict=True)) < AGREED
 
 
 def _apart(before: RunData, after: RunData, sensor_sd: FloatArray) -> float:

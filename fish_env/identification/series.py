@@ -181,9 +181,8 @@ class SeriesProblem(Problem):
     def default_noise(self) -> NoiseModel:
         """Sensor noise from differences of the data, and a disturbance of a few millinewton."""
         noise = small_disturbance(self.sensor_sd)
-        return (
-            replace(noise, phase_sd=UNEVEN_PHASE_SD, spread=USUAL) if self.drive.uneven else noise
-        )
+        uneven = replace(noise, phase_sd=UNEVEN_PHASE_SD, spread=USUAL)
+        return uneven if self.drive.uneven else noise
 
     def fitted_noise(
         self,

@@ -104,9 +104,8 @@ def attribute(
         effort: how much to spend.
         report: told what is being done.
     """
-    report("screening causes")
-    begun = partial(_begun, problem, baseline, causes, rng, effort, report)
-    return extended(begun(), causes, rng, effort, report)
+    usual = (causes, rng, effort, report)
+    return extended(_begun(problem, baseline, *usual), *usual)
 
 
 def _begun(
@@ -120,6 +119,7 @@ def _begun(
     """What the baseline says, without a cause."""
     nothing = Explanation((), baseline)
     relax = effort.retries and disturbance_at_limit(baseline) and not problem.drive.known
+    report("screening causes")
     first = screen(baseline, causes, rng)
     report("computing detectable sizes")
     known, _ = both(  # where the disturbance is at its limit, relaxed noise is tried in any case

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import replace
-from typing import TypeVar, cast
 
 import numpy as np
 
@@ -17,7 +16,6 @@ from fish_env.inference.hypotheses import CauseId, of_effects
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
 
-P = TypeVar("P", bound=Problem)
 MORE = 3
 """Most fits until one is converged."""
 
@@ -76,7 +74,7 @@ def search_steps(problem: Problem) -> int:
     return FEWER_STEPS if problem.drive.uneven else USUAL_STEPS
 
 
-def to_search(problem: P) -> P:
+def to_search(problem: Problem) -> Problem:
     """The problem in the steps of fits that only compare causes.
 
     Where each run has a drive of its own such fits take longest, what is still missing moves
@@ -85,7 +83,7 @@ def to_search(problem: P) -> P:
     """
     if not problem.drive.uneven:
         return problem
-    return cast(P, problem.without_refinement().with_long_steps())
+    return problem.without_refinement().with_long_steps()
 
 
 def run_variation(own: Fit) -> Spread:

@@ -16,13 +16,11 @@ from fish_env.inference.estimate.free import (
     objectives_with_gains,
     quadratic,
 )
-from fish_env.inference.estimate.gauss_newton import descend
+from fish_env.inference.estimate.gauss_newton import Quadratic, descend
 from fish_env.inference.estimate.slopes import Slopes
 from fish_env.inference.hypotheses import Coefficient
 from fish_env.inference.problem import Point, Problem
 
-Quadratic = tuple[FloatArray, FloatArray]
-"""Half a Hessian (n, n) and half a gradient (n,)."""
 STEPS = 5
 TOLERANCE = 0.5
 """A coarse fit ends when no parameter moves by more of its standard deviation."""

@@ -24,7 +24,7 @@ from fish_env.inference.estimate.free import (
     residuals_at,
     spread_of,
 )
-from fish_env.inference.estimate.gauss_newton import descend
+from fish_env.inference.estimate.gauss_newton import Linearise, Quadratic, descend
 from fish_env.inference.estimate.information import gradient, information, leverage, prior_precision
 from fish_env.inference.estimate.joint import descend_jointly
 from fish_env.inference.estimate.run_variation import Marginal
@@ -266,17 +266,16 @@ def gauss_newton(
     def evaluate(at: FloatArray) -> tuple[float, Sequence[Evaluation]]:
         return objective(problem, free, at, slopes.noise, marginal, last)
 
-    def exactly(at: FloatArray, filtered: Sequence[Evaluation]) -> tuple[FloatArray, FloatArray]:
-        nonlocal last
-        last = filtered
-        return quadratic(free, at, slopes.exact(problem, at, filtered, marginal))
+    def modelled(linearise: Callable[..., Linearised]) -> Linearise[Sequence[Evaluation]]:
+        def model(at: FloatArray, filtered: Sequence[Evaluation]) -> Quadratic:
+            nonlocal last
+            last = filtered
+            return quadratic(free, at, linearise(problem, at, filtered, marginal))
 
-    def quickly(at: FloatArray, filtered: Sequence[Evaluation]) -> tuple[FloatArray, FloatArray]:
-        nonlocal last
-        last = filtered
-        return quadratic(free, at, slopes.quick(problem, at, filtered, marginal))
+        return model
 
     limits = (free.bounds, iterations, tolerance, give_up_above)
+    exactly, quickly = modelled(slopes.exact), modelled(slopes.quick)
     return descend(vector, evaluate, exactly, *limits, quickly=quickly)
 
 

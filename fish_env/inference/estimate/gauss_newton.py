@@ -11,13 +11,14 @@ from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.bounds import LinearBounds
 
 T = TypeVar("T")
-Linearise = Callable[[FloatArray, T], tuple[FloatArray, FloatArray]]
+Quadratic = tuple[FloatArray, FloatArray]
+"""Half a Hessian (n, n), positive definite, and half a gradient (n,)."""
+Linearise = Callable[[FloatArray, T], Quadratic]
 SHARES = (1.0, 0.5, 0.2)
 DAMPINGS = (0.1, 10.0)
 NEAR, SLIGHT = 1.0, 0.1
 """If the decrease predicted is below the first (in -2 log likelihood), a shortened step that gains
 less than the second follows the objective's roughness."""
-
 AS_PROMISED = 0.75
 """Share of the predicted decrease that a step gains where the model is good (Nocedal and Wright,
 "Numerical Optimization", 2006, algorithm 4.1)."""
@@ -75,13 +76,13 @@ def descend(
             if trial_value < value:
                 vector, value, known = trial, trial_value, trial_known
                 break
-        gained, trusted = before - value, exact or quickly is None
+        gained = before - value
         rough = tried > 1 and predicted < NEAR and gained < SLIGHT
-        if trusted and (rough or not gained):
+        if exact and (rough or not gained):
             break
         nearly_linear = gained > 0.0 and gained >= AS_PROMISED * predicted
-        left -= int(trusted or nearly_linear)
-        exact = not nearly_linear
+        left -= int(exact or nearly_linear)
+        exact = quickly is None or not nearly_linear
     return vector, value, known
 
 

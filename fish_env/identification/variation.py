@@ -14,6 +14,7 @@ import numpy as np
 
 from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.run_variation import RunVariation
+from fish_env.inference.hypotheses import EffectParameterId as Shared
 from fish_env.params.packing import RECORD_FIELDS
 from fish_env.sensing.devices import Device, devices_of
 
@@ -22,16 +23,16 @@ USUAL_BEAT, USUAL_SAG = 4e-3, 3e-4
 Within these a beat that runs share is none: a narrower spread about what combs have found would
 take the mean of their errors for a cause."""
 VARIATIONS = (
-    RunVariation("trim_x", "m", 1e-4),
-    RunVariation("trim_y", "m", 1e-4),
-    RunVariation("trim_z", "m", 1e-4),
-    RunVariation("buoyancy", "kg", 4e-4),
-    RunVariation("gyro_zero_p", "rad/s", 5e-3),
-    RunVariation("gyro_zero_q", "rad/s", 5e-3),
-    RunVariation("gyro_zero_r", "rad/s", 5e-3),
-    RunVariation("clock_offset", "s", 1e-2),
-    RunVariation("beat", "1", USUAL_BEAT),
-    RunVariation("beat_sag", "1/s", USUAL_SAG),
+    RunVariation("trim_x", "m", 1e-4, beside=Shared("com_offset", "x")),
+    RunVariation("trim_y", "m", 1e-4, beside=Shared("com_offset", "y")),
+    RunVariation("trim_z", "m", 1e-4, beside=Shared("com_offset", "z")),
+    RunVariation("buoyancy", "kg", 4e-4, beside=Shared("buoyancy_offset", "mass")),
+    RunVariation("gyro_zero_p", "rad/s", 5e-3, beside=Shared("gyro_bias", "p")),
+    RunVariation("gyro_zero_q", "rad/s", 5e-3, beside=Shared("gyro_bias", "q")),
+    RunVariation("gyro_zero_r", "rad/s", 5e-3, beside=Shared("gyro_bias", "r")),
+    RunVariation("clock_offset", "s", 1e-2, beside=Shared("sensor_delay", "delay")),
+    RunVariation("beat", "1", USUAL_BEAT, beside=Shared("frequency_scale", "scale")),
+    RunVariation("beat_sag", "1/s", USUAL_SAG, beside=Shared("battery_sag", "rate")),
     RunVariation("camera_delay", "s", 0.02, shared=True, positive=True),
     RunVariation("inertial_delay", "s", 0.03, shared=True, positive=True),
     RunVariation("depth_delay", "s", 0.02, shared=True, positive=True),
@@ -67,8 +68,8 @@ SENSOR_ERRORS = (
     RunVariation("camera_pitch", "rad", DEGREE, shared=True),
     RunVariation("camera_scale_per_depth", "1/m", 0.15, shared=True),
     RunVariation("inertial_smoothing", "1", 1.0, shared=True, positive=True),
-    RunVariation("current_north", "m/s", 4e-3),
-    RunVariation("current_east", "m/s", 4e-3),
+    RunVariation("current_north", "m/s", 4e-3, beside=Shared("current", "north")),
+    RunVariation("current_east", "m/s", 4e-3, beside=Shared("current", "east")),
 )
 """Usual sizes: a centimetre, a degree, one per cent, all that a low-pass of 5 Hz inside an inertial
 unit takes away beside making it late; the picture of a camera some metres above the water shrinks

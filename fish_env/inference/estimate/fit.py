@@ -16,7 +16,6 @@ from fish_env.inference.estimate.covariance import sandwich
 from fish_env.inference.estimate.free import (
     Free,
     Linearised,
-    marginal_of,
     objective,
     objective_of,
     objective_with,
@@ -227,7 +226,7 @@ def fit(
         problem, marginal = predicted_variation(problem, point, noise, nearby=True)
         value, filtered = objective(problem, free, vector, noise, near=filtered)
         if marginal is not None:
-            marginal = marginal_of(problem, point, noise, filtered)
+            marginal = slopes.marginal(problem, vector, filtered)
             value = objective_with(free, vector, filtered, marginal)
     return _finish(problem, slopes, names, vector, value, filtered, marginal)
 

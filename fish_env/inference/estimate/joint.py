@@ -21,7 +21,6 @@ from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.free import (
     Free,
     least_of,
-    marginal_of,
     objective_with,
     own_objectives,
     quadratic,
@@ -119,7 +118,7 @@ def descend_jointly(
         nearly_linear = gained > 0.0 and gained >= AS_PROMISED * predicted
         left -= int(exact or nearly_linear)
         exact = not nearly_linear
-    marginal = marginal_of(at.problem, free.unpack(at.vector), noise, at.filtered)
+    marginal = slopes.marginal(at.problem, at.vector, at.filtered)
     assert marginal is not None
     value = objective_with(free, at.vector, at.filtered, marginal)
     return at.problem, at.vector, value, at.filtered, marginal
@@ -174,9 +173,10 @@ class _Model:
         self.lin = linearise(problem, at.vector, at.filtered)
         own: Marginal | None
         if near is None:
-            own = marginal_of(problem, free.unpack(at.vector), noise, at.filtered)
+            own = slopes.marginal(problem, at.vector, at.filtered)
         else:
-            own = replace(near.own, at=problem.variation[:, self.active] / self.spread)
+            moved = replace(near.own, at=problem.variation[:, self.active] / self.spread)
+            own = slopes.alike(moved, problem, self.lin)
         assert own is not None
         self.own: Marginal = own
         # A number that is held at zero is none that the shared parameters can count on.

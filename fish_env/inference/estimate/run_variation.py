@@ -10,8 +10,8 @@ conditional estimation as in Lindstrom and Bates (1990), Biometrics 46, 673.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -20,6 +20,7 @@ from scipy.special import chdtrc
 
 from fish_env.arrays import FloatArray, IntArray
 from fish_env.inference.estimate.box_qp import minimise_in_box
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.policy import POLICY
 
 CHANCE, UNTOLD = 0.05, 0.5
@@ -41,6 +42,7 @@ class RunVariation:
             count as variation: what all runs have in common is a cause, to be found and named.
             What they may share is not taken to be far beyond the usual, which again is a cause.
         positive: whether it cannot be negative: no device shows what has yet to happen.
+        beside: parameter of an effect that is what runs have of it in common, if there is one.
     """
 
     name: str
@@ -48,6 +50,7 @@ class RunVariation:
     usual: float
     shared: bool = False
     positive: bool = False
+    beside: EffectParameterId | None = None
 
     @property
     def largest(self) -> float:
@@ -109,6 +112,24 @@ class Marginal:
     def _slices(self) -> list[slice]:
         edges = np.searchsorted(self.run_of, np.arange(len(self.at) + 1))
         return [slice(a, b) for a, b in pairwise(edges.tolist())]
+
+    def alike(self, pairs: Iterable[tuple[int, FloatArray]]) -> Marginal:
+        """The same with slopes of own numbers in proportion to those by what runs share.
+
+        Water that drifts in all runs and in one of them does the same to that run, and no data tell
+        the two apart. Slopes that were worked out in two ways differ a little, and very accurate
+        data then seem to: what runs share would be known better than as a mean over so many runs,
+        and steps to it would be too short.
+
+        Args:
+            pairs: number of a column, and slopes (D,) by the parameter that it is beside.
+        """
+        slopes = self.slopes.copy()
+        for column, shared in pairs:
+            size = shared @ shared
+            if size > 0.0:
+                slopes[:, column] = shared * (shared @ slopes[:, column] / size)
+        return replace(self, slopes=slopes)
 
     def rows(self, rows: FloatArray) -> FloatArray:
         """Rows (m, D) of residuals or of their changes, whitened with the variation in place."""

@@ -17,7 +17,14 @@ from typing import Any
 import numpy as np
 
 from fish_env.arrays import FloatArray
-from fish_env.inference.estimate.free import Free, Linearised, linearised, residuals_and_rows
+from fish_env.inference.estimate.free import (
+    Free,
+    Linearised,
+    linearised,
+    marginal_of,
+    residuals_and_rows,
+    spread_of,
+)
 from fish_env.inference.estimate.run_variation import Marginal
 from fish_env.inference.evaluation import Evaluation
 from fish_env.inference.problem import Problem
@@ -90,3 +97,34 @@ class Slopes:
         residuals, rows = residuals_and_rows(*at, first=count)
         rows = np.concatenate([self._last.rows[:count], rows])
         return linearised(problem, residuals, rows, marginal)
+
+    def marginal(
+        self, problem: Problem, vector: FloatArray, filtered: Sequence[Evaluation]
+    ) -> Marginal | None:
+        """How to integrate out what the runs differ in; None where they do not.
+
+        Slopes by a number that is beside a free parameter are those by the parameter. Args as for
+        :meth:`exact`.
+        """
+        found = marginal_of(problem, self.free.unpack(vector), self.noise, filtered)
+        if found is None or not self._beside(problem):
+            return found
+        return self.alike(found, problem, self.exact(problem, vector, filtered))
+
+    def alike(self, marginal: Marginal, problem: Problem, lin: Linearised) -> Marginal:
+        """What runs differ in beside free parameters with the slopes by these.
+
+        Args:
+            marginal: integrates out what the runs differ in.
+            problem: the problem.
+            lin: slopes with nothing integrated out.
+        """
+        pairs = self._beside(problem)
+        return marginal.alike((own, lin.slopes[:, i]) for own, i in pairs) if pairs else marginal
+
+    def _beside(self, problem: Problem) -> list[tuple[int, int]]:
+        """Pairs of an active number of runs and the free parameter that it is beside."""
+        active = np.flatnonzero(spread_of(problem, self.noise)).tolist()
+        at = {id: i for i, id in enumerate(self.free.ids)}
+        beside = enumerate(problem.variations[i].beside for i in active)
+        return [(own, at[id]) for own, id in beside if id is not None and id in at]

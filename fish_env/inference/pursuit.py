@@ -264,7 +264,8 @@ def _together(
 ) -> CoarseFit | None:
     """The coarse fit with all effects at once; None where the simulation diverges.
 
-    It begins from their sizes in the linear model, and from their mildest settings.
+    It begins from their sizes in the linear model, from their mildest settings, or from where they
+    hardly act: several at once, each of a size that shows, may be far worse than none.
     """
     base = current.fit
     sizes = {pick.signal.cause.effect: pick for pick in picks}
@@ -276,7 +277,8 @@ def _together(
     mild = dict(base.point.effects)
     for name in causes:
         mild |= probed(base.problem, signals[name])[0]
-    begin = [Point(base.point.z, {**mild, **linear}), Point(base.point.z, mild)]
+    faint = {**base.problem.beginning(causes), **base.point.effects}
+    begin = [Point(base.point.z, values) for values in ({**mild, **linear}, mild, faint)]
     effects = (*base.effects, *causes)
     return reached(lambda: CoarseFitter(base).coarse_fit(effects, base.released, begin))
 

@@ -7,7 +7,7 @@ from a lag of some size and under a small disturbance its few steps end far belo
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 
 from fish_env.inference.adequacy import beyond_plausible
@@ -18,17 +18,24 @@ from fish_env.inference.hypotheses import EffectName, EffectParameterId, listed
 from fish_env.inference.parallel import side_by_side
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point
+from fish_env.inference.projection import Signal
 from fish_env.inference.screening import Screen
+from fish_env.inference.search import is_off
 from fish_env.inference.starts import probed
 
 STEPS = 4
 """Of each trial: a lag that is right is found in three."""
+CLOSE = 2
+"""Effects that are fitted to all runs, at most."""
 
 
 def tried_out(
     current: Explanation, shown: Screen, report: Callable[[str], None]
 ) -> Explanation | None:
     """The explanation with the hidden effect that explains most; None where none explains more.
+
+    Lags of different kinds explain nearly alike. Those whose few steps end close to the best are
+    fitted to all runs.
 
     Args:
         current: causes accepted so far, beside a large misfit.
@@ -41,23 +48,51 @@ def tried_out(
     if not hidden or not swamped:
         return None
     report(f"trying {listed(s.cause.id for s in hidden)} one at a time")
-    tasks = [partial(_trial, current, "", {})]
+    closest = _promising(current, hidden)
+    if closest:
+        report(f"fitting {listed(closest)}, each alone")
+    whole = [partial(_in_all_runs, current, name, own) for name, own in closest.items()]
+    fitted = [more for more in side_by_side(whole) if more]
+    best = min(fitted, key=lambda more: more.score, default=current)
+    return best if best.score < current.score - POLICY.evidence_doubt else None
+
+
+def _promising(current: Explanation, hidden: Sequence[Signal]) -> dict[EffectName, Fit]:
+    """The few trials to go on from. The others take much memory, and end here."""
+    problem = current.fit.problem
     begun = [(s.cause.effect, values) for s in hidden for values in probed(problem, s)]
-    tasks += [partial(_trial, current, *begin) for begin in begun]
+    tasks = [partial(_trial, current, *begin) for begin in [("", {}), *begun]]
     without, *found = side_by_side(tasks)
-    best = min((f for f in found if f), key=lambda f: f.objective, default=None)
-    if best is None:
+    return _closest(current, without, [f for f in found if f])
+
+
+def _closest(
+    current: Explanation, without: Fit | None, found: Sequence[Fit]
+) -> dict[EffectName, Fit]:
+    """The trial that explains most, and one of another effect that explains nearly as much."""
+    best: dict[EffectName, Fit] = {}
+    for own in sorted(found, key=lambda own: own.objective):
+        (name,) = map(EffectName, {*own.effects} - {*current.fit.effects})
+        best.setdefault(name, own)
+    if not best:
+        return {}
+    least = next(iter(best.values())).objective
+    if without is None:
+        return dict(list(best.items())[:1])
+    if least > without.objective - POLICY.evidence_doubt:
+        return {}
+    enough = least + POLICY.coarse_fit_behind * (without.objective - least)
+    return {name: own for name, own in list(best.items())[:CLOSE] if own.objective <= enough}
+
+
+def _in_all_runs(current: Explanation, name: EffectName, own: Fit) -> Explanation | None:
+    """The explanation with one more effect, from its trial; None where the fit is of no use."""
+    problem = current.fit.problem
+    fresh = usual_runs(problem, own.point, own.noise)
+    whole = fitted_again(fresh, own, own.noise)
+    if whole is None or beyond_plausible(whole, name) or is_off(problem, whole.point, name):
         return None
-    if without and best.objective > without.objective - POLICY.evidence_doubt:
-        return None
-    (name,) = map(EffectName, {*best.effects} - {*current.fit.effects})
-    report(f"fitting {name}")
-    fresh = usual_runs(problem, best.point, best.noise)
-    whole = fitted_again(fresh, best, best.noise)
-    if whole is None or beyond_plausible(whole, name):
-        return None
-    more = Explanation((*current.causes, name), whole)
-    return more if more.score < current.score - POLICY.evidence_doubt else None
+    return Explanation((*current.causes, name), whole)
 
 
 def _trial(current: Explanation, name: str, values: dict[EffectParameterId, float]) -> Fit | None:

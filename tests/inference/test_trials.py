@@ -1,10 +1,12 @@
 """Effects that an uneven drive hides are tried in fits of their own."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from fish_env.inference.estimate.fit import fit
-from fish_env.inference.explanation import Explanation
+from fish_env.inference.explanation import FEW_RUNS, Explanation
 from fish_env.inference.probes import causes_of
 from fish_env.inference.screening import screen
 from fish_env.inference.trials import tried_out
@@ -48,6 +50,48 @@ def test_an_effect_without_a_slope_is_found():
 
 def test_nothing_is_found_where_nothing_is_late():
     assert found_in(problem(late=0.0)) is None
+
+
+def alike(seed=1):
+    """A lag, and another that in the runs of a trial acts nearly so, and fits a little better."""
+    rng = np.random.default_rng(seed)
+    x, y, more = rng.standard_normal((3, RUNS, SAMPLES))
+    noise = rng.standard_normal((RUNS, SAMPLES))
+    tried = np.isin(np.arange(RUNS), Stated(lambda z, e: x).spread(FEW_RUNS))[:, None]
+    other = np.where(tried, x + 0.1 * more, y)
+    acts = np.where(tried, other, x)
+
+    def residuals(z, effects):
+        late, like = effects[size_of(LATE)] ** 2, effects[size_of(OTHER)] ** 2
+        return noise + 40.0 * (0.25 * acts - late * x - like * other) - z[0] * y
+
+    stated = Stated(residuals, (effect(LATE, lower=0.0), effect(OTHER, lower=0.0)))
+    stated.hidden_by_drive, stated.drive = (LATE, OTHER), Drive(uneven=True)
+    stated.swamped = lambda noise: True
+    return stated
+
+
+def test_lags_that_explain_alike_are_compared_on_all_runs():
+    told = []
+    assert found_in(alike(), told).causes == (LATE,)
+    assert told[-1] == f"fitting {OTHER}, {LATE}, each alone"
+
+
+def test_an_effect_that_ends_switched_off_is_no_cause():
+    """Coefficients of a nominal vehicle may lead further; what that gains is not the effect's."""
+    stated = problem(late=0.0)
+    shown_in = np.isin(np.arange(RUNS), stated.spread(FEW_RUNS))[:, None]
+    x = np.random.default_rng(2).standard_normal((RUNS, SAMPLES))
+    noise = np.random.default_rng(3).standard_normal((RUNS, SAMPLES))
+    # The runs of a trial show it, the other one the contrary, which no size of it explains.
+    asked = np.where(shown_in, 0.1, -1.0) * x
+    stated.residuals = lambda z, effects: noise + 10.0 * (asked - effects[size_of(LATE)] ** 2 * x)
+    begun = fit(stated)
+    far = Explanation((), replace(begun, objective=begun.objective + 1e4))
+    shown = screen(begun, causes_of(stated), np.random.default_rng(0))
+    told = []
+    assert tried_out(far, shown, told.append) is None
+    assert told[-1] == f"fitting {LATE}, each alone"
 
 
 @pytest.mark.parametrize("settings", [{"uneven": False}, {"swamped": False}])

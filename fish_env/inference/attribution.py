@@ -18,6 +18,7 @@ from fish_env.inference.estimate.again import to_publish
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.hypotheses import CauseId, Coefficient
+from fish_env.inference.lags import asked_again
 from fish_env.inference.left_out import left_out_scores
 from fish_env.inference.many_causes import challenged, pursue
 from fish_env.inference.parallel import both, side_by_side
@@ -179,9 +180,12 @@ def settled(found: Attribution, thoroughly: bool, report: Callable[[str], None])
     current, unnecessary = backward_elimination(found.accepted)
     failed = found.failed if current.causes == found.accepted.causes else frozenset()
     # What else is missing moves estimates by more than a few steps more would.
+    alike: tuple[Explanation, ...] = ()
     if current.causes and thoroughly and not disturbance_at_limit(current.fit):
-        current = _published(current, report)
-    rivals = (*found.rivals, *unnecessary)
+        searched, current = current.fit.problem, _published(current, report)
+        if searched.drive.uneven:
+            current, alike = asked_again(current, found.shown, report)
+    rivals = (*found.rivals, *unnecessary, *alike)
     if thoroughly and rivals:
         rivals = tuple(side_by_side([partial(without_idle, e) for e in rivals]))
     # A rival that contains the accepted causes is no rival once a cause is dropped.

@@ -10,6 +10,7 @@ import numpy as np
 from fish_env.inference.adequacy import disturbance_at_limit
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import CauseId, Coefficient, EffectName
+from fish_env.inference.lags import look_alikes
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause
 from fish_env.inference.problem import Problem
@@ -193,7 +194,7 @@ def challenged(
     close = _close(current, shown)
     pairs_of = (zip(current.causes, e.causes, strict=False) for e in rivals)
     earlier = [(a, b) for pairs in pairs_of for a, b in pairs if a != b]
-    first = [*_of_drive(current), *_of_lags(current), *replaced]
+    first = [*_of_drive(current), *look_alikes(current), *replaced]
     tried = [*first, *[*earlier, *each_in_turn(close)][:MOST]]
     pairs = [(c, signals[n]) for c, n in dict.fromkeys(tried) if n in signals and c in known]
     best, *others = substituted(current, pairs, POLICY.most_challenges, report)
@@ -227,28 +228,11 @@ def _of_drive(current: Explanation) -> list[tuple[EffectName, EffectName]]:
     problem = current.fit.problem
     return [
         (cause, name)
-        for cause in _effects(current)
-        if cause in problem.drive.effects
+        for cause in current.causes
+        if cause in problem.drive.effects and not isinstance(cause, Coefficient)
         for name in problem.out_of_step
         if name in problem.known[cause].confusable_with and name not in current.causes
     ]
-
-
-def _of_lags(current: Explanation) -> list[tuple[EffectName, EffectName]]:
-    """What makes a drive late, each with what else may: short lags differ little but in name.
-
-    The linear model is of no help. It begins from sizes at which the one follows another course
-    than the other.
-    """
-    problem = current.fit.problem
-    others = [name for name in problem.hidden_by_drive if name not in current.causes]
-    lags = [cause for cause in _effects(current) if cause in problem.hidden_by_drive]
-    return [(c, n) for c in lags for n in others if n in problem.known[c].confusable_with]
-
-
-def _effects(current: Explanation) -> list[EffectName]:
-    """Those of the causes that are effects."""
-    return [cause for cause in current.causes if not isinstance(cause, Coefficient)]
 
 
 def each_in_turn(

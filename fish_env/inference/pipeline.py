@@ -24,12 +24,14 @@ from fish_env.inference.estimate.again import finished
 from fish_env.inference.estimate.fit import FEWER_STEPS, Fit, fit
 from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.gain import gap_closed
+from fish_env.inference.lags import undecided
 from fish_env.inference.partial import Describe, confirmed, sustained
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause, causes_of
 from fish_env.inference.problem import Problem
 from fish_env.inference.result import ResidualModel, Result
 from fish_env.inference.screening import screen
+from fish_env.inference.substitution import without
 from fish_env.inference.verdict import EXTENDING, Verdict, decide
 
 Report = Callable[[str], None]
@@ -166,7 +168,10 @@ def partly(
     """
     found = confirmed(attribution.accepted, left.threshold, report)
     found = sustained(found, rng, report) if found else None
-    if found is None:
+    if found and disturbance_at_limit(found.fit):
+        doubtful = undecided(found, attribution.shown, report)
+        found = without(found, doubtful) if doubtful else found
+    if found is None or not found.causes:
         return attribution, verdict
     rivals = tuple(e for e in attribution.rivals if len(e.causes) == len(found.causes))
     return replace(attribution, accepted=found, rivals=rivals), Verdict("partial", found.causes)

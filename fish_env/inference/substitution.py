@@ -56,13 +56,13 @@ def substituted(
     fitter = CoarseFitter(own)
     leeway = dict.fromkeys((name for name, _ in pairs), POLICY.coarse_fit_leeway)
     if beside_misfit:
-        leeway = {name: max(least, _part(fitter, name)) for name, least in leeway.items()}
+        leeway = {name: max(least, what_may_lack(fitter, name)) for name, least in leeway.items()}
     found: list[tuple[float, tuple[CauseId, ...], CoarseFit]] = []
     for name, signal in pairs:
         report(f"trying {signal.cause.effect} instead of {name_of(name)}")
         causes = tuple(signal.cause.id if c == name else c for c in current.causes)
         enough = fitter.base + leeway[name]
-        coarse = _swapped(fitter, own, name, signal, enough)
+        coarse = swapped(fitter, own, name, signal, enough)
         if coarse is None or coarse.objective >= enough:
             continue
         if limit_at(own.problem, signal.cause.effect, coarse.point.effects) != name:
@@ -82,13 +82,13 @@ def substituted(
     return sorted(found_all, key=lambda e: e.score)
 
 
-def _part(fitter: CoarseFitter, name: CauseId) -> float:
+def what_may_lack(fitter: CoarseFitter, name: CauseId) -> float:
     """The part of what a cause explains in a coarse fit that a finalist may lack."""
     left = coarse_without(fitter, name)
     return np.inf if left is None else POLICY.coarse_fit_behind * (left.objective - fitter.base)
 
 
-def _swapped(
+def swapped(
     fitter: CoarseFitter, own: Fit, name: CauseId, signal: Signal, enough: float
 ) -> CoarseFit | None:
     """The coarse fit with one effect in place of another, from all its sizes.

@@ -1,0 +1,69 @@
+"""Lags that look alike: asked again in published steps, and not named where nothing decides."""
+
+import numpy as np
+import pytest
+
+from fish_env.inference.estimate.fit import fit
+from fish_env.inference.explanation import Explanation
+from fish_env.inference.lags import asked_again, look_alikes, undecided
+from fish_env.inference.probes import causes_of
+from fish_env.inference.screening import screen
+from fish_env.inference.vehicle import Drive
+from tests.inference.stated import Stated, effect, size_of
+
+RUNS, SAMPLES = 4, 60
+LAG, LIMIT = "lag", "limit"
+
+
+def problem(share, lag=0.5, limit=0.0):
+    """Runs in which one of two lags acts, or both.
+
+    Args:
+        share: how much of the one is like the other, as a correlation.
+        lag: size of the first.
+        limit: size of the second.
+    """
+    rng = np.random.default_rng(1)
+    x, own, y = rng.standard_normal((3, RUNS, SAMPLES))
+    noise = rng.standard_normal((RUNS, SAMPLES))
+    like = share * x + np.sqrt(1.0 - share**2) * own
+
+    def residuals(z, effects):
+        left = (lag - effects[size_of(LAG)]) * x + (limit - effects[size_of(LIMIT)]) * like
+        return noise + 20.0 * left - z[0] * y
+
+    known = (effect(LAG, confusable_with=(LIMIT,)), effect(LIMIT, confusable_with=(LAG,)))
+    stated = Stated(residuals, known)
+    stated.hidden_by_drive, stated.drive = (LAG, LIMIT), Drive(uneven=True)
+    return stated
+
+
+def explained(stated, name):
+    """A fit with one of the lags, and what its screen shows of the other."""
+    current = Explanation((name,), fit(stated, [name]))
+    return current, screen(current.fit, causes_of(stated), np.random.default_rng(0))
+
+
+def test_each_lag_is_compared_with_those_known_to_look_like_it():
+    current, _ = explained(problem(0.9), LIMIT)
+    assert look_alikes(current) == [(LIMIT, LAG)]
+
+
+def test_the_lag_that_fits_best_takes_the_place_of_another():
+    best, alike = asked_again(*explained(problem(0.9), LIMIT), [].append)
+    assert best.causes == (LAG,)
+    assert alike == ()
+
+
+def test_lags_that_fit_alike_are_rivals():
+    best, alike = asked_again(*explained(problem(1.0 - 1e-6), LAG), [].append)
+    assert {best.causes, *(e.causes for e in alike)} == {(LAG,), (LIMIT,)}
+
+
+@pytest.mark.parametrize(("share", "lags"), [(0.95, {LAG}), (0.5, set())])
+def test_beside_the_unknown_only_a_lag_that_none_can_replace_is_named(share, lags):
+    told = []
+    assert undecided(*explained(problem(share), LAG), told.append) == lags
+    assert told == [
+        f"rejecting {name}: {LIMIT} explains nearly as much in its place" for name in lags
+    ]

@@ -58,8 +58,11 @@ def asked_again(
     Each lag that looks like one of its causes takes its place in a fit of a few steps to a few
     runs: where runs differ in all they have, a coarse fit, which holds that, tells too little.
 
+    One that was found in long steps and diverges in those of published estimates leaves its place
+    to any that does not.
+
     Args:
-        current: causes with their fit, in the steps of published estimates.
+        current: causes with their fit, in the steps of published estimates if it has one in them.
         shown: causes that are not among them.
         report: told what is being done.
     """
@@ -68,10 +71,12 @@ def asked_again(
         return current, ()
     report(f"fitting {listed(closest.causes, ' and ')}")
     own = current.fit
-    whole = at_noise(own.problem, closest.fit, own.noise, STEPS)
+    whole = at_noise(own.problem.with_refinement(), closest.fit, own.noise, STEPS)
     if whole is None:
         return current, ()
     other = Explanation(closest.causes, whole)
+    if own.problem.is_coarse(own.point.effects):
+        return Explanation(other.causes, finished(whole)), ()
     best, last = sorted((current, other), key=lambda e: e.score)
     if best is other:
         best = Explanation(best.causes, finished(whole))
@@ -81,11 +86,9 @@ def asked_again(
 def _closest(current: Explanation, shown: Screen, report: Report) -> Explanation | None:
     """The best explanation of a few runs with another lag; None where none fits them as well."""
     own = current.fit
-    few, pairs = own.problem.subset(FEW_RUNS), _pairs(current, shown)
+    few, pairs = own.problem.with_refinement().subset(FEW_RUNS), _pairs(current, shown)
     usual = at_noise(few, own, own.noise, STEPS) if pairs else None
-    if usual is None:
-        return None
-    best, enough = None, usual.objective + POLICY.evidence_doubt
+    best, enough = None, usual.objective + POLICY.evidence_doubt if usual else np.inf
     for cause, signal in pairs:
         report(f"trying {signal.cause.effect} instead of {name_of(cause)}")
         found = at_noise(few, _in_place(own, cause, signal), own.noise, STEPS, enough)

@@ -60,6 +60,30 @@ def test_lags_that_fit_alike_are_rivals():
     assert {best.causes, *(e.causes for e in alike)} == {(LAG,), (LIMIT,)}
 
 
+class LongSteps(Stated):
+    """A problem in steps of a search, in which a fit of the published ones may diverge."""
+
+    published: Stated
+
+    def is_coarse(self, effects):
+        return True
+
+    def with_refinement(self):
+        return self.published
+
+
+def test_a_lag_that_diverges_in_published_steps_leaves_its_place():
+    usual = problem(0.9)
+    usual.diverging = lambda effects, noise: size_of(LIMIT) in effects
+    long = problem(0.9)
+    long.__class__ = LongSteps
+    long.published = usual
+    best, alike = asked_again(*explained(long, LIMIT), [].append)
+    assert best.causes == (LAG,)
+    assert best.fit.problem is usual
+    assert alike == ()
+
+
 @pytest.mark.parametrize(("share", "lags"), [(0.95, {LAG}), (0.5, set())])
 def test_beside_the_unknown_only_a_lag_that_none_can_replace_is_named(share, lags):
     told = []

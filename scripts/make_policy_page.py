@@ -1,42 +1,36 @@
-"""Writes the tables of docs/policy.md from the policy itself."""
+"""Writes the tables of docs/policy.md from the policies themselves."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-from fish_env.inference.policy import POLICY, DecisionPolicy
+from fish_env.inference.policy import POLICY
+from fish_env.inference.policy_numbers import Numbers
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "policy.md"
-BEGIN, END = "<!-- policy -->\n", "<!-- end of policy -->\n"
+POLICIES: dict[str, Numbers] = {"inference": POLICY}
 
 
 def main() -> None:
-    PAGE.write_text(with_table(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    PAGE.write_text(with_tables(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
 
 
-def with_table(page: str) -> str:
-    """The page with its table made anew."""
-    before, rest = page.split(BEGIN)
-    return f"{before}{BEGIN}\n{table()}\n{END}{rest.split(END)[1]}"
+def with_tables(page: str) -> str:
+    """The page with its tables made anew."""
+    for name, policy in POLICIES.items():
+        begin, end = f"<!-- {name} -->\n", f"<!-- end of {name} -->\n"
+        before, rest = page.split(begin)
+        page = f"{before}{begin}\n{table_of(policy)}\n{end}{rest.split(end)[1]}"
+    return page
 
 
-def table() -> str:
-    """Name, value, meaning and source of every number."""
-    meanings = _meanings()
+def table_of(policy: Numbers) -> str:
+    """Name, value, meaning and source of every number of a policy."""
+    meanings = policy.meanings()
     rows = ["| number | value | what it decides | source |", "| --- | ---: | --- | --- |"]
-    for name, value, source in POLICY.table():
+    for name, value, source in policy.table():
         rows.append(f"| `{name}` | {value:.4g} | {meanings[name]} | {source} |")
     return "\n".join(rows) + "\n"
-
-
-def _meanings() -> dict[str, str]:
-    """What the class says of each number."""
-    text = (DecisionPolicy.__doc__ or "").split("Attributes:")[1]
-    found: dict[str, str] = {}
-    for line in text.strip().splitlines():
-        name, _, meaning = line.strip().partition(": ")
-        found[name] = meaning.rstrip(".")
-    return found
 
 
 if __name__ == "__main__":

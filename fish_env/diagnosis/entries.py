@@ -24,6 +24,7 @@ from fish_env.inference.hypotheses import (
     ParameterId,
     name_of,
 )
+from fish_env.inference.policy import POLICY
 from fish_env.inference.preconditions import Precondition
 from fish_env.inference.vehicle import Coefficients, Effect
 
@@ -178,7 +179,7 @@ def residual_entry(model: ResidualModel | None) -> Plain | None:
 
 
 def _term(term: Term) -> Plain:
-    half = float(ndtri(0.975)) * term.error
+    half = float(ndtri(POLICY.interval_ends[1])) * term.error
     return {
         "direction": term.direction,
         "depends_on": term.function,

@@ -117,13 +117,13 @@ def disturbance_at_limit(fit: Fit) -> tuple[str, ...]:
 def implausible_estimates(fit: Fit) -> tuple[Implausible, ...]:
     """Implausible estimates of causes: something similar acts instead.
 
-    A coefficient is implausible more than :data:`FAR_OFF` prior deviations off, or at its physical
-    bound. Beside an effect :data:`EXTREME_PRIOR_SD` is enough: such a coefficient compensates for
-    what the effect does not do; alone it may be an error in the parameter file. A coefficient that
-    does the same as an effect may go as far as the effect.
+    A coefficient is implausible more than ``implausible_prior_sd`` prior deviations off, or at its
+    physical bound. Beside an effect ``extreme_prior_sd`` is enough: such a coefficient compensates
+    for what the effect does not do; alone it may be an error in the parameter file. A coefficient
+    that does the same as an effect may go as far as the effect.
 
-    An effect is implausible with a sign that it cannot have, :data:`FAR_OFF` times as strong as the
-    strongest plausible one, or with a shape far from the plausible ones.
+    An effect is implausible with a sign that it cannot have, ``implausible_prior_sd`` times as
+    strong as the strongest plausible one, or with a shape far from the plausible ones.
     """
     effects_too = {Coefficient(p) for effect in fit.problem.known.values() for p in effect.equals}
     farthest = POLICY.extreme_prior_sd if fit.effects else POLICY.implausible_prior_sd
@@ -175,7 +175,7 @@ def _out_of_place(parameter: EffectParameter, value: float) -> bool:
     off = value - 0.5 * (low + high)
     if not np.isfinite(parameter.neutral):
         off = min(off, 0.0) if parameter.neutral > 0.0 else max(off, 0.0)
-    return bool(abs(off) > 1.5 * (high - low))
+    return bool(abs(off) > POLICY.shape_reach * (high - low))
 
 
 def _beyond(

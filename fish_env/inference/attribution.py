@@ -386,7 +386,7 @@ def ranking_of(tried: Sequence[Explanation], base: Explanation) -> tuple[Ranked,
 def _ranked(cause: CauseId, gains: FloatArray) -> Ranked:
     """A cause by what it gains in each run (runs,)."""
     count, total = len(gains), float(gains.sum())
-    half = float(stdtrit(count - 1, 0.975) * gains.std(ddof=1) * np.sqrt(count))
+    half = float(stdtrit(count - 1, POLICY.interval_ends[1]) * gains.std(ddof=1) * np.sqrt(count))
     return Ranked(cause, total, (total - half, total + half))
 
 

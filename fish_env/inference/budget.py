@@ -27,8 +27,6 @@ from fish_env.inference.hypotheses import CauseId, EffectParameterId, name_of
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Problem
 
-RESAMPLES = 2000
-
 
 class Other(Enum):
     """What an explanation changes beside its causes."""
@@ -270,11 +268,11 @@ def _intervals(
     if runs < POLICY.fewest_runs_for_interval:
         return [], None
     draws = []
-    for _ in range(RESAMPLES):
+    for _ in range(POLICY.bootstrap_draws):
         own, noise = energy.of_runs(np.asarray(rng.integers(0, runs, runs)))
         if own[0] > noise:
             draws.append(shares_of(own, count)[0] / (own[0] - noise))
-    low, high = np.quantile(np.array(draws), [0.025, 0.975], axis=0)
-    ends = np.quantile(1.0 - np.array(draws).sum(axis=1), [0.025, 0.975])
+    low, high = np.quantile(np.array(draws), POLICY.interval_ends, axis=0)
+    ends = np.quantile(1.0 - np.array(draws).sum(axis=1), POLICY.interval_ends)
     pairs = [(float(a), float(b)) for a, b in zip(low, high, strict=True)]
     return pairs, (float(ends[0]), float(ends[1]))

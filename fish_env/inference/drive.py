@@ -19,7 +19,7 @@ from fish_env.inference.effort import Effort
 from fish_env.inference.estimate.again import to_search
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.estimate.settle import usual_runs
-from fish_env.inference.explanation import FEW_RUNS, Explanation, fitted_again, reached
+from fish_env.inference.explanation import Explanation, fitted_again, reached
 from fish_env.inference.hypotheses import EffectName
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause
@@ -67,7 +67,7 @@ def measured(nothing: Explanation, report: Callable[[str], None]) -> Explanation
     begin = [Point(z, values) for z in baselines(own)]
     # The runs' own numbers have gone far to make up for what was measured.
     fresh = usual_runs(to_search(own.problem), begin[0], noise)
-    few = fresh.subset(FEW_RUNS)
+    few = fresh.subset(POLICY.few_runs)
     tried = [reached(partial(fit, few, effects, point, noise, rounds=1)) for point in begin]
     best = min((f for f in tried if f), key=lambda f: f.objective, default=None)
     whole = fitted_again(fresh, best, best.noise) if best else None
@@ -148,7 +148,7 @@ def _with_drive(
     known = problem.known
     drives = [c for c in causes if c.is_effect and known[c.effect].drifts_in_phase]
     shown = list(screen(followed, drives, rng).best())
-    few = fitted_again(problem.subset(FEW_RUNS), followed, followed.noise, rounds=1)
+    few = fitted_again(problem.subset(POLICY.few_runs), followed, followed.noise, rounds=1)
     if few is None or not shown:
         return []
     return refits(begun, shown, report, (few, shown), effort)[0]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from fish_env.inference.policy import POLICY
+
 
 @dataclass(frozen=True)
 class Effort:
@@ -35,7 +37,8 @@ class Effort:
     @property
     def reduced(self) -> Effort:
         """The same with fewer causes tried, one fitted, and what was found not questioned."""
-        return replace(self, shortlist=3, finalists=1, retries=False)
+        few, fewest = POLICY.quick_shortlist, POLICY.quick_finalists
+        return replace(self, shortlist=few, finalists=fewest, retries=False)
 
 
 PICTURES = "figures as PNG"
@@ -43,17 +46,17 @@ FULL = Effort(
     runs=10_000,
     seconds=float("inf"),
     step_s=0.01,
-    shortlist=6,
-    finalists=4,
+    shortlist=POLICY.shortlist,
+    finalists=POLICY.finalists,
     retries=True,
     pictured=6,
 )
 QUICK = Effort(
-    runs=2,
-    seconds=20.0,
+    runs=POLICY.quick_runs,
+    seconds=POLICY.quick_run_s,
     step_s=0.02,
-    shortlist=3,
-    finalists=1,
+    shortlist=POLICY.quick_shortlist,
+    finalists=POLICY.quick_finalists,
     retries=False,
     pictured=2,
     left_out=(

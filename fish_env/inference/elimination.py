@@ -88,7 +88,7 @@ def without_idle(found: Explanation) -> Explanation:
     return smaller if smaller and smaller.score < found.score + least else found
 
 
-def allowed_loss(fit: Fit, cause: CauseId, level: float = 0.05) -> float:
+def allowed_loss(fit: Fit, cause: CauseId, level: float = POLICY.interval_error) -> float:
     """Growth of -2 log likelihood without a cause, at most, if its region holds neutral values.
 
     In white residuals it is a quantile of chi-squared; coloured ones multiply it.
@@ -118,7 +118,7 @@ def may_not_act(fit: Fit, cause: CauseId) -> bool:
     The region is corrected for coloured residuals.
     """
     off = off_values(fit, cause)
-    return bool(_from_off(fit, off) < chdtri(len(off), 0.05))
+    return bool(_from_off(fit, off) < chdtri(len(off), POLICY.interval_error))
 
 
 def insignificant(fit: Fit, causes: Sequence[CauseId], threshold: float) -> tuple[CauseId, ...]:

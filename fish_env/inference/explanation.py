@@ -19,9 +19,6 @@ from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Problem
 
 T = TypeVar("T")
-FEW_RUNS = 3
-"""Runs on which a fit is begun, or tried."""
-MOST_TURNS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +46,7 @@ class Explanation:
         noise = own.problem.relaxed_noise(own.noise)
         if noise is None:
             return None
-        return fitted_again(own.problem.subset(FEW_RUNS), own, noise)
+        return fitted_again(own.problem.subset(POLICY.few_runs), own, noise)
 
     def varied(self, beside_misfit: bool = False, dropped: Collection[CauseId] = ()) -> Explanation:
         """The same causes with what the runs differ in, as it shows now that more is explained.
@@ -78,7 +75,7 @@ class Explanation:
         What runs differ in and what they share settle in turns.
         """
         best = self
-        for _ in range(MOST_TURNS):
+        for _ in range(POLICY.most_variation_turns):
             more = best.varied(beside_misfit=True)
             if more.score > best.score - POLICY.evidence_doubt:
                 break

@@ -17,12 +17,6 @@ from fish_env.inference.estimate.settle import evaluated
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
 
-RESAMPLES = 2000
-
-
-WORST = 1e4
-"""Squared error of a prediction, in units of the noise: a hundred standard deviations."""
-
 
 @dataclass(frozen=True)
 class ClosedGap:
@@ -57,7 +51,7 @@ def gap_closed(
 def squared_errors(problem: Problem, point: Point, noise: object) -> FloatArray:
     """Squared whitened one-step errors (D,), NaN where nothing was measured.
 
-    A model that diverges is taken to be wrong by :data:`WORST`.
+    A model that diverges is taken to be wrong by ``largest_squared_error``.
 
     Args:
         problem: the runs.
@@ -66,7 +60,7 @@ def squared_errors(problem: Problem, point: Point, noise: object) -> FloatArray:
     """
     _, evaluations = evaluated(problem, point, noise)
     residuals = np.concatenate([evaluation.residuals for evaluation in evaluations])
-    return np.where(problem.measured, np.fmin(residuals**2, WORST), np.nan)
+    return np.where(problem.measured, np.fmin(residuals**2, POLICY.largest_squared_error), np.nan)
 
 
 def by_window(
@@ -104,12 +98,12 @@ def reachable_share(
         return None, None
     share = float(np.mean(np.concatenate(baseline)) - np.mean(np.concatenate(extended))) / gap
     draws = []
-    for _ in range(RESAMPLES):
+    for _ in range(POLICY.bootstrap_draws):
         left = right = 0.0
         for i in rng.integers(0, len(baseline), len(baseline)):
             chosen = rng.integers(0, len(baseline[i]), len(baseline[i]))
             left += float(baseline[i][chosen].mean() - extended[i][chosen].mean())
             right += float(baseline[i][chosen].mean() - 1.0)
         draws.append(left / right if right > 0 else np.nan)
-    low, high = np.nanquantile(draws, [0.025, 0.975])
+    low, high = np.nanquantile(draws, POLICY.interval_ends)
     return share, (float(low), float(high))

@@ -23,13 +23,6 @@ from fish_env.inference.starts import probed
 from fish_env.inference.substitution import in_parts, limit_at, limit_of, substituted, without
 from fish_env.inference.trials import tried_out
 
-ALONE = 3
-"""Causes that are looked for one at a time, at most, while a large misfit is unexplained."""
-LIKES = 4
-"""Effects tried in place of each of these."""
-MOST = 6
-"""Substitutes tried in coarse fits."""
-
 
 def pursue(
     current: Explanation,
@@ -66,7 +59,7 @@ def pursue(
         varied = current.varied(beside_misfit=True)
         if varied.score < current.score - POLICY.evidence_doubt:
             current, shown = varied, screen(varied.fit, causes, rng)
-    for _ in range(ALONE):
+    for _ in range(POLICY.most_single_searches):
         if not disturbance_at_limit(current.fit):
             break
         kept = beside(current, shown)
@@ -105,7 +98,7 @@ def _against_likes(
     known = current.fit.problem.known[last].confusable_with
     signals = {s.cause.id: s for s in shown.best() if s.cause.is_effect}
     alike = [s for s in substitutes(current, shown) if s.cause == last and s.name in known]
-    pairs = [(last, signals[s.name]) for s in alike[:LIKES]]
+    pairs = [(last, signals[s.name]) for s in alike[: POLICY.most_lookalikes]]
     return substituted(current, pairs, 1, report, beside_misfit=True)[0]
 
 
@@ -195,7 +188,7 @@ def challenged(
     pairs_of = (zip(current.causes, e.causes, strict=False) for e in rivals)
     earlier = [(a, b) for pairs in pairs_of for a, b in pairs if a != b]
     first = [*_of_drive(current), *look_alikes(current), *replaced]
-    tried = [*first, *[*earlier, *each_in_turn(close)][:MOST]]
+    tried = [*first, *[*earlier, *each_in_turn(close)][: POLICY.most_substitutes]]
     pairs = [(c, signals[n]) for c, n in dict.fromkeys(tried) if n in signals and c in known]
     best, *others = substituted(current, pairs, POLICY.most_challenges, report)
     apart = [in_parts(best, cause, report) for cause in best.causes]

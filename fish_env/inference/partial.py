@@ -20,7 +20,6 @@ from fish_env.inference.adequacy import (
     generic_signals,
     implausible_estimates,
 )
-from fish_env.inference.budget import RESAMPLES
 from fish_env.inference.elimination import off_values
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.free import Free
@@ -45,10 +44,6 @@ from fish_env.inference.tails import chi2_log_tail
 Describe = Callable[[Fit, float, Problem | None], ResidualModel | None]
 """Models what a fit leaves: the fit, the log p-value that a term has to pass, runs to judge on."""
 Report = Callable[[str], None]
-POOL = 16
-"""Generic forces that are considered beside each set of causes, the most indicated ones."""
-MOST = 8
-"""Generic forces in one sum."""
 
 
 def silent(step: str) -> None:
@@ -204,8 +199,8 @@ def _least(losses: FloatArray, rng: np.random.Generator) -> float:
     """Lower end of the 95 % interval of a mean over runs (R,); the mean of fewer than three."""
     if len(losses) < POLICY.fewest_runs_for_interval:
         return float(losses.mean())
-    drawn = losses[rng.integers(0, len(losses), (RESAMPLES, len(losses)))].mean(axis=1)
-    return float(np.quantile(drawn, 0.025))
+    drawn = losses[rng.integers(0, len(losses), (POLICY.bootstrap_draws, len(losses)))].mean(axis=1)
+    return float(np.quantile(drawn, POLICY.interval_ends[0]))
 
 
 def _blamed(causes: Sequence[CauseId], found: Sequence[Implausible]) -> CauseId | None:
@@ -313,7 +308,7 @@ class StandIns:
             for ranked, one in zip(best, removed, strict=True):
                 ranked.append((self._gain(signal, one), column, signal))
                 ranked.sort(key=lambda entry: (-entry[0], entry[1]))
-                del ranked[POOL:]
+                del ranked[POLICY.force_pool :]
         chosen = {column: signal for ranked in best for _, column, signal in ranked}
         return [chosen[column] for column in sorted(chosen)]
 
@@ -346,9 +341,13 @@ class StandIns:
         info, score = self._system(pool, removed)
         whole, explained = np.diag(info).copy(), 0.0
         inflation = np.array([s.variance_inflation for s in pool])
-        for _ in range(MOST):
+        for _ in range(POLICY.most_forces):
             left = np.diag(info)
-            gains = np.where(left > 0.05 * whole, score**2 / np.maximum(left, 1e-300), 0.0)
+            gains = np.where(
+                left > POLICY.least_independent_share * whole,
+                score**2 / np.maximum(left, 1e-300),
+                0.0,
+            )
             best = int(np.argmax(gains / inflation))
             if chi2_log_tail(float(gains[best] / inflation[best]), 1) >= self.threshold:
                 break

@@ -220,7 +220,8 @@ class Projector:
             return None
         projected = inner(left, left) + followed.T @ (self.prior[:, None] * followed)
         energy = np.einsum("ij,ij->j", columns, columns)
-        if np.any(np.diag(projected) < 1e-4) or np.any(energy < 1e-3):
+        weak = np.diag(projected) < POLICY.smallest_signal
+        if np.any(weak) or np.any(energy < POLICY.smallest_change):
             return None
         projected += 1e-9 * np.diag(np.diag(projected))
         score = -left.T @ self.lin.residuals

@@ -32,8 +32,6 @@ from fish_env.inference.starts import linear_estimate, probed, starts
 from fish_env.inference.tails import chi2_log_tail
 
 Report = Callable[[str], None]
-ECHOES = 3
-"""Effects tried as what the first pick may be an echo of."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +139,7 @@ def _sized(chosen: Sequence[tuple[Signal, Rows, float]]) -> list[Pick]:
 
 def _independent(info: FloatArray, whole: FloatArray) -> bool:
     """Whether something of an effect is left beside those picked."""
-    return bool(np.all(np.diag(info) > 0.05 * np.diag(whole)))
+    return bool(np.all(np.diag(info) > POLICY.least_independent_share * np.diag(whole)))
 
 
 def pursued(
@@ -233,7 +231,7 @@ def _led(
     coarse fits hardly tell the two best apart, the second follows in case the first is of no use.
     """
     alike = {n for c in (*current.causes, names[0]) for n in _confusable(current, c)} - {*names}
-    echoes = [s for s in shown.best() if s.cause.id in alike][:ECHOES]
+    echoes = [s for s in shown.best() if s.cause.id in alike][: POLICY.most_echoes]
     if not echoes:
         return [names]
     base = current.fit
@@ -247,8 +245,8 @@ def _led(
         if found:
             tried.append((found.objective, name))
     enough = min(tried)[0] + POLICY.coarse_fit_leeway if tried else np.inf
-    close = [name for objective, name in sorted(tried) if objective < enough][:2]
-    return [_in_place(name, names, current) for name in close or names[:1]]
+    close = [name for objective, name in sorted(tried) if objective < enough]
+    return [_in_place(name, names, current) for name in close[: POLICY.most_leads] or names[:1]]
 
 
 def _in_place(

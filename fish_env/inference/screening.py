@@ -188,7 +188,7 @@ def _coefficient_signals(projector: Projector, causes: Sequence[Cause], fit: Fit
         i = fit.problem.baseline.ids.index(cause.id)
         at, variance = projector.without_own_bound(i)
         left = 1.0 - variance
-        if left < 0.05:
+        if left < POLICY.least_learned_share:
             continue
         column = projector.lin.slopes[:, [i]]
         score = np.array([at])

@@ -14,7 +14,7 @@ from fish_env.inference.effort import FULL, Effort
 from fish_env.inference.estimate.again import search_steps, to_search
 from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
 from fish_env.inference.estimate.fit import Fit, fit
-from fish_env.inference.explanation import FEW_RUNS, Explanation, fitted_again, reached
+from fish_env.inference.explanation import Explanation, fitted_again, reached
 from fish_env.inference.hypotheses import CauseId, Coefficient, EffectParameterId, name_of
 from fish_env.inference.parallel import side_by_side
 from fish_env.inference.policy import POLICY
@@ -258,7 +258,7 @@ def in_full(problem: Problem, coarse: CoarseFit, noise: Any) -> Fit | None:
     Where each run has a drive of its own, in the steps of a search.
     """
     problem = to_search(problem)
-    few = problem.subset(FEW_RUNS)
+    few = problem.subset(POLICY.few_runs)
     # The noise of the sensors is told in a second round only.
     rounds = 2 if few is problem else 1
     start = (coarse.effects, coarse.point, noise, coarse.released)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fish_env.inference.hypotheses import CauseId, Coefficient
+from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Problem
 from fish_env.inference.projection import Signal
 from fish_env.inference.screening import Screen
@@ -44,7 +45,11 @@ def shortlisted(
     first = problem.known[effects[0].cause.effect] if effects else None
     alike = set(first.confusable_with) if first else set()
     like_first = [s for s in effects[count:] if s.cause.id in alike]
-    return [*effects[:count], *like_first, *coefficients[: max(1, count // 2)]]
+    return [
+        *effects[:count],
+        *like_first,
+        *coefficients[: max(1, int(POLICY.coefficients_per_effect * count))],
+    ]
 
 
 def _threshold_of_coefficients(screen: Screen, found: int) -> float:
@@ -64,7 +69,7 @@ def newly_shown(after: Screen, chosen: Sequence[Signal]) -> list[Signal]:
     """Effects that the first screen had not shown: the misfit then hid them."""
     known = {s.cause.id for s in chosen}
     leading = [s for s in after.best() if s.log_p < after.threshold and s.cause.is_effect]
-    return [s for s in leading if s.cause.id not in known][:3]
+    return [s for s in leading if s.cause.id not in known][: POLICY.most_newly_shown]
 
 
 def like(

@@ -28,8 +28,6 @@ from fish_env.inference.search import Report, at_noise, is_off
 from fish_env.inference.starts import baselines, probed
 
 Values = Mapping[EffectParameterId, float]
-MOST_TURNS = 6
-"""Sizes from which a coarse fit is tried in turn."""
 
 
 def substituted(
@@ -103,7 +101,7 @@ def swapped(
     trying = partial(fitter.coarse_fit, effects, own.released, give_up_above=enough)
     coarse = [reached(partial(trying, begin))]
     if coarse[0] is None or is_off(own.problem, coarse[0].point, signal.cause.effect):
-        turns = fitter.promising(effects, own.released, begin, MOST_TURNS)
+        turns = fitter.promising(effects, own.released, begin, POLICY.most_turned_sizes)
         coarse += [reached(partial(trying, [b])) for b in turns]
     return min((s for s in coarse if s), key=lambda s: s.objective, default=None)
 

@@ -13,7 +13,7 @@ from functools import partial
 from fish_env.inference.adequacy import beyond_plausible
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.estimate.settle import usual_runs
-from fish_env.inference.explanation import FEW_RUNS, Explanation, fitted_again, reached
+from fish_env.inference.explanation import Explanation, fitted_again, reached
 from fish_env.inference.hypotheses import EffectName, EffectParameterId, listed
 from fish_env.inference.parallel import side_by_side
 from fish_env.inference.policy import POLICY
@@ -22,11 +22,6 @@ from fish_env.inference.projection import Signal
 from fish_env.inference.screening import Screen
 from fish_env.inference.search import is_off
 from fish_env.inference.starts import probed
-
-STEPS = 4
-"""Of each trial: a lag that is right is found in three."""
-CLOSE = 2
-"""Effects that are fitted to all runs, at most."""
 
 
 def tried_out(
@@ -107,10 +102,10 @@ def _trial(current: Explanation, name: str, values: dict[EffectParameterId, floa
         values: where its parameters begin.
     """
     own = current.fit
-    few = own.problem.subset(FEW_RUNS)
+    few = own.problem.subset(POLICY.few_runs)
     effects = (*own.effects, name) if name else own.effects
     begin = Point(few.start.z, {**own.point.effects, **values})
     noise = few.default_noise()
     fresh = usual_runs(few, begin, noise)
     start = (effects, begin, noise, own.released)
-    return reached(lambda: fit(fresh, *start, iterations=STEPS, rounds=1))
+    return reached(lambda: fit(fresh, *start, iterations=POLICY.trial_steps, rounds=1))

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from fish_env.inference.adequacy import Adequacy
 from fish_env.inference.attribution import Attribution
 from fish_env.inference.hypotheses import CauseId, Coefficient
+from fish_env.inference.policy import POLICY
 from fish_env.inference.preconditions import Precondition
 
 VERDICTS = (
@@ -50,7 +51,7 @@ def decide(
         adequacy.reached,
         attribution.accepted.causes,
         tuple(rival.causes for rival in attribution.rivals),
-        blind > len(preconditions) / 2,
+        blind > POLICY.most_blind_share * len(preconditions),
     )
 
 

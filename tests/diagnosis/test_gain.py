@@ -11,8 +11,9 @@ from fish_env.identification import SeriesProblem, open_loop
 from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.runs import RunData
 from fish_env.identification.variation import CURRENT, SENSOR_ERRORS
-from fish_env.inference.gain import WORST, by_window, gap_closed, reachable_share, squared_errors
+from fish_env.inference.gain import by_window, gap_closed, reachable_share, squared_errors
 from fish_env.inference.hypotheses import EffectParameterId
+from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point
 from fish_env.params import load_fish
 from fish_env.simulator import Simulator
@@ -160,7 +161,7 @@ def test_a_model_that_diverges_on_final_runs_loses_by_a_finite_amount():
     noise = Setup(channels=good.channels).noise
     point = Point(np.zeros(0), {})
     usual, spoilt = (squared_errors(problem, point, noise) for problem in (good, bad))
-    assert np.nanmax(spoilt) == WORST
+    assert np.nanmax(spoilt) == POLICY.largest_squared_error
     assert np.isfinite(spoilt).sum() == np.isfinite(usual).sum()
     before, after = (by_window(good, values, np.nanmean) for values in (usual + 1.0, spoilt))
     share, interval = reachable_share(before, after, np.random.default_rng(0))

@@ -1,25 +1,38 @@
-"""The page of the decision policy holds what the policy is."""
+"""The page of the decision policies holds what the policies are."""
 
 from dataclasses import replace
 
 import pytest
 
 from fish_env.inference.policy import POLICY
-from scripts.make_policy_page import PAGE, with_table
+from scripts.make_policy_page import PAGE, POLICIES, with_tables
+
+every_policy = pytest.mark.parametrize("policy", POLICIES.values(), ids=POLICIES.keys())
 
 
-def test_the_page_is_made_from_the_policy():
+def test_the_page_is_made_from_the_policies():
     page = PAGE.read_text(encoding="utf-8")
-    assert with_table(page) == page
+    assert with_tables(page) == page
 
 
 def test_a_page_of_other_numbers_is_noticed():
     page = PAGE.read_text(encoding="utf-8")
-    assert with_table(page.replace("| 4000 |", "| 4001 |")) == page
+    assert with_tables(page.replace("| 4000 |", "| 4001 |")) == page
 
 
-def test_every_number_names_its_source():
-    assert all(source for _, _, source in POLICY.table())
+@every_policy
+def test_every_number_names_its_source(policy):
+    assert all(source for _, _, source in policy.table())
+
+
+@every_policy
+def test_every_number_says_what_it_decides(policy):
+    assert policy.meanings().keys() == policy.as_dict().keys()
+    assert all(policy.meanings().values())
+
+
+def test_meanings_of_several_lines_are_whole():
+    assert POLICY.meanings()["linear_doubt"].endswith("where a fit has yet to tell")
 
 
 @pytest.mark.parametrize(("name", "value"), [("screen_level", 0.9), ("most_causes", 0)])

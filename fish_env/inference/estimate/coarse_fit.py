@@ -19,13 +19,12 @@ from fish_env.inference.estimate.free import (
 from fish_env.inference.estimate.gauss_newton import Quadratic, descend
 from fish_env.inference.estimate.slopes import Slopes
 from fish_env.inference.hypotheses import Coefficient
+from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
 
 STEPS = 5
 TOLERANCE = 0.5
 """A coarse fit ends when no parameter moves by more of its standard deviation."""
-MOST_SETTLED = 12
-"""Starts at which the runs' own starts are settled: to settle one takes as long as many lanes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +56,7 @@ class CoarseFitter:
         runs: how many of its runs to use, spread over all of them.
     """
 
-    def __init__(self, fit: Fit, runs: int = 2) -> None:
+    def __init__(self, fit: Fit, runs: int = POLICY.coarse_fit_runs) -> None:
         self.fit = fit
         self._usual = self._few(fit.problem, runs)
         self._long = self._few(fit.comparing, runs)
@@ -160,7 +159,7 @@ class CoarseFitter:
         if few.starts_known:
             values = self._objectives(few, free, vectors)
             return few, vectors[int(np.argmin(values))]
-        vectors = self._likeliest(few, free, vectors, MOST_SETTLED)
+        vectors = self._likeliest(few, free, vectors, POLICY.most_settled_starts)
         settled = [few.settled(free.unpack(v), noise, nearby=True) for v in vectors]
         pairs = zip(settled, vectors, strict=True)
         return min(pairs, key=lambda pair: self._objectives(pair[0], free, [pair[1]])[0])

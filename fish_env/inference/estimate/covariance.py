@@ -36,7 +36,8 @@ def sandwich(
     if count >= POLICY.fewest_runs_for_interval:
         by_run = _widened(scores, inverse, prior, lin.run_of)
         by_chance = chdtri(count - 1, POLICY.run_errors_level) / (count - 1)
-        few = float(stdtrit(count - 1, 0.975) / ndtri(0.975)) ** 2
+        end = POLICY.interval_ends[1]
+        few = float(stdtrit(count - 1, end) / ndtri(end)) ** 2
         widened = np.where(by_run > by_chance * widened, few * by_run, widened)
     inflation = np.sqrt(widened)
     return np.asarray(inverse * np.outer(inflation, inflation))

@@ -144,9 +144,11 @@ class Fit:
         marginal = self.linearised.marginal
         return residuals if marginal is None else marginal.residuals(residuals)
 
-    def interval(self, parameter: ParameterId, level: float = 0.95) -> tuple[float, float]:
+    def interval(
+        self, parameter: ParameterId, level: float = POLICY.interval_level
+    ) -> tuple[float, float]:
         """Interval of one parameter: by likelihood where that was worked out, else normal."""
-        if level == 0.95 and parameter in self.profiles:
+        if level == POLICY.interval_level and parameter in self.profiles:
             return self.profiles[parameter]
         i = self.ids.index(parameter)
         half = float(ndtri(0.5 + level / 2)) * np.sqrt(self.covariance[i, i])

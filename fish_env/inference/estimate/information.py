@@ -26,7 +26,7 @@ def prior_precision(
     """
     prior = np.concatenate([np.ones(len(baseline)), np.zeros(further)])
     for coefficient in released:
-        prior[baseline.ids.index(coefficient)] = 1e-4
+        prior[baseline.ids.index(coefficient)] = POLICY.lifted_prior_precision
     return prior
 
 

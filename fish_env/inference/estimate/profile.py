@@ -21,9 +21,9 @@ from fish_env.inference.estimate.information import information
 from fish_env.inference.estimate.slopes import Slopes
 from fish_env.inference.evaluation import Evaluation
 from fish_env.inference.hypotheses import EffectParameterId, ParameterId
+from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point
 
-LEVEL = 0.95
 BETTER = 0.1
 """A fit whose objective is lower by less is the same fit."""
 FIRST, GROWTH = 2.2, 1.5
@@ -151,7 +151,8 @@ def profile_of(own: Fit, parameter: EffectParameterId, bounds: tuple[float, floa
     white = np.linalg.inv(information(own.linearised.slopes, free.prior))[i, i]
     widened = float(own.covariance[i, i] / white)
     start = Held(float(own.estimates[i]), own.objective, own.point, own.filtered)
-    sd, worse = float(np.sqrt(own.covariance[i, i])), float(chdtri(1, 1.0 - LEVEL)) * widened
+    sd = float(np.sqrt(own.covariance[i, i]))
+    worse = float(chdtri(1, 1.0 - POLICY.interval_level)) * widened
     return Profile(partial(_held, own, parameter), start, sd, bounds, worse)
 
 

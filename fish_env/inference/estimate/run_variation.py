@@ -23,12 +23,6 @@ from fish_env.inference.estimate.box_qp import minimise_in_box
 from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.policy import POLICY
 
-CHANCE, UNTOLD = 0.05, 0.5
-"""Of a spread that is shown: how often chance shows one or more, and the share of its variance that
-the data must not leave open."""
-LARGEST = 30.0
-"""Largest spread that is looked for, in units of the usual one."""
-
 
 @dataclass(frozen=True)
 class RunVariation:
@@ -55,7 +49,7 @@ class RunVariation:
     @property
     def largest(self) -> float:
         """Largest spread, in usual ones, that is taken for variation."""
-        return POLICY.beyond_usual if self.shared else LARGEST
+        return POLICY.beyond_usual if self.shared else POLICY.largest_run_spread
 
 
 def shown_spread(values: FloatArray, variance: FloatArray) -> FloatArray:
@@ -70,8 +64,8 @@ def shown_spread(values: FloatArray, variance: FloatArray) -> FloatArray:
     """
     noise = np.maximum(variance * (1.0 - variance), 1e-12)
     statistic = np.sum(values**2 / noise, axis=0)
-    shown = chdtrc(len(values), statistic) < CHANCE / values.shape[1]
-    told = variance.mean(axis=0) < UNTOLD
+    shown = chdtrc(len(values), statistic) < POLICY.shown_spread_level / values.shape[1]
+    told = variance.mean(axis=0) < POLICY.most_untold_variance
     unsure = np.minimum(variance, 1.0 - 1e-9)
     squares = np.mean((values / (1.0 - unsure)) ** 2 - unsure / (1.0 - unsure), axis=0)
     return np.asarray(np.where(shown & told, np.sqrt(np.maximum(squares, 0.0)), 0.0))

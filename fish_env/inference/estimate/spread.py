@@ -21,8 +21,6 @@ SMALLEST = 1e-3
 """Spread, in units of the usual one, that counts as none."""
 SIZES = np.geomspace(0.1, 10.0, 7)
 """Spreads that are tried before one is looked for exactly, in units of the usual one."""
-FORESEEN = 2.0
-"""Standard errors of a run's number by which its mean is surely negative."""
 WIDE = 0.01
 """Precision of what all runs have in common, in usual spreads: hardly any."""
 
@@ -217,7 +215,8 @@ def _without_causes(
 
 def _negative(values: FloatArray, errors: FloatArray) -> BoolArray:
     """(K,) whether the runs' own numbers (R, K) are negative on the whole."""
-    return np.asarray(values.mean(axis=0) < -FORESEEN * errors.mean(axis=0))
+    surely = POLICY.surely_negative_sd * errors.mean(axis=0)
+    return np.asarray(values.mean(axis=0) < -surely)
 
 
 def _alone(

@@ -23,7 +23,8 @@ for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "ROBOFISH_THREADS"):
 from rich.progress import track  # noqa: E402
 
 from fish_env.diagnosis.inputs.check import check_inputs  # noqa: E402
-from fish_env.identification.own_beats import CLEARLY, NOTICEABLE, TELLING, own_beats  # noqa: E402
+from fish_env.identification.own_beats import own_beats  # noqa: E402
+from fish_env.identification.policy import IDENTIFICATION  # noqa: E402
 from fish_env.identification.series import SeriesProblem  # noqa: E402
 from fish_env.identification.tail_drive import tail_drive  # noqa: E402
 from scripts.hidden_runs import hidden_runs  # noqa: E402
@@ -56,15 +57,17 @@ def main() -> None:
     options = parser.parse_args()
     jobs = [(t, FIRST + i) for i in range(options.cases) for t in (*ALIKE, *DIFFERENT)]
     rows = [measured(*job) for job in track(jobs)]
+    clearly, noticeable = IDENTIFICATION.clear_own_beat, IDENTIFICATION.noticeable_own_beat
+    fewest = IDENTIFICATION.fewest_own_beats
     for name, tiers in (("one beat", ALIKE), ("own beats", DIFFERENT)):
         own = [row for row in rows if row["tier"] in tiers]
-        clear = sum(max(row["gains"].values(), default=0.0) > CLEARLY for row in own)
+        clear = sum(max(row["gains"].values(), default=0.0) > clearly for row in own)
         several = sum(
-            sum(gain > NOTICEABLE for gain in row["gains"].values()) >= TELLING for row in own
+            sum(gain > noticeable for gain in row["gains"].values()) >= fewest for row in own
         )
-        print(f"{name}: {clear} of {len(own)} sets have a run above {CLEARLY}")
-        print(f"{name}: {several} of {len(own)} sets have {TELLING} runs above {NOTICEABLE}")
-    print(write_dated(options.out, "own-beats", {"clearly": CLEARLY, "rows": rows}))
+        print(f"{name}: {clear} of {len(own)} sets have a run above {clearly}")
+        print(f"{name}: {several} of {len(own)} sets have {fewest} runs above {noticeable}")
+    print(write_dated(options.out, "own-beats", {"clearly": clearly, "rows": rows}))
 
 
 if __name__ == "__main__":

@@ -18,17 +18,11 @@ from scipy.special import chdtrc, fdtrc
 from fish_env.arrays import FloatArray
 from fish_env.data.schema import CommandSteps, Dataset, Run
 from fish_env.data.vocabulary import COMMANDS
+from fish_env.identification.policy import IDENTIFICATION
 from fish_env.params.schema import FishParams
 
 SWAYING = ("r", "yaw", "v", "y")
 """Channels in which a beat shows, the clearest first."""
-FEWEST_BEATS, FEWEST_SAMPLES = 6.0, 30
-NEAR = (0.75, 1.3)
-"""Frequencies looked at, in units of the commanded one; twice it is the beat of surge and power."""
-SURE = 1e-6
-"""p-value of a sway that is taken for one."""
-UNEVEN, BY_CHANCE = 0.01, 1e-4
-"""Spread of ratios between runs worth a word, and its p-value."""
 _AMPLITUDE, _FREQUENCY = (list(COMMANDS).index(f"tail_{n}") for n in ("amplitude", "frequency"))
 
 
@@ -66,11 +60,12 @@ def beats_of(dataset: Dataset) -> tuple[Beat, ...]:
 
 def _beats_of(run: Run, channel: str) -> Iterator[Beat]:
     ends = np.append(run.commands.times_s[1:], run.time_s[-1])
-    values = run.channels[channel]
+    values, known = run.channels[channel], IDENTIFICATION
     for row, (begin, end) in enumerate(zip(run.commands.times_s, ends, strict=True)):
         amplitude, commanded = run.commands.values[row, [_AMPLITUDE, _FREQUENCY]]
         inside = (run.time_s >= begin) & (run.time_s <= end) & np.isfinite(values)
-        enough = inside.sum() >= FEWEST_SAMPLES and (end - begin) * commanded >= FEWEST_BEATS
+        beats = (end - begin) * commanded
+        enough = inside.sum() >= known.fewest_beat_samples and beats >= known.fewest_beats
         if amplitude <= 0.0 or not enough:
             continue
         sway = np.unwrap(values[inside]) if channel == "yaw" else values[inside]
@@ -88,6 +83,7 @@ def frequency_of(t: FloatArray, sway: FloatArray, near: float) -> tuple[float, f
         near: about what is looked for (Hz).
     """
     length = t[-1] - t[0]
+    lowest, highest = IDENTIFICATION.lowest_beat_ratio, IDENTIFICATION.highest_beat_ratio
     at = 2.0 * (t - t[0]) / length - 1.0
     slow = np.polynomial.legendre.legvander(at, int(np.clip(length * near / 3.0, 2, 8)))
 
@@ -101,7 +97,7 @@ def frequency_of(t: FloatArray, sway: FloatArray, near: float) -> tuple[float, f
         residuals = fitted(frequency)[2]
         return float(residuals @ residuals)
 
-    grid = np.arange(NEAR[0] * near, NEAR[1] * near, 0.1 / length)
+    grid = np.arange(lowest * near, highest * near, 0.1 / length)
     best = float(grid[np.argmin([left(f) for f in grid])])
     best = float(minimize_scalar(left, bounds=(best - 0.1 / length, best + 0.1 / length)).x)
     columns, weights, residuals = fitted(best)
@@ -110,8 +106,8 @@ def frequency_of(t: FloatArray, sway: FloatArray, near: float) -> tuple[float, f
     gain = float(alone @ alone - residuals @ residuals)
     variance = float(residuals @ residuals) / freedom * _colour(residuals)
     # The best of as many frequencies as the range tells apart.
-    looks = (NEAR[1] - NEAR[0]) * near * length
-    if looks * fdtrc(3, freedom, gain / 3.0 / variance) > SURE:
+    looks = (highest - lowest) * near * length
+    if looks * fdtrc(3, freedom, gain / 3.0 / variance) > IDENTIFICATION.sway_level:
         return None
     turning = 2.0 * np.pi * (t - t.mean())
     slope = turning * (weights[-1] * columns[:, -2] - weights[-2] * columns[:, -1])
@@ -145,8 +141,8 @@ def uneven(beats: Sequence[Beat]) -> bool:
     ratios, errors = pairs.T
     weights = errors**-2
     square = float(weights @ (ratios - weights @ ratios / weights.sum()) ** 2)
-    by_chance = chdtrc(len(pairs) - 1, square) > BY_CHANCE
-    return bool(np.std(ratios, ddof=1) > UNEVEN and not by_chance)
+    by_chance = chdtrc(len(pairs) - 1, square) > IDENTIFICATION.uneven_beats_level
+    return bool(np.std(ratios, ddof=1) > IDENTIFICATION.uneven_beats and not by_chance)
 
 
 def with_measured_beats(dataset: Dataset, fish: FishParams) -> Dataset:

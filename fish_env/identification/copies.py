@@ -12,16 +12,13 @@ from itertools import combinations
 import numpy as np
 
 from fish_env.data.schema import Dataset, Run
+from fish_env.identification.policy import IDENTIFICATION
 from fish_env.rigidbody.interpolation import (
     evenly_spaced,
     interpolator_of,
     windows_of,
     without_turns,
 )
-
-SHARED = 0.5
-"""Root mean square by which the noise of two runs differs, over that of one: the square root of 2
-where each has noise of its own, 0 where they share it. Half is far from both."""
 
 
 def without_copies(dataset: Dataset) -> Dataset:
@@ -51,7 +48,7 @@ def _copies(one: Run, other: Run) -> bool:
     """Whether two runs share the noise of every channel, sample by sample."""
     shares = [_difference(one, other, channel) for channel in one.channels]
     known = [share for share in shares if share is not None]
-    return bool(known) and max(known) < SHARED
+    return bool(known) and max(known) < IDENTIFICATION.copied_noise
 
 
 def _difference(one: Run, other: Run, channel: str) -> float | None:

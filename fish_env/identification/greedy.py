@@ -13,20 +13,14 @@ from fish_env.arrays import FloatArray
 from fish_env.effects import catalogue
 from fish_env.identification.left_out import RunErrors, left_out_errors
 from fish_env.identification.objectives import Objective
+from fish_env.identification.policy import IDENTIFICATION
 from fish_env.identification.whole_runs.problem import WholeRunProblem
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.explanation import reached
 from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point, Problem
 
-MOST_EFFECTS = 6
-FINALISTS = 2
-"""Effects of each step that are judged on conditions left out."""
 COARSE_STEPS = 4
-LEAST_GAIN = 2.0
-"""Decrease of -2 log likelihood that an effect needs to be judged (Akaike, 1974)."""
-LEVEL = 0.05
-"""p-value, over groups, of a held-out gain that is taken for one."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +65,7 @@ def add_effects(
     best, steps = base, list[EffectStep]()
     errors = left_out_errors(objective, base, groups, report)
     untried = [n for n in (candidates or catalogue()) if n not in base.effects]
-    while len(best.effects) < MOST_EFFECTS:
+    while len(best.effects) < IDENTIFICATION.most_added_effects:
         leaders = _leaders(best, untried, report)
         judged = []
         for name, begin in leaders:
@@ -84,7 +78,7 @@ def add_effects(
                 judged.append((gain, p, name, full, trial))
         judged.sort(key=lambda one: -one[0])
         for i, (gain, p, name, full, trial) in enumerate(judged):
-            added = i == 0 and gain > 0.0 and p < LEVEL
+            added = i == 0 and gain > 0.0 and p < IDENTIFICATION.held_out_level
             steps.append(EffectStep(name, gain, p, added))
             if added:
                 best, errors = full, trial
@@ -118,10 +112,10 @@ def _leaders(
             )
         )
         gain = 0.0 if coarse is None else 2.0 * (coarse.log_likelihood - base.log_likelihood)
-        if coarse is not None and gain > LEAST_GAIN:
+        if coarse is not None and gain > IDENTIFICATION.least_coarse_gain:
             found.append((gain, name, coarse.point))
     found.sort(key=lambda one: -one[0])
-    return [(name, point) for _, name, point in found[:FINALISTS]]
+    return [(name, point) for _, name, point in found[: IDENTIFICATION.most_judged_effects]]
 
 
 def _switched_on(problem: Problem, name: str) -> dict[EffectParameterId, float]:

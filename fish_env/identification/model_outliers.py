@@ -16,20 +16,15 @@ from scipy.stats import binom
 from fish_env.arrays import BoolArray, FloatArray
 from fish_env.identification.filtering import Filtered
 from fish_env.identification.in_step import nominal_point
+from fish_env.identification.policy import IDENTIFICATION
 from fish_env.identification.runs import RunData
 from fish_env.identification.series import SeriesProblem
 from fish_env.rigidbody.outliers import GATE, SETTLED, Outliers
 
-ROUNDS = 4
-"""An outlier turns the predictions after it, which hide others."""
 BESIDE, AROUND = (-2, -1, 1, 2), (-4, -3, -2, -1, 1, 2, 3, 4)
 """Samples whose median says what is missed anyhow, and those that say how much that scatters."""
 MAD_SD = 1.4826
 """Standard deviation of normal numbers over the median of their sizes."""
-BEGINS_S = 0.6
-"""Seconds of a run in which the filter still finds out where the fish is and how it moves."""
-CHANCE = 0.01
-"""Of as many outliers near jumps, by the share elsewhere, below which they are motion."""
 
 
 def without_model_outliers(
@@ -47,7 +42,7 @@ def without_model_outliers(
     near = [_near_jumps(run) for run in problem.runs]
     shares = _calm_shares(problem, known, near)
     point = nominal_point(problem)
-    for _ in range(ROUNDS):
+    for _ in range(IDENTIFICATION.outlier_rounds):
         settled = problem.settled(point, noise)
         try:
             filtered = settled.filtered(point, noise, keep_slopes=True)
@@ -69,9 +64,13 @@ def without_model_outliers(
 
 
 def _missed(run: RunData, filtered: Filtered) -> FloatArray:
-    """(T, C) measured less predicted (SI); NaN where missing, or before the filter has settled."""
+    """(T, C) measured less predicted (SI); NaN where missing, or before the filter has settled.
+
+    At the start of a run it still finds out where the fish is and how it moves.
+    """
     assert filtered.slopes is not None
-    judged = np.isfinite(run.measured) & (run.clock > BEGINS_S)[:, None]
+    settled = run.clock > IDENTIFICATION.unjudged_start_s
+    judged = np.isfinite(run.measured) & settled[:, None]
     return np.asarray(np.where(judged, filtered.slopes.raw, np.nan))
 
 
@@ -102,7 +101,8 @@ def _of_channel(
     found = [_peaks(one, scale) for one in away]
     at_jumps = sum(int(np.sum(mask & one)) for mask, one in zip(found, near, strict=True))
     samples = sum(int(np.sum(one)) for one in near)
-    if at_jumps and binom.sf(at_jumps - 1, samples, share) < CHANCE:
+    level = IDENTIFICATION.outliers_at_jumps_level
+    if at_jumps and binom.sf(at_jumps - 1, samples, share) < level:
         found = [mask & ~one for mask, one in zip(found, near, strict=True)]
     return [(mask, np.abs(one[mask]).tolist()) for mask, one in zip(found, away, strict=True)]
 

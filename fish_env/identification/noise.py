@@ -15,16 +15,15 @@ from fish_env.data.schema import Dataset
 from fish_env.identification.filtering import Filtered, RunFilter
 from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.noise_scoring import Replayed, climb
+from fish_env.identification.policy import IDENTIFICATION
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point
 from fish_env.params.schema import FishParams
 
-PHASE_SD_RANGE = (3e-3, 0.03)
-"""Random walk of the phase of a tail whose beat is a little different in each run (rad/s^0.5): what
-its own beat and sag leave is some 0.15 rad after half a minute, as is the larger one. A larger one
-would follow whatever makes the tail late, and nothing that does would show."""
-JITTER_SD_RANGE = (2e-4, 0.01)
-"""How early or late samples may be (s): a camera's exposures jitter by a few milliseconds."""
+PHASE_SD_RANGE = (IDENTIFICATION.least_phase_walk, IDENTIFICATION.largest_phase_walk)
+"""Random walk of the phase of a tail whose beat is a little different in each run (rad/s^0.5)."""
+JITTER_SD_RANGE = (IDENTIFICATION.least_jitter_s, IDENTIFICATION.largest_jitter_s)
+"""How early or late samples may be (s)."""
 JITTER_TRIALS = (1e-3, 2e-3, 4e-3)
 """Jitters (s) that are tried before one is fitted: beside twice or half its best size, it still
 has most of its likelihood."""
@@ -33,8 +32,6 @@ WINDOW = 30
 QUANTILE = 0.15
 GAIN = 0.1
 """The noise model is found when a step gains no more log likelihood."""
-FELT = 0.1
-"""Of the largest believable disturbance: how long a weaker one lasts no run tells."""
 
 
 def white_noise_sd(dataset: Dataset, channel: str) -> float:
@@ -101,13 +98,13 @@ class DisturbanceRange:
 
     def left_by(self, noise: NoiseModel) -> tuple[str, ...]:
         """How a noise model's disturbance is at the end of this range, in words."""
-        found = []
-        if noise.force_sd > 0.98 * self.force[1]:
+        found, reached = [], IDENTIFICATION.at_limit_share
+        if noise.force_sd > reached * self.force[1]:
             found.append(f"a disturbing force of {1e3 * noise.force_sd:.0f} mN or more")
-        if noise.moment_sd > 0.98 * self.moment[1]:
+        if noise.moment_sd > reached * self.moment[1]:
             found.append(f"a disturbing moment of {1e3 * noise.moment_sd:.2g} mN m or more")
         strength = max(noise.force_sd / self.force[1], noise.moment_sd / self.moment[1])
-        if self._stays(noise) and strength > FELT:
+        if self._stays(noise) and strength > IDENTIFICATION.felt_disturbance:
             found.append(f"a disturbance that stays for {noise.correlation_s:.0f} s or more")
         return tuple(found)
 
@@ -122,7 +119,7 @@ class DisturbanceRange:
 
     def _stays(self, noise: NoiseModel) -> bool:
         """Whether its disturbance stays as long as any may."""
-        return noise.correlation_s > 0.98 * self.correlation[1]
+        return noise.correlation_s > IDENTIFICATION.at_limit_share * self.correlation[1]
 
 
 def disturbance_range(fish: FishParams) -> DisturbanceRange:
@@ -131,10 +128,12 @@ def disturbance_range(fish: FishParams) -> DisturbanceRange:
     For the 2 kg fish that is 20 mN, against 150 mN of thrust; its width is taken as the edge of a
     cube of the same volume.
     """
-    mass = fish.get("mass.total")
-    force = 1e-3 * mass * fish.get("water.gravity")
-    moment = 0.25 * float(np.cbrt(mass / fish.get("water.density"))) * force
-    return DisturbanceRange((1e-4, force), (1e-6, moment), (0.05, 10.0))
+    known, mass = IDENTIFICATION, fish.get("mass.total")
+    force = known.disturbance_weight * mass * fish.get("water.gravity")
+    width = float(np.cbrt(mass / fish.get("water.density")))
+    moment = known.disturbance_arm * width * force
+    lasting = known.shortest_correlation_s, known.longest_correlation_s
+    return DisturbanceRange((1e-4, force), (1e-6, moment), lasting)
 
 
 def widest_disturbance(fish: FishParams) -> DisturbanceRange:

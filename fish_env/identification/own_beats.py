@@ -20,6 +20,7 @@ import numpy as np
 from fish_env.arrays import FloatArray
 from fish_env.identification.by_run import squares_by_run
 from fish_env.identification.in_step import nominal_point
+from fish_env.identification.policy import IDENTIFICATION
 from fish_env.identification.runs import PHASE, RunData
 from fish_env.identification.series import SeriesProblem
 from fish_env.identification.tail_drive import RATE, SCALE, TailDrive
@@ -40,20 +41,8 @@ FINE_SAGS: FloatArray = np.asarray(np.arange(-3, 4) * 1e-4)
 """The grid about the best of these."""
 PHASE_SD = 0.2
 """How far the phase at the start of a run may be from the declared one (rad)."""
-SURE, HALF_NORMAL = 3.0, np.array([math.sqrt(2.0 / math.pi), math.sqrt(1.0 - 2.0 / math.pi)])
-"""Standard errors of a mean over runs within which it is ordinary, and the mean and spread of what
-is normal and only counted where positive: batteries lose charge."""
-LEAST = 1.5e-3
-"""Difference of two beats below which the comb cannot tell them apart."""
-CLEARLY = 0.2
-"""Share of what the common beat leaves that the own beat of a single run has to take away for runs
-to differ. Of 30 sets of runs with one beat one had such a run."""
-TELLING, NOTICEABLE = 2, 0.05
-"""Runs with a beat of their own that say that runs differ, and the share that each has to take
-away: beside a misfit it is less than where nothing else is wrong. In short runs, whose beat is
-hardly known, it is a hundredth. No set of runs with one beat has two such runs, where beats differ
-as servos do all have (`scripts/calibrate_own_beats.py`)."""
-FEWEST = 3
+HALF_NORMAL = np.array([math.sqrt(2.0 / math.pi), math.sqrt(1.0 - 2.0 / math.pi)])
+"""Mean and spread of what is normal and only counted where positive: batteries lose charge."""
 AT_ONCE = 64
 """Teeth of a comb that are evaluated together: what each leaves of every sample takes memory."""
 
@@ -84,7 +73,8 @@ def own_beats(problem: SeriesProblem, differ: bool = False) -> OwnBeats:
         differ: whether runs are known to differ in their beat.
     """
     free = problem.with_runs([_with_free_phase(run) for run in problem.runs])
-    if len(free.runs) < FEWEST or "frequency_scale" in free.model.effects:
+    few = len(free.runs) < IDENTIFICATION.fewest_runs_for_beats
+    if few or "frequency_scale" in free.model.effects:
         return OwnBeats()
     best = _comb(free)
     if best is None:
@@ -101,7 +91,7 @@ def own_beats(problem: SeriesProblem, differ: bool = False) -> OwnBeats:
         if not 0 < own < len(comb) - 1:
             continue
         found[run.id] = _minimum(mine, comb, own) / together
-        if abs(found[run.id] - 1.0) >= LEAST:
+        if abs(found[run.id] - 1.0) >= IDENTIFICATION.least_beat_difference:
             gains[run.id] = 1.0 - float(mine[own] / mine[common])
     drive = problem.drive.at(together)
     if not (differ or _differ(gains.values())):
@@ -133,10 +123,15 @@ def _comb(problem: SeriesProblem) -> tuple[FloatArray, FloatArray] | None:
 
 
 def _differ(gains: Iterable[float]) -> bool:
-    """Whether runs differ, by the shares that their own beats take away."""
-    largest = sorted(gains, reverse=True)
-    several = len(largest) >= TELLING and largest[TELLING - 1] > NOTICEABLE
-    return several or max(largest, default=0.0) > CLEARLY
+    """Whether runs differ, by the shares that their own beats take away.
+
+    Beside a misfit the shares are smaller than where nothing else is wrong. In short runs, whose
+    beat is hardly known, they are a hundredth.
+    """
+    known, shares = IDENTIFICATION, list(gains)
+    noticeable = sum(share > known.noticeable_own_beat for share in shares)
+    clear = max(shares, default=0.0) > known.clear_own_beat
+    return noticeable >= known.fewest_own_beats or clear
 
 
 def _sagging(problem: SeriesProblem, own: Mapping[str, float]) -> OwnBeats:
@@ -215,7 +210,7 @@ def _beside_shared(
     beats = problem.drive.scale * beats
     sags = sags + problem.drive.measured.get(RATE, 0.0)
     ordinary = USUAL_SAG * HALF_NORMAL
-    sure = SURE / np.sqrt(len(beats))
+    sure = IDENTIFICATION.ordinary_mean_sd / np.sqrt(len(beats))
     large = float(ordinary[0] + sure * ordinary[1])
     rate = float(sags.mean()) if sags.mean() > large else 0.0
     lost = middle * ordinary[0] if rate == 0.0 else 0.0

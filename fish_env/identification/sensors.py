@@ -9,15 +9,11 @@ import numpy as np
 from fish_env.arrays import FloatArray
 from fish_env.data.schema import Dataset
 from fish_env.identification.noise import white_noise_sd
+from fish_env.identification.policy import IDENTIFICATION
 from fish_env.identification.recorded import recorded
 from fish_env.inference.policy import POLICY
 from fish_env.rigidbody.outliers import Outliers, outliers_of
 from fish_env.rigidbody.sample_times import largest_jitter_s
-
-FEWEST_CHANNELS = 3
-"""Declared channels of which most can show more noise than declared."""
-TELLING = 1e-4
-"""Share of the samples of a channel from which outliers are told in words."""
 
 
 def without_outliers(dataset: Dataset) -> tuple[Dataset, tuple[Outliers, ...]]:
@@ -69,7 +65,7 @@ def noise_over_declared(dataset: Dataset) -> float:
 
 
 def _over_declared(dataset: Dataset, shown: dict[str, float]) -> float:
-    if len(dataset.noise) < FEWEST_CHANNELS:
+    if len(dataset.noise) < IDENTIFICATION.fewest_declared_channels:
         return 0.0
     return float(np.median([shown[name] / sd for name, sd in dataset.noise.items()]))
 
@@ -101,7 +97,7 @@ def largest_jitter_of(dataset: Dataset) -> float:
 
 def sentences(found: tuple[Outliers, ...]) -> list[str]:
     """What a reader should know about outliers."""
-    many = [one for one in found if one.share > TELLING]
+    many = [one for one in found if one.share > IDENTIFICATION.told_outliers]
     if not many:
         return []
     said = ", ".join(f"{one.channel} {one.count} ({100.0 * one.share:.2g} %)" for one in many)

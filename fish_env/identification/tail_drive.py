@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from fish_env.identification.policy import IDENTIFICATION
 from fish_env.inference.hypotheses import EffectParameterId, effect_names
 from fish_env.inference.vehicle import Drive
 from fish_env.model.effect import Effect
@@ -15,8 +16,6 @@ LATE = effect_names(
     "servo_lag", "servo_delay", "servo_rate_limit", "tail_flexibility", "wake_memory"
 )
 """Effects that make the tail or its force late."""
-ORDINARY = 4e-3
-"""Share of the beat that a servo is off by, usually."""
 BESIDE = (-6e-3, -3e-3, 0.0, 3e-3, 6e-3)
 """Departures from the measured beat that a fit begins from: less than a third of a cycle in a run
 of a minute."""
@@ -81,7 +80,7 @@ def tail_drive(
         uneven: whether single runs differ; what is ordinary is then in the runs' own beats.
     """
     found = dict(measured)
-    least = 0.0 if uneven else ORDINARY
+    least = 0.0 if uneven else IDENTIFICATION.ordinary_beat_error
     ordinary = SCALE in found and abs(found[SCALE] - 1.0) <= least
     if ordinary:
         found.pop(SCALE)

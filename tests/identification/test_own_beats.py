@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from fish_env.data import CommandSteps
-from fish_env.identification.own_beats import CLEARLY, LEAST, OwnBeats, own_beats, with_own_beats
+from fish_env.identification.own_beats import OwnBeats, own_beats, with_own_beats
+from fish_env.identification.policy import IDENTIFICATION
 from fish_env.identification.runs import FREQUENCY
 from fish_env.identification.series import SeriesProblem
 from fish_env.identification.tail_drive import RATE, SCALE, TailDrive, tail_drive
@@ -100,10 +101,10 @@ def test_two_runs_that_differ_are_enough_beside_a_misfit():
     ratios = np.array([1.0, 1.0022, 0.9978, 1.0, 1.0])
     wrong = simulate(replace(SETUP, changes={"tail.lift.c1": 6.5}))
     beats = own_beats(SeriesProblem(told(wrong, ratios)))
-    assert max(beats.gains.values()) < CLEARLY
+    assert max(beats.gains.values()) < IDENTIFICATION.clear_own_beat
     lost = 0.5 * SETUP.duration * np.array(list(beats.sags.values()))
     found = np.array(list(beats.own.values())) * (1.0 - lost)
-    np.testing.assert_allclose(found, ratios, atol=LEAST)
+    np.testing.assert_allclose(found, ratios, atol=IDENTIFICATION.least_beat_difference)
 
 
 @pytest.mark.parametrize("differ", [False, True])

@@ -16,6 +16,7 @@ from fish_env.effects.registry import catalogue
 from fish_env.errors import DatasetError
 from fish_env.identification.applied_wrench import EFFECT as APPLIED_WRENCH
 from fish_env.identification.parameters import ALIKE, Baseline, changes_of, neutral_values
+from fish_env.identification.policy import IDENTIFICATION
 from fish_env.identification.tables.means import MEANS, SENSED
 from fish_env.identification.tables.orbit import (
     COORDINATES,
@@ -43,14 +44,9 @@ from fish_env.model.effect import Effect
 from fish_env.params.schema import FishParams
 
 DT_S = 0.01
-SLOWEST = 0.1
-"""Share of a beat; a tail that is slower, or lost, gets the commanded time and is not steady."""
 WRENCH = np.r_[1e-4, 1e-4, 1e-4, 1e-6, 1e-6, 1e-6]
 """N and N m. Small wrenches for finite differences."""
 PLACE_AND_TIME = 1e-9
-SILENT = 1e-2
-"""Change of every average, in standard deviations of its noise, below which there is none."""
-FEWEST_REPEATS = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -277,7 +273,7 @@ class TableProblem(Problem):
     def lack_of_fit(self, fit: Any) -> LackOfFit | None:
         """Mean square of what conditions miss over that of repeats; None with few repeats."""
         table, lin = self.table, fit.linearised
-        if table.repeats < FEWEST_REPEATS:
+        if table.repeats < IDENTIFICATION.fewest_repeats:
             return None
         _, column, condition = table.lines
         cell = condition * len(table.observations) + column
@@ -320,7 +316,7 @@ class TableProblem(Problem):
         there, _ = finder.beat(states, everyone, elsewhere=True)
         apart = np.abs(coordinates(here) - coordinates(there)).max(axis=0)
         moved = apart.reshape(z.shape[1], self.run_count).max(axis=1)[1:]
-        silent = (moved > PLACE_AND_TIME) | (changes < SILENT)
+        silent = (moved > PLACE_AND_TIME) | (changes < IDENTIFICATION.untold_change)
         return {name for name, none in zip(settings, silent, strict=True) if none}
 
     def not_steady(self) -> DatasetError:
@@ -355,10 +351,13 @@ def _lane(point: Point) -> tuple[FloatArray, dict[EffectParameterId, FloatArray]
 
 
 def _pace(finder: OrbitFinder) -> FloatArray:
-    """Beats swum in the time of a commanded one: effects may slow the tail."""
+    """Beats swum in the time of a commanded one: effects may slow the tail.
+
+    A tail that is lost gets the commanded time and is not steady.
+    """
     everyone = np.arange(len(finder.commands))
     states = finder.from_rest(everyone, 1)
     after, _ = finder.beat(states, everyone)
     turns = (after[PHASE] - states[PHASE]) / (2.0 * np.pi)
-    beating = (finder.commands[:, FREQUENCY] > 0.0) & (turns > SLOWEST)
+    beating = (finder.commands[:, FREQUENCY] > 0.0) & (turns > IDENTIFICATION.slowest_steady_tail)
     return np.where(beating, np.round(turns, 12), 1.0)

@@ -15,14 +15,13 @@ from scipy.linalg import solve_discrete_lyapunov
 from scipy.optimize import minimize
 
 from fish_env.arrays import FloatArray
+from fish_env.identification.policy import IDENTIFICATION
 from fish_env.identification.tables.orbit import COORDINATES
 from fish_env.identification.tables.table import Table
 
 RECORDING_S = 10.0
 """Assumed length of the recordings behind the averages; the strength of the pushes scales with
 it, so only its size against the fish's memory matters."""
-SMALLEST = 1e-3
-"""Share of an observation's spread below which its noise is not believed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +130,7 @@ def first_guess(table: Table) -> FloatArray:
     pooled = repeat_sd(table)
     guess = np.where(np.isfinite(pooled), pooled, 0.1 * spread)
     guess = np.where(np.isfinite(table.declared), np.fmax(table.declared, guess), guess)
-    return np.asarray(np.maximum(guess, SMALLEST * spread))
+    return np.asarray(np.maximum(guess, IDENTIFICATION.least_scatter * spread))
 
 
 def repeat_sd(table: Table) -> FloatArray:
@@ -174,7 +173,7 @@ def estimate_scatter(
     weight = np.maximum(table.counts, 1e-9)
     typical = [float(np.sum(weight * p) / np.sum(weight * guess**2)) for p in pushes]
     start = np.r_[np.log(guess[~fixed]), -np.log(np.maximum(typical, 1e-30)) - 2.0]
-    floor = np.log(SMALLEST * spread)
+    floor = np.log(IDENTIFICATION.least_scatter * spread)
 
     def parts(x: FloatArray) -> tuple[FloatArray, float, float]:
         sensor = table.declared.copy()

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fish_env.identification.policy import IDENTIFICATION
-from fish_env.inference.policy import POLICY
+from fish_env.diagnosis.policy import POLICIES
 from fish_env.inference.policy_numbers import Numbers
 
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "policy.md"
-POLICIES: dict[str, Numbers] = {"inference": POLICY, "identification": IDENTIFICATION}
 
 
 def main() -> None:

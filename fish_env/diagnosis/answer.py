@@ -22,6 +22,7 @@ from fish_env.diagnosis.entries import (
     residual_entry,
 )
 from fish_env.diagnosis.input_checks import doubts
+from fish_env.diagnosis.policy import policies_as_dict
 from fish_env.diagnosis.regimes import as_plain
 from fish_env.diagnosis.result import Diagnosed, Diagnosis
 from fish_env.identification.beats import beats_of, by_run, uneven
@@ -80,7 +81,7 @@ def shared_entries(diagnosis: Diagnosed) -> Plain:
         "dataset": diagnosis.dataset.name,
         "seed": diagnosis.seed,
         "quick": diagnosis.quick,
-        "policy": POLICY.as_dict(),
+        "policy": policies_as_dict(),
         "runtime_s": diagnosis.runtime_s,
         "verdict": verdict.name,
         "causes": [cause_entry(diagnosis.accepted, cause) for cause in verdict.causes],

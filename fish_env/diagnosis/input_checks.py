@@ -11,6 +11,7 @@ import numpy as np
 from fish_env.data import load_dataset
 from fish_env.data.clock import check_seconds
 from fish_env.data.schema import Dataset, Run, identical_runs
+from fish_env.diagnosis.policy import CHECKS
 from fish_env.errors import DatasetError
 from fish_env.identification.channels import body_channels, usable_channels
 from fish_env.identification.recorded import recorded_run
@@ -19,9 +20,6 @@ from fish_env.inference.hypotheses import short_name
 from fish_env.inference.policy import POLICY
 from fish_env.rigidbody.recording_faults import check_clock_jumps, check_stuck
 
-LONGEST_GAP_S = 5.0
-"""A motion carried further than this without a sample says nothing about the fish."""
-FEWEST_SAMPLES = 50
 _AMPLITUDE, _FREQUENCY = 1, 2
 
 
@@ -76,7 +74,7 @@ def _check_run(name: str, run: Run) -> None:
     _check_clock(place, run)
     for channel, values in run.channels.items():
         present = values[np.isfinite(values)]
-        if len(present) >= 10 and np.ptp(present) == 0.0:
+        if len(present) >= CHECKS.fewest_constant_samples and np.ptp(present) == 0.0:
             raise DatasetError(
                 f"{place}: {channel} is {present[0]:g} in every sample, like a broken sensor; "
                 "leave its cells empty in this run, or leave out the run"
@@ -100,7 +98,7 @@ def _check_length(place: str, run: Run) -> None:
 def _check_clock(place: str, run: Run) -> None:
     gaps = np.diff(run.time_s)
     longest = int(np.argmax(gaps))
-    if gaps[longest] > LONGEST_GAP_S:
+    if gaps[longest] > CHECKS.longest_gap_s:
         raise DatasetError(
             f"{place}: the clock jumps by {gaps[longest]:.4g} s at t = {run.time_s[longest]:.4g} s;"
             " times are in seconds: correct the clock, or split the run"
@@ -110,10 +108,10 @@ def _check_clock(place: str, run: Run) -> None:
 def _check_amount(dataset: Dataset) -> None:
     for channel in usable_channels(dataset.channels):
         present = sum(int(np.isfinite(run.channels[channel]).sum()) for run in dataset.runs)
-        if present < FEWEST_SAMPLES:
+        if present < CHECKS.fewest_channel_samples:
             raise DatasetError(
                 f"{dataset.name}: {present} samples of {channel} in all, too few for a "
-                f"diagnosis; measure at least {FEWEST_SAMPLES}"
+                f"diagnosis; measure at least {CHECKS.fewest_channel_samples}"
             )
 
 

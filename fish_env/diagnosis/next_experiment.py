@@ -15,6 +15,7 @@ import numpy as np
 
 from fish_env.arrays import FloatArray
 from fish_env.diagnosis.manoeuvres import DURATION_S, MENU, Manoeuvre
+from fish_env.diagnosis.policy import CHECKS
 from fish_env.identification import open_loop
 from fish_env.identification.runs import RunData
 from fish_env.identification.series import SeriesProblem, series_of
@@ -32,8 +33,6 @@ from fish_env.model.state import BASE_STATES
 RATE_HZ = 25.0
 STEP_S = 0.02
 """Longest step of a simulated manoeuvre; shorter where the fit has shorter ones, for quick lags."""
-SHOWN = 25.0
-"""A manoeuvre shows an effect that it changes the record by more than five deviations with."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +79,8 @@ def best_of(
     best, manoeuvre = max(found, key=lambda pair: float(np.mean(np.log1p(pair[0]))))
     apart = dict(zip(rivals, best.tolist(), strict=True))
     if verdict.name != "ambiguous":  # of rivals the best manoeuvre is wanted, however good it is
-        apart = {name: size for name, size in apart.items() if size > SHOWN}
+        enough = CHECKS.shown_separation
+        apart = {name: size for name, size in apart.items() if size > enough}
     if not apart:
         return None
     separated = float(np.mean(list(apart.values())))

@@ -18,6 +18,7 @@ from fish_env.diagnosis.gain import measure_gain, misfit_of, one_step
 from fish_env.diagnosis.input_checks import check_runs, divergence
 from fish_env.diagnosis.inputs.check import check_inputs
 from fish_env.diagnosis.next_experiment import propose
+from fish_env.diagnosis.policy import CHECKS
 from fish_env.diagnosis.regimes import localise_fits
 from fish_env.diagnosis.report import ReportSeries, series_from, write_report
 from fish_env.diagnosis.residual_model import ResidualModel, residual_model
@@ -229,7 +230,8 @@ def fitted_and_final(dataset: Dataset, seed: int) -> tuple[tuple[str, ...], tupl
     Repeats of a condition stay together: a run whose twin was fitted judges nothing.
     """
     conditions = {run.condition or run.id for run in dataset.runs}
-    if len(conditions) < 4:
+    if len(conditions) < CHECKS.fewest_for_held_out:
         return dataset.ids, ()
-    split = split_runs(dataset, seed, (0.75, 0.0, 0.25), by="condition")
+    share = CHECKS.held_out_runs
+    split = split_runs(dataset, seed, (1.0 - share, 0.0, share), by="condition")
     return (*split.fit, *split.select), split.final

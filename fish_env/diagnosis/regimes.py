@@ -19,16 +19,13 @@ import numpy.typing as npt
 
 from fish_env.arrays import BoolArray, FloatArray, IntArray
 from fish_env.data.vocabulary import COMMANDS
+from fish_env.diagnosis.policy import CHECKS
 from fish_env.identification.filtering import Filtered
 from fish_env.identification.runs import RunData
 from fish_env.identification.series import SeriesProblem
 from fish_env.model.state import BASE_STATES
 from fish_env.sensing import channels_from_states
 
-DRAWS = 499
-FEWEST_SAMPLES = 20
-"""A bin with fewer is shown but not judged."""
-LEVEL = 0.05
 STILL = 1e-3
 """rad. A tail that beats less has no phase and no frequency."""
 DEG = np.pi / 180.0
@@ -133,7 +130,7 @@ class Localisation:
         found = [
             self._place(c, regime, b)
             for regime in self.regimes
-            for c, b in np.argwhere(self.p_values[regime.name] < LEVEL)
+            for c, b in np.argwhere(self.p_values[regime.name] < CHECKS.regime_level)
         ]
         return tuple(sorted(found, key=lambda p: self.overall[p.channel] - p.energy))
 
@@ -228,7 +225,7 @@ def localise(
     channels: Sequence[str],
     runs: Sequence[RunResiduals],
     rng: np.random.Generator,
-    draws: int = DRAWS,
+    draws: int = CHECKS.regime_draws,
 ) -> Localisation:
     """Table of residual energy by channel and regime bin, with calibrated significance.
 
@@ -242,7 +239,7 @@ def localise(
     membership = np.concatenate([_membership(regimes, run) for run in runs])
     energies = [run.residuals**2 for run in runs]
     energy, counts = _means(membership, np.concatenate(energies))
-    judged = (counts >= FEWEST_SAMPLES) & np.isfinite(energy)
+    judged = (counts >= CHECKS.fewest_regime_samples) & np.isfinite(energy)
     null = np.array(
         [_means(membership, _shuffled(energies, rng))[0] for _ in range(draws)]
     )  # (draws, bins, C)

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fish_env.arrays import FloatArray, IntArray
+from fish_env.diagnosis.policy import CHECKS
 from fish_env.identification.filtering import Filtered
 from fish_env.identification.generic_forces import (
     BoundForces,
@@ -35,15 +36,6 @@ from fish_env.inference.projection import Projector
 from fish_env.inference.tails import chi2_log_tail
 
 Columns = IntArray
-POOL = 32
-"""Wrenches to choose from: those that the data ask for most, each alone."""
-MOST = 8
-APART = 1e-3
-"""Share of a wrench that those already chosen must leave."""
-ROUNDS, ROUNDS_BESIDE = 4, 1
-"""Most rounds of choosing and fitting: alone, and beside causes or where the runs differ.
-
-The latter rounds take longest."""
 RESTING = 0.3
 """Standard errors by which sizes may still move at the end."""
 
@@ -142,7 +134,8 @@ def residual_model(
     like = forces = generic_forces(series_of(explanation).runs, explanation.filtered)
     state = _State(explanation, np.zeros(0, np.int64), np.zeros(0), np.zeros(0))
     differing = spread_of(explanation.problem, explanation.noise).any()
-    most = ROUNDS_BESIDE if explanation.effects or differing else ROUNDS
+    beside = bool(explanation.effects) or differing
+    most = CHECKS.residual_rounds_beside if beside else CHECKS.residual_rounds
     for _ in range(most if rounds is None else rounds):
         chosen = _enlarged(state, forces, threshold)
         if not len(chosen.columns):
@@ -176,7 +169,7 @@ def _enlarged(state: _State, forces: GenericForces, threshold: float) -> _State:
     projector = Projector(own)
     bound = BoundForces(own, forces)
     asked = sorted(generic_signals(bound, projector), key=lambda signal: signal[1].log_p)
-    others = [column for column, _ in asked[:POOL] if column not in present]
+    others = [column for column, _ in asked[: CHECKS.residual_pool] if column not in present]
     pool = np.array([*present, *others], np.int64)
     before = np.r_[state.sizes, np.zeros(len(others))] / probes(pool)
     change = own.linearised.whitened(bound.changes(pool).T).T
@@ -216,7 +209,7 @@ class _Chooser:
         if self.all is None:
             return []
         chosen = present
-        while len(chosen) < MOST:
+        while len(chosen) < CHECKS.most_residual_terms:
             log_p = {i: self._log_p([*chosen, i])[-1] for i in self._apart(chosen)}
             best = min(log_p, key=lambda i: log_p[i], default=None)
             if best is None or log_p[best] > self.threshold:
@@ -253,7 +246,8 @@ class _Chooser:
         shared = whole[:, own]
         swallowed = shared * np.linalg.solve(whole[np.ix_(own, own)], shared.T).T
         left = 1.0 - swallowed.sum(axis=1) / np.diag(whole)
-        return [i for i in range(len(whole)) if i not in own and left[i] > APART]
+        least = CHECKS.least_residual_share
+        return [i for i in range(len(whole)) if i not in own and left[i] > least]
 
 
 def _refitted(state: _State, forces: GenericForces) -> Fit | None:

@@ -12,6 +12,7 @@ from fish_env.commands.diagnose import diagnose_dataset, print_headline
 from fish_env.diagnosis import diagnose
 from fish_env.diagnosis.answer import FORMAT
 from fish_env.diagnosis.headline import headline
+from fish_env.diagnosis.policy import policies_as_dict
 from fish_env.diagnosis.writing import write_answer
 from fish_env.inference.verdict import VERDICTS
 from fish_env.params import load_fish
@@ -45,6 +46,7 @@ def test_a_hidden_effect_is_named_with_its_size(lagging):
     answer = json.loads((out / "diagnosis.json").read_text())
     assert answer["format"] == FORMAT
     assert set(answer) >= KEYS
+    assert answer["policy"] == policies_as_dict()
     assert answer["verdict"] == "cause"
     assert [cause["name"] for cause in answer["causes"]] == ["servo_lag"]
     found = answer["causes"][0]["parameters"]["time_constant"]

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from fish_env.data import CommandSteps, Dataset, Run
-from fish_env.diagnosis.inputs.check import CERTAIN, check_inputs
+from fish_env.diagnosis.inputs.check import check_inputs
 from fish_env.diagnosis.inputs.drive_law import DriveLaw, drive_law
+from fish_env.diagnosis.policy import CHECKS
 from fish_env.identification.tail_drive import SCALE, tail_drive
 from fish_env.inference.hypotheses import EffectParameterId
 
@@ -95,9 +96,9 @@ def test_tails_that_obey_have_no_law():
 def test_own_beats_of_runs_are_no_certain_law():
     """Runs that differ by two per cent: chance makes no law certain, and a law is."""
     chance = [drive_law(swaying(seed, own=0.02)).p for seed in range(20, 50)]
-    assert min(chance) > CERTAIN
+    assert min(chance) > CHECKS.certain_law_level
     assert sum(p < 0.05 for p in chance) <= 5  # binomial: more in one set of thirty of 300
-    assert drive_law(swaying(1, own=0.02, offset=0.25)).p < CERTAIN
+    assert drive_law(swaying(1, own=0.02, offset=0.25)).p < CHECKS.certain_law_level
 
 
 def test_without_a_beat_nothing_is_said():

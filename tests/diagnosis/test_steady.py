@@ -8,6 +8,7 @@ import pytest
 
 from fish_env.data import SteadyDataset, load_dataset
 from fish_env.diagnosis import diagnose
+from fish_env.diagnosis.policy import policies_as_dict
 from fish_env.diagnosis.tables.pipeline import diagnose_steady, refitted, untold
 from fish_env.effects.extended import build_model
 from fish_env.errors import DatasetError
@@ -267,6 +268,7 @@ def test_a_table_whose_tail_never_beats_is_answered(frequency):
     still = SteadyDataset("still", "zheng-2021-a", ids, (None,) * len(ids), commands, observed)
     answer = diagnose_steady(still, quick=True)
     assert answer["verdict"] == "not_excited"
+    assert answer["policy"] == policies_as_dict()
     row = answer["next_experiment"]["schedule"][0]
     assert row["tail_amplitude"] > 0.0
     assert row["tail_frequency"] > 0.0

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import pytest
 
+from fish_env.diagnosis.policy import POLICIES, policies_as_dict
 from fish_env.inference.policy import POLICY
-from scripts.make_policy_page import PAGE, POLICIES, with_tables
+from scripts.make_policy_page import PAGE, with_tables
 
 every_policy = pytest.mark.parametrize("policy", POLICIES.values(), ids=POLICIES.keys())
 
@@ -29,6 +30,11 @@ def test_every_number_names_its_source(policy):
 def test_every_number_says_what_it_decides(policy):
     assert policy.meanings().keys() == policy.as_dict().keys()
     assert all(policy.meanings().values())
+
+
+def test_no_two_numbers_have_one_name():
+    """In ``diagnosis.json`` the numbers of all policies stand beside each other."""
+    assert len(policies_as_dict()) == sum(len(policy.as_dict()) for policy in POLICIES.values())
 
 
 def test_meanings_of_several_lines_are_whole():

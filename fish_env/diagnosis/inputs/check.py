@@ -15,28 +15,22 @@ from fish_env.data.schema import Dataset
 from fish_env.diagnosis.inputs.changes import Change
 from fish_env.diagnosis.inputs.clocks import strokes_of
 from fish_env.diagnosis.inputs.drive_law import DriveLaw, drive_law
-from fish_env.diagnosis.inputs.fine import BIAS, Fine, fine_clock
+from fish_env.diagnosis.inputs.fine import Fine, fine_clock
 from fish_env.diagnosis.inputs.ratios import ratio_near
 from fish_env.diagnosis.inputs.search import Found, search
 from fish_env.diagnosis.inputs.weighing import BEAT, Scales
+from fish_env.diagnosis.policy import CHECKS
 from fish_env.errors import DatasetError
 from fish_env.identification.beats import own_ratio
 from fish_env.identification.recorded import recorded
 from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.input_faults import InputFault
+from fish_env.inference.policy import POLICY
 from fish_env.params.io import load_fish
 from fish_env.params.schema import FishParams
 from fish_env.rigidbody.derived import Derived, derived_channels
 from fish_env.rigidbody.noise_floor import noise_floors
 
-ORDINARY_BEAT = 0.15
-"""A tail that beats so much faster or slower than it was told is a servo's doing: the effect
-`frequency_scale` describes it, and runs of a real robot differ as much. Beyond, a command or a
-clock is wrong."""
-CERTAIN = 1e-3
-"""p-value of a law of the beat that needs no model of forces to be believed. Without any law the
-p-values are uniform, also where each run has a beat of its own
-(`tests/diagnosis/test_drive_law.py`)."""
 TIMES = ("clock", "clock_skew", "beat")
 PACES = ("frequency_scale", "clock_scale", "clock_skew")
 """Effects by which a fish makes another frequency of the commanded one."""
@@ -106,7 +100,7 @@ def check_inputs(dataset: Dataset, fish: FishParams | None = None, seed: int = 0
         dataset = seen.fine.change.applied(dataset)
     drive = seen.law.starts(math.prod(change.clocks[""].beat for change in left))
     drive = {id: v for id, v in drive.items() if id.effect not in nominal.effects}
-    certain = seen.law.p < CERTAIN
+    certain = seen.law.p < CHECKS.certain_law_level
     return Inputs(tuple(faults), _noted(dataset, faults), logged, drive, certain)
 
 
@@ -226,9 +220,9 @@ def _fault(one: Found, right: Dataset) -> InputFault:
 
 
 def _ordinary(change: Change) -> bool:
-    """Whether a beat is no further off than servos are."""
+    """Whether a beat is no further off than servos are, as `frequency_scale` describes them."""
     ratios = [clocks.beat for clocks in change.clocks.values()]
-    return change.kind == "beat" and all(abs(r - 1.0) < ORDINARY_BEAT for r in ratios)
+    return change.kind == "beat" and all(abs(r - 1.0) < CHECKS.servo_beat_error for r in ratios)
 
 
 def _interval(change: Change, right: Dataset) -> tuple[float, float] | None:
@@ -238,7 +232,8 @@ def _interval(change: Change, right: Dataset) -> tuple[float, float] | None:
     left = ratio_near(list(strokes_of(right).values()))
     if left is None:
         return None
-    half = float(ndtri(0.975)) * float(np.hypot(left.sd, BIAS))
+    error = float(np.hypot(left.sd, CHECKS.ratio_bias))
+    half = float(ndtri(POLICY.interval_ends[1])) * error
     return change.value * (1.0 - half), change.value * (1.0 + half)
 
 

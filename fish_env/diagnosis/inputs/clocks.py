@@ -15,16 +15,12 @@ from fish_env.data.schema import Dataset
 from fish_env.diagnosis.inputs.changes import Change
 from fish_env.diagnosis.inputs.clock_changes import beat, clock
 from fish_env.diagnosis.inputs.orders import Stroke, stroke_of
-from fish_env.diagnosis.inputs.ratios import CLEAR, beat_ratio, clock_ratio
+from fish_env.diagnosis.inputs.ratios import beat_ratio, clock_ratio
 from fish_env.diagnosis.inputs.skews import Aligner, near_skew, skews
 from fish_env.diagnosis.inputs.weighing import Scales, Weighed
+from fish_env.diagnosis.policy import CHECKS
 from fish_env.identification.recorded import recorded
 from fish_env.rigidbody.gridded import gridded
-
-GROSS = 0.1
-"""Log of a ratio of angles to rates that no gain of a gyro makes."""
-NEAR = 0.02
-"""Spread of ratios, relative, within which runs are taken to beat alike."""
 
 
 def strokes_of(dataset: Dataset) -> dict[str, Stroke]:
@@ -44,9 +40,10 @@ def changes_of_clocks(dataset: Dataset, scales: Scales, now: Weighed) -> list[Ch
     """
     found: list[Change] = []
     gross = clock_ratio(now)
-    if gross is not None and abs(np.log(gross)) > GROSS:
+    if gross is not None and abs(np.log(gross)) > CHECKS.gross_clock:
         found.append(clock(gross))
-    astray = [run for run, left in now.beats.items() if np.mean(left) > 1.0 - CLEAR]
+    unclear = 1.0 - CHECKS.clear_sway
+    astray = [run for run, left in now.beats.items() if np.mean(left) > unclear]
     if astray:
         found += _beats(strokes_of(dataset), astray)
     aligner = Aligner.of(dataset)
@@ -78,4 +75,4 @@ def _beats(strokes: Mapping[str, Stroke], astray: Sequence[str]) -> list[Change]
 
 
 def _close(values: Sequence[float]) -> bool:
-    return bool(np.ptp(values) < NEAR * np.mean(values))
+    return bool(np.ptp(values) < CHECKS.alike_beats * np.mean(values))

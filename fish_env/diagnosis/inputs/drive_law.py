@@ -18,6 +18,7 @@ from fish_env.data.schema import CommandSteps, Dataset, Run
 from fish_env.diagnosis.inputs.clocks import strokes_of
 from fish_env.diagnosis.inputs.orders import FREQUENCY, drive_terms, windows_of
 from fish_env.diagnosis.inputs.ratios import peaks_of, ratio_near
+from fish_env.diagnosis.policy import CHECKS
 from fish_env.effects import catalogue
 from fish_env.identification.tail_drive import RATE, SCALE
 from fish_env.inference.hypotheses import EffectParameterId
@@ -36,10 +37,6 @@ SMALLEST = tuple(
 )
 """The least that the catalogue takes for plausible. Without any such effect the regression finds
 less than a third of it."""
-LEVEL = 0.05
-"""Of a two-sided t-test. A term only begins a fit, whose evidence decides."""
-FAR = 3.5
-"""Robust standard deviations from which a window's beat is another thing's."""
 ROUNDS = 8
 
 
@@ -125,7 +122,7 @@ def _law(ratio: FloatArray, weight: FloatArray, terms: FloatArray, run_of: IntAr
         p = 2.0 * stdtr(freedom, -np.abs(value[1:] / error[1:]))
         small = np.array([size < SMALLEST[i] for size, i in zip(sizes, kept, strict=True)], bool)
         doubtful = np.where(small, 1.0, p)
-        if not kept or doubtful.max() < LEVEL:
+        if not kept or doubtful.max() < CHECKS.drive_law_level:
             found = {TERMS[i]: float(size) for i, size in zip(kept, sizes, strict=True)}
             largest = min(1.0, len(TERMS) * float(doubtful.max())) if kept else 1.0
             return DriveLaw(float(value[0]), found, largest)
@@ -163,7 +160,7 @@ def _regression(
         offset, shrink = _own_offsets(left, used, own)
         left -= offset[own]
         scale = 1.4826 * float(np.median(np.abs(left[near])))
-        near = np.abs(left) < FAR * max(scale, 1e-4)
+        near = np.abs(left) < CHECKS.far_window_sd * max(scale, 1e-4)
     pulls = rows[:, :-1] * (used * (rows[:, -1] - rows[:, :-1] @ value))[:, None]
     sums = np.array([pulls[own == run].sum(axis=0) for run in range(len(runs))])
     freedom = max(len(runs) - columns.shape[1], 1)

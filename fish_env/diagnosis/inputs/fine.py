@@ -18,21 +18,12 @@ from fish_env.diagnosis.inputs.clock_changes import beat, clock, skew
 from fish_env.diagnosis.inputs.clocks import strokes_of
 from fish_env.diagnosis.inputs.ratios import Ratio, ratio_near
 from fish_env.diagnosis.inputs.skews import Aligner
+from fish_env.diagnosis.policy import CHECKS
 from fish_env.identification.beats import beats_of, by_run
 from fish_env.identification.recorded import recorded
+from fish_env.inference.policy import POLICY
 from fish_env.rigidbody.consistency import check_consistency
 from fish_env.rigidbody.kinematic_fit import Estimate
-
-BIAS = 0.001
-"""What the ratio of beats is off by in good data: the hull answers quicker beats later."""
-SURE, SMALLEST = 5.0, 0.004
-"""Standard errors, and size, from which a common ratio is not one."""
-UNEVEN, BY_CHANCE = 0.01, 1e-5
-"""Spread of ratios between runs worth a word, and its p-value."""
-AGREE = 3.0
-"""Standard errors within which a beat and a scale of angles are one clock."""
-ALIGNED = 5.0
-"""Log likelihood by which the times of commands tell one clock from two."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,15 +88,16 @@ def _uneven(ratios: Sequence[Ratio]) -> float | None:
     if len(ratios) < 2:
         return None
     values = np.array([ratio.value for ratio in ratios])
-    weights = np.array([ratio.sd**2 + BIAS**2 for ratio in ratios]) ** -1
+    weights = np.array([ratio.sd**2 + CHECKS.ratio_bias**2 for ratio in ratios]) ** -1
     square = float(weights @ (values - weights @ values / weights.sum()) ** 2)
     p = float(chdtrc(len(values) - 1, square))
-    return p if np.std(values, ddof=1) > UNEVEN and p < BY_CHANCE else None
+    differ = np.std(values, ddof=1) > CHECKS.uneven_ratios
+    return p if differ and p < CHECKS.uneven_ratios_level else None
 
 
 def _off(ratio: Ratio) -> bool:
-    error = float(np.hypot(ratio.sd, BIAS))
-    return abs(ratio.value - 1.0) > max(SURE * error, SMALLEST)
+    error = float(np.hypot(ratio.sd, CHECKS.ratio_bias))
+    return abs(ratio.value - 1.0) > max(CHECKS.sure_ratio_sd * error, CHECKS.smallest_ratio_error)
 
 
 def _clock_or_beat(
@@ -114,8 +106,9 @@ def _clock_or_beat(
     rng: np.random.Generator,
 ) -> Fine:
     """Which of the two a common ratio is."""
-    error = float(np.hypot(whole.sd, BIAS))
-    half, p = float(ndtri(0.975)) * error, float(2.0 * ndtr(-abs(whole.value - 1.0) / error))
+    error = float(np.hypot(whole.sd, CHECKS.ratio_bias))
+    half = float(ndtri(POLICY.interval_ends[1])) * error
+    p = float(2.0 * ndtr(-abs(whole.value - 1.0) / error))
     interval = (whole.value - half, whole.value + half)
     slow, common = clock(whole.value), beat({"": whole.value})
     scale = _scale(dataset, rng)
@@ -123,9 +116,9 @@ def _clock_or_beat(
         return Fine(common, interval, p, (slow,), False)
     apart = abs(scale.value - (whole.value - 1.0)) / np.hypot(scale.error, whole.sd)
     if not scale.found:
-        apart_enough = bool(apart >= AGREE)
+        apart_enough = bool(apart >= CHECKS.one_clock_sd)
         return Fine(common, interval, p, () if apart_enough else (slow,), apart_enough)
-    if apart > AGREE:
+    if apart > CHECKS.one_clock_sd:
         return Fine(common, interval, p, (), False)
     changes = _one_clock_or_two(dataset, whole.value)
     return Fine(changes[0], interval, scale.p, tuple(changes[1:]), True)
@@ -151,6 +144,6 @@ def _one_clock_or_two(dataset: Dataset, ratio: float) -> list[Change]:
     gain = (
         0.5 * windows * (aligner.left((1.0 / ratio, 0.0), ratio) - aligner.left((1.0, 0.0), ratio))
     )
-    if abs(gain) < ALIGNED:
+    if abs(gain) < CHECKS.clock_evidence:
         return [one, two] if gain > 0.0 else [two, one]
     return [one] if gain > 0.0 else [two]

@@ -10,11 +10,8 @@ import numpy as np
 from fish_env.arrays import FloatArray
 from fish_env.diagnosis.inputs.orders import Stroke, Window, bands, explained, windows_of
 from fish_env.diagnosis.inputs.weighing import Weighed
+from fish_env.diagnosis.policy import CHECKS
 
-CLEAR = 0.5
-"""Share of the sway that a beat explains if it is the tail's. In good data it is above 0.8."""
-ALIKE = 0.9
-"""Correlation above which a ratio of an angle's and a rate's increments is one of clocks."""
 SIDE, REFINED = 0.12, 50
 """How far around a multiple it is refined, relative, and in how many steps."""
 RATIOS = ("roll against p", "pitch against q", "yaw against r",
@@ -47,7 +44,7 @@ def beat_ratio(strokes: Sequence[Stroke]) -> Ratio | None:
         mean = np.mean([explained(w, multiples) for w in windows], axis=0)
         if mean.max() > share:
             best, share = float(multiples[np.argmax(mean)]), float(mean.max())
-    if share < CLEAR:
+    if share < CHECKS.clear_sway:
         return None
     return _refined([w for s in strokes for w in windows_of(s, best)], best)
 
@@ -56,7 +53,7 @@ def ratio_near(strokes: Sequence[Stroke], near: float = 1.0) -> Ratio | None:
     """The same ratio, looked for close to where it is known to be."""
     windows = [w for stroke in strokes for w in windows_of(stroke, near)]
     found = _refined(windows, near) if windows else None
-    return found if found is not None and found.clear >= CLEAR else None
+    return found if found is not None and found.clear >= CHECKS.clear_sway else None
 
 
 def _refined(windows: Sequence[Window], near: float) -> Ratio:
@@ -69,7 +66,7 @@ def _refined(windows: Sequence[Window], near: float) -> Ratio:
         return Ratio(float(_around(near)[centre]), SIDE * near, float(total[centre]))
     value, weight = found[known].T
     middle = float(np.median(value))
-    kept = np.abs(value - middle) < 0.03 * near
+    kept = np.abs(value - middle) < CHECKS.far_peak * near
     value, weight = value[kept], weight[kept] / weight[kept].sum()
     mean = float(weight @ value)
     sd = float(np.sqrt(weight**2 @ (value - mean) ** 2 * len(value) / max(len(value) - 1, 1)))
@@ -92,7 +89,7 @@ def peaks_of(windows: Sequence[Window], near: float) -> tuple[FloatArray, FloatA
     found = np.full((len(windows), 2), np.nan)
     for share, peak in zip(shares, found, strict=True):
         at = int(np.argmax(share))
-        if 0 < at < len(multiples) - 1 and share[at] > CLEAR:
+        if 0 < at < len(multiples) - 1 and share[at] > CHECKS.clear_sway:
             peak[0] = _vertex(multiples[at - 1 : at + 2], share[at - 1 : at + 2])
             peak[1] = share[at] / (1.01 - share[at])
     return shares, found
@@ -111,5 +108,5 @@ def _vertex(x: FloatArray, y: FloatArray) -> float:
 def clock_ratio(weighed: Weighed) -> float | None:
     """How much faster angles and positions grow than rates and speeds say; None if unknown."""
     found = [c.ratio for name, c in weighed.comparisons.items()
-             if name in RATIOS and c.likeness > ALIKE]  # fmt: skip
+             if name in RATIOS and c.likeness > CHECKS.clock_likeness]  # fmt: skip
     return float(np.median(found)) if found else None

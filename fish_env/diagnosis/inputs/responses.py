@@ -15,6 +15,7 @@ import numpy as np
 from fish_env.arrays import FloatArray
 from fish_env.data.schema import CommandSteps
 from fish_env.data.units import unwrap_angle
+from fish_env.diagnosis.policy import CHECKS
 from fish_env.errors import RoboticFishError
 from fish_env.rigidbody.comparisons import Comparison, compared
 from fish_env.rigidbody.gridded import GridRun, averaged, grown
@@ -25,12 +26,8 @@ BEAT_S = 1.0
 """s over which motions are averaged: about a beat."""
 DEPTH_S = 2.0
 """s over which a change of depth is taken."""
-SETTLED_S = 3.0
-"""s. A run that begins in motion is compared from here on."""
 STEP_S = 0.02
 """s. Physics step: only averages are wanted."""
-BY_NOISE = 1e-3
-"""Probability that noise alone makes a way that counts."""
 AGAINST = "against commands"
 Simulated = dict[str, FloatArray]
 
@@ -60,7 +57,7 @@ def simulate(
     seen = {name: np.asarray(values) for name, values in swum.channels.items()}
     seen |= {name: unwrap_angle(seen[name]) for name in ("roll", "yaw")}
     if not from_rest:
-        late = grid.since_s < SETTLED_S
+        late = grid.since_s < CHECKS.compared_from_s
         seen = {name: np.where(late, np.nan, values) for name, values in seen.items()}
     return seen
 
@@ -125,7 +122,8 @@ def _speed(columns: Sequence[FloatArray], stride: int) -> FloatArray:
     way: FloatArray = np.hypot(*(grown(column, stride) for column in columns))
     noise = float(np.linalg.norm([_noise(column) for column in columns]))
     # The way between two positions with this noise is Rayleigh distributed.
-    return np.where(way > noise * np.sqrt(-2.0 * np.log(BY_NOISE)), way, np.nan)
+    farthest = noise * np.sqrt(-2.0 * np.log(CHECKS.way_by_noise_level))
+    return np.where(way > farthest, way, np.nan)
 
 
 def _noise(column: FloatArray) -> float:

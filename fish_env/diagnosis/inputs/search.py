@@ -13,26 +13,7 @@ from fish_env.diagnosis.inputs.clocks import changes_of_clocks
 from fish_env.diagnosis.inputs.library import readings
 from fish_env.diagnosis.inputs.responses import AGAINST
 from fish_env.diagnosis.inputs.weighing import BEAT, Scales, Weighed
-
-SUSPICIOUS = 0.4
-"""Disagreement from which the columns of a comparison are read otherwise."""
-FALLS = 0.2
-"""By how much a mistake, put right, lowers the disagreement of some comparison.
-
-A wrong sign takes it from near 2 to near 0, a unit from 1 to near 0."""
-LEFT = 0.5
-"""Share of the disagreement of a column that may be left once it is read right.
-
-A fish whose file is wrong by a factor of two is no wrong unit: a unit that makes it better leaves
-most of the disagreement."""
-LEVEL = 0.01
-"""Probability by chance below which a finding is decisive."""
-RIVAL = 8.0
-"""Log likelihood within which another reading explains as much."""
-CLOCKS_TRIED = 500
-"""Distinct rates and offsets of clocks that a search may end at."""
-MOST = 6
-"""Mistakes that are looked for, one after the other."""
+from fish_env.diagnosis.policy import CHECKS
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,8 +41,9 @@ class Found:
     @property
     def decisive(self) -> bool:
         """Whether chance cannot have made it, and no other reading than it or its rivals can."""
-        enough = bool(self.change.clocks) or self.after < LEFT * self.before
-        return self.p < LEVEL and self.before - self.after > FALLS and enough
+        enough = bool(self.change.clocks) or self.after < CHECKS.most_left * self.before
+        falls = self.before - self.after > CHECKS.least_fall
+        return self.p < CHECKS.input_fault_level and falls and enough
 
 
 def search(dataset: Dataset, scales: Scales) -> tuple[list[Found], Dataset]:
@@ -73,7 +55,7 @@ def search(dataset: Dataset, scales: Scales) -> tuple[list[Found], Dataset]:
     """
     found: list[Found] = []
     now = scales.weigh(dataset)
-    while len(found) < MOST:
+    while len(found) < CHECKS.most_input_faults:
         best = best_reading(dataset, scales, now, readings(dataset))
         if best is None or not best.decisive:
             return found, dataset
@@ -100,18 +82,18 @@ def best_reading(
     if not weighed:
         return None
     gains = np.array([now.gain(other) for _, other in weighed])
-    first = int(np.argmax(gains))
+    first, rival = int(np.argmax(gains)), CHECKS.rival_reading
     beats = [i for i, (c, _) in enumerate(weighed) if c.kind == "beat" and "" in c.clocks]
     if weighed[first][0].kind in ("clock", "beat") and beats:
         # A beat is the smaller claim where the data cannot tell it from a clock.
-        first = beats[0] if gains[beats[0]] > gains[first] - RIVAL else first
+        first = beats[0] if gains[beats[0]] > gains[first] - rival else first
     change, after = weighed[first]
     gain = float(gains[first])
     rivals = tuple(
         other for (other, _), g in zip(weighed, gains, strict=True)
-        if other is not change and g > gain - RIVAL
+        if other is not change and g > gain - rival
     )  # fmt: skip
-    p = float(min(1.0, (len(every) + CLOCKS_TRIED) * np.exp(-max(gain, 0.0))))
+    p = float(min(1.0, (len(every) + CHECKS.clocks_tried) * np.exp(-max(gain, 0.0))))
     own = change.clocks.keys() - {""}
     pair = (now.of_runs(own), after.of_runs(own)) if own else (now, after)
     return Found(change, gain, p, *pair[0].clearest(pair[1]), rivals)
@@ -119,7 +101,8 @@ def best_reading(
 
 def _questioned(change: Change, now: Weighed) -> bool:
     """Whether a comparison that a change may touch is bad."""
-    bad = {name for name, value in now.disagreement.items() if value > SUSPICIOUS and name != BEAT}
+    enough = CHECKS.suspicious_disagreement
+    bad = {name for name, value in now.disagreement.items() if value > enough and name != BEAT}
     if change.commands and any(name.endswith(AGAINST) for name in bad):
         return True
     return any(set(now.comparisons[name].channels) & change.channels.keys() for name in bad)

@@ -13,21 +13,15 @@ from fish_env.diagnosis.inputs.changes import Change
 from fish_env.diagnosis.inputs.clock_changes import skew
 from fish_env.diagnosis.inputs.orders import Stroke, explained, stroke_of, windows_of
 from fish_env.diagnosis.inputs.responses import BEAT_S, Simulated, simulate
-from fish_env.diagnosis.inputs.weighing import LEAST
+from fish_env.diagnosis.policy import CHECKS
 from fish_env.identification.recorded import recorded
 from fish_env.rigidbody.gridded import GridRun, averaged, gridded, grown
 from fish_env.simulator import Simulator
 
 SCALES = np.geomspace(0.18, 5.6, 230)
 """Rates of the commands' clock that are tried."""
-SHIFT_S = 5.0
-"""s. Largest offset between two clocks that is looked for."""
 SPACING_S = 0.2
 """s between the points at which answers are compared."""
-FEWEST_CHANGES = 3
-"""Changes of command in a run that are needed to tell when they came."""
-WORTH = 0.1
-"""By how much the mean log of what the beat leaves has to fall for a skew to be tried."""
 Pair = tuple[float, float]
 """Scale and offset (s) that put the times of the commands right."""
 
@@ -47,7 +41,8 @@ class Aligner:
     @classmethod
     def of(cls, dataset: Dataset) -> Aligner | None:
         """For a dataset; None if its commands hardly change, so that nothing shows when."""
-        if not any(len(run.commands.times_s) > FEWEST_CHANGES for run in dataset.runs):
+        fewest = CHECKS.fewest_command_changes
+        if not any(len(run.commands.times_s) > fewest for run in dataset.runs):
             return None
         return cls(dataset.runs, gridded(recorded(dataset)))
 
@@ -84,7 +79,7 @@ def near_skew(aligner: Aligner) -> Pair | None:
     tried = [(1.0, 0.1 * i) for i in range(-10, 11)] + [(1 + 0.01 * i, 0.0) for i in range(-6, 7)]
     left = {pair: aligner.left(pair) for pair in tried}
     best = min(tried, key=lambda pair: left[pair])
-    return None if left[best] > left[1.0, 0.0] - WORTH else best
+    return None if left[best] > left[1.0, 0.0] - CHECKS.least_skew_gain else best
 
 
 def skews(aligner: Aligner, simulator: Simulator, near: Pair | None) -> list[Change]:
@@ -102,7 +97,7 @@ def skews(aligner: Aligner, simulator: Simulator, near: Pair | None) -> list[Cha
     # Either the clock of the measurements is right, or that of the commands.
     for right in (True, False):
         scale, offset = _refined(aligner, about, right)
-        if abs(scale - 1.0) > 0.004:
+        if abs(scale - 1.0) > CHECKS.smallest_ratio_error:
             value, shift = (scale, offset) if right else (1.0 / scale, offset / scale)
             found.append(skew(value, shift, of_commands=right))
     found.append(skew(1.0, _refined(aligner, (1.0, about[1]), True, (1.0,))[1]))
@@ -178,7 +173,7 @@ def _by_shift(
     measured: Sequence[dict[str, FloatArray]], swum: Sequence[dict[str, FloatArray]]
 ) -> tuple[FloatArray, FloatArray]:
     """Score of every offset of the commands (low is good), and the offsets, s."""
-    most = round(SHIFT_S / SPACING_S)
+    most = round(CHECKS.largest_clock_offset_s / SPACING_S)
     total = np.zeros(2 * most + 1)
     for name in {name for answers in measured for name in answers}:
         error, size, count = (np.zeros(2 * most + 1) for _ in range(3))
@@ -189,7 +184,8 @@ def _by_shift(
                 size += own + other
                 count += known
         disagreement = error / np.maximum(size, 1e-12)
-        total += count * SPACING_S * np.log(np.clip(disagreement, 0.0, 2.0) + LEAST)
+        logs = np.log(np.clip(disagreement, 0.0, 2.0) + CHECKS.best_disagreement)
+        total += count * SPACING_S * logs
     return total, SPACING_S * np.arange(-most, most + 1, dtype=np.float64)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from fish_env.data.schema import CommandSteps, Dataset, Run
 from fish_env.diagnosis.inputs.orders import Stroke, explained, stroke_of, windows_of
 from fish_env.diagnosis.inputs.responses import STEP_S, Simulated, responses, simulate
+from fish_env.diagnosis.policy import CHECKS
 from fish_env.identification.recorded import recorded
 from fish_env.params.schema import FishParams
 from fish_env.rigidbody.comparisons import Comparison
@@ -18,10 +19,6 @@ from fish_env.rigidbody.links import links
 from fish_env.simulator import Simulator
 
 BEAT = "beat against commands"
-LEAST = 0.02
-"""Disagreement below which a comparison cannot get better."""
-SHARED = 0.5
-"""What a window of a comparison counts: several comparisons are made of the same motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,11 +52,12 @@ class Weighed:
         Errors are taken to be normal with a size of their own in each comparison.
         """
         mine, theirs, windows = self.disagreement, other.disagreement, self.windows
+        least = CHECKS.best_disagreement
         return sum(
             0.5
-            * (1.0 if name == BEAT else SHARED)
+            * (1.0 if name == BEAT else CHECKS.comparison_weight)
             * windows[name]
-            * float(np.log((mine[name] + LEAST) / (theirs[name] + LEAST)))
+            * float(np.log((mine[name] + least) / (theirs[name] + least)))
             for name in mine.keys() & theirs.keys()
         )
 

@@ -13,7 +13,8 @@ import numpy as np
 from fish_env.arrays import FloatArray
 from fish_env.data.vocabulary import COMMANDS
 from fish_env.diagnosis.headline import many_fitted
-from fish_env.diagnosis.regimes import LEVEL, Localisation
+from fish_env.diagnosis.policy import CHECKS
+from fish_env.diagnosis.regimes import Localisation
 from fish_env.diagnosis.report.series import RunSeries, SteadySeries
 from fish_env.diagnosis.report.units import label, shown_unit
 from fish_env.files import file_name, replacing
@@ -174,7 +175,7 @@ def _draw_map(
     image = ax.pcolormesh(edges, np.arange(len(size) + 1), size, cmap="cividis", norm=norm)
     for c, b in np.argwhere(np.isnan(size)):
         ax.add_patch(Rectangle((edges[b], c), wide, 1, fc="none", ec="#999999", hatch="////", lw=0))
-    for c, b in np.argwhere(found.p_values[name] < LEVEL):
+    for c, b in np.argwhere(found.p_values[name] < CHECKS.regime_level):
         corner = (edges[b] + 0.04 * wide, c + 0.06)
         ax.add_patch(Rectangle(corner, 0.92 * wide, 0.88, fill=False, ec=VERMILION, lw=1.8))
     return image, edges

@@ -19,6 +19,7 @@ from fish_env.diagnosis.next_experiment import (
     rivals_of,
     unfollowed,
 )
+from fish_env.diagnosis.policy import CHECKS
 from fish_env.identification.tables.problem import TableProblem
 from fish_env.identification.tables.table import Table
 from fish_env.inference.attribution import Attribution
@@ -30,9 +31,6 @@ from fish_env.inference.verdict import Verdict
 HOLD_S = 60.0
 ORDINARY_AMPLITUDE, ORDINARY_FREQUENCIES = 0.35, (1.0, 2.0)
 """rad and Hz, of a tail that the table's commands leave still."""
-REPEATS = 4
-WORTH = 1.0
-"""Squared distance, in noise units, below which no condition is worth the while."""
 
 
 def propose(
@@ -58,13 +56,14 @@ def propose(
     there = steady_only(problem.with_table(candidates(problem.table)), fit)
     if there is None:
         return _over_time(names)
-    distance = separation(fit, there, list(rivals.values()))
-    best = int(np.argmax(np.log1p(REPEATS * distance).mean(axis=0)))
-    if REPEATS * distance[:, best].max() < WORTH:
+    repeats = CHECKS.held_repeats
+    distance = repeats * separation(fit, there, list(rivals.values()))
+    best = int(np.argmax(np.log1p(distance).mean(axis=0)))
+    if distance[:, best].max() < CHECKS.least_separation:
         return _over_time(names)
     row = dict(zip(COMMANDS, there.table.commands[best].tolist(), strict=True))
-    held = f"hold one condition, average over whole beats, {REPEATS} times"
-    gained = float(REPEATS * distance[:, best].mean())
+    held = f"hold one condition, average over whole beats, {repeats} times"
+    gained = float(distance[:, best].mean())
     return Proposal(held, ({"t": 0.0, **row}, {"t": HOLD_S, **row}), names, gained)
 
 

@@ -15,6 +15,7 @@ from fish_env.arrays import IntArray
 from fish_env.data import split_runs
 from fish_env.data.schema import SteadyDataset
 from fish_env.diagnosis.next_experiment import plausible_sizes
+from fish_env.diagnosis.policy import CHECKS
 from fish_env.diagnosis.report import write_report
 from fish_env.diagnosis.report.steady import steady_series_from
 from fish_env.diagnosis.result import TableDiagnosis
@@ -41,9 +42,6 @@ from fish_env.params.io import load_fish
 from fish_env.params.schema import FishParams
 
 Progress = Callable[[str], None]
-FEWEST_CONDITIONS = 3
-FEWEST_FOR_FINAL = 6
-"""Conditions a table must have before a fifth of them are held out."""
 ABSENT = (
     "left out, because this table cannot show effects that depend on place, heading or time, or "
     "that do not change averages: {names}"
@@ -123,10 +121,10 @@ def diagnose_table(
 
 
 def _check(table: Table) -> None:
-    if len(table.conditions) < FEWEST_CONDITIONS:
+    if len(table.conditions) < CHECKS.fewest_conditions:
         raise DatasetError(
             f"{table.name}: {len(table.conditions)} condition(s) are too few to distinguish "
-            f"causes; measure at least {FEWEST_CONDITIONS}"
+            f"causes; measure at least {CHECKS.fewest_conditions}"
         )
 
 
@@ -170,10 +168,11 @@ def split_conditions(dataset: SteadyDataset, table: Table, seed: int) -> tuple[I
     Among the first, each is left out in turn to select, so none is set apart for that.
     """
     count = len(table.conditions)
-    if count < FEWEST_FOR_FINAL:
+    if count < CHECKS.fewest_for_held_out_conditions:
         return np.arange(count), np.arange(0)
     named = replace(dataset, conditions=tuple(table.conditions[i] for i in table.condition_of))
-    split = split_runs(named, seed, (0.8, 0.0, 0.2), by="condition")
+    share = CHECKS.held_out_conditions
+    split = split_runs(named, seed, (1.0 - share, 0.0, share), by="condition")
     rows = [table.ids.index(i) for i in split.final]
     final = np.unique(table.condition_of[rows])
     return np.setdiff1d(np.arange(count), final), final

@@ -1,7 +1,8 @@
 """Every number that decides about inputs and answers of a diagnosis, with its source.
 
-Those of inference, for any vehicle, are in :mod:`fish_env.inference.policy`, and those of
-identification in :mod:`fish_env.identification.policy`.
+Those of inference and of recordings, for any vehicle, are in :mod:`fish_env.inference.policy` and
+:mod:`fish_env.rigidbody.policy`, and those of identification in
+:mod:`fish_env.identification.policy`.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from dataclasses import dataclass
 from fish_env.identification.policy import IDENTIFICATION
 from fish_env.inference.policy import POLICY
 from fish_env.inference.policy_numbers import BY_HAND, EFFORT, FISHER, Numbers, number
+from fish_env.rigidbody.policy import RECORDINGS
 
 COUNTED = f"{BY_HAND}; scripts/calibrate_inputs.py counts false alarms"
 
@@ -146,6 +148,7 @@ class ChecksPolicy(Numbers):
 CHECKS = ChecksPolicy()
 POLICIES: Mapping[str, Numbers] = {
     "inference": POLICY,
+    "recordings": RECORDINGS,
     "identification": IDENTIFICATION,
     "checks": CHECKS,
 }

@@ -19,7 +19,8 @@ from fish_env.identification.in_step import nominal_point
 from fish_env.identification.policy import IDENTIFICATION
 from fish_env.identification.runs import RunData
 from fish_env.identification.series import SeriesProblem
-from fish_env.rigidbody.outliers import GATE, SETTLED, Outliers
+from fish_env.rigidbody.outliers import Outliers
+from fish_env.rigidbody.policy import RECORDINGS
 
 BESIDE, AROUND = (-2, -1, 1, 2), (-4, -3, -2, -1, 1, 2, 3, 4)
 """Samples whose median says what is missed anyhow, and those that say how much that scatters."""
@@ -76,7 +77,7 @@ def _missed(run: RunData, filtered: Filtered) -> FloatArray:
 
 def _near_jumps(run: RunData) -> BoolArray:
     """(T,) whether a command jumped so shortly before a sample that a spike may be motion."""
-    steps = int(np.ceil(SETTLED))
+    steps = int(np.ceil(RECORDINGS.jump_settles_samples))
     padded = np.r_[np.zeros(steps, bool), run.fresh]
     shifted = [padded[i : i + len(run.fresh)] for i in range(steps + 1)]
     return np.asarray(np.logical_or.reduce(shifted))
@@ -136,7 +137,8 @@ def _peaks(away: FloatArray, scale: float) -> BoolArray:
     sizes = np.abs(away)
     local = MAD_SD * np.nan_to_num(_median_of(sizes, AROUND))
     largest = np.nanmax([np.nan_to_num(_shifted(sizes, by)) for by in BESIDE], axis=0)
-    return np.asarray((sizes > GATE * np.maximum(scale, local)) & (sizes >= largest))
+    gate = RECORDINGS.outlier_gate_sd * np.maximum(scale, local)
+    return np.asarray((sizes > gate) & (sizes >= largest))
 
 
 def _without(run: RunData, mask: BoolArray) -> RunData:

@@ -9,11 +9,10 @@ import numpy as np
 
 from fish_env.arrays import FloatArray
 from fish_env.rigidbody.gridded import GridRun
+from fish_env.rigidbody.policy import RECORDINGS
 
 WINDOW_S = 5.0
 """s. Windows this long are nearly independent of each other."""
-FEWEST_POINTS = 8
-"""Points that a window needs to count."""
 
 Part = tuple[GridRun, FloatArray, FloatArray, int]
 """A run, what was measured (n, d), what was expected (n, d), and the stride in steps."""
@@ -80,7 +79,7 @@ def compared(
             continue
         m, g = (np.reshape(a, (len(a), -1)) for a in (measured, expected))
         known = np.isfinite(m).all(axis=1) & np.isfinite(g).all(axis=1)
-        if known.sum() < FEWEST_POINTS:
+        if known.sum() < RECORDINGS.fewest_compared_points:
             continue
         if centred:
             m, g = m - m[known].mean(axis=0), g - g[known].mean(axis=0)
@@ -88,7 +87,8 @@ def compared(
         m, g = m[known], g[known]
         squares = [np.sum(a**2, axis=1) for a in (m - g, m, g)]
         sums = np.array([np.bincount(window, weights=a) for a in squares])
-        found.append(sums[:, np.bincount(window) >= FEWEST_POINTS])
+        enough = np.bincount(window) >= RECORDINGS.fewest_compared_points
+        found.append(sums[:, enough])
     error, size, other = np.hstack([np.zeros((3, 0)), *found])
     if not np.any(size + other):
         return None

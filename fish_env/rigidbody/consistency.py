@@ -10,8 +10,6 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 
 from fish_env.rigidbody.kinematic_fit import (
-    FEWEST_WINDOWS,
-    LEVEL,
     POWER_80,
     Estimate,
     Tested,
@@ -19,6 +17,7 @@ from fish_env.rigidbody.kinematic_fit import (
 )
 from fish_env.rigidbody.kinematics import ANGLES, POSITIONS, RATES, VELOCITIES, relations_of
 from fish_env.rigidbody.noise_floor import Floor, noise_floors
+from fish_env.rigidbody.policy import RECORDINGS
 from fish_env.rigidbody.recording import Recording
 
 _TURNING, _MOVING = (*ANGLES, *RATES), (*POSITIONS, *ANGLES, *VELOCITIES)
@@ -127,16 +126,19 @@ def _explained(start: Estimate, told: Iterable[Estimate]) -> bool:
     """Whether a reading at the start is what an effect that was found makes of it."""
     if not start.name.startswith("start."):
         return False
-    name = start.name.removeprefix("start.")
+    name, sure = start.name.removeprefix("start."), RECORDINGS.same_reading_sd
     return any(
-        e.found and abs(e.value - start.value) < 3.0 * np.hypot(e.error, start.error)
+        e.found and abs(e.value - start.value) < sure * np.hypot(e.error, start.error)
         for e in told
         if e.name.endswith((f"bias_{name}", f"{name}_offset"))
     )
 
 
 def check_consistency(
-    recording: Recording, rng: np.random.Generator, floors: Sequence[Floor] | None = None
+    recording: Recording,
+    rng: np.random.Generator,
+    floors: Sequence[Floor] | None = None,
+    draws: int = RECORDINGS.consistency_draws,
 ) -> Consistency:
     """Step 2 of a diagnosis: do the channels agree among themselves?
 
@@ -144,13 +146,14 @@ def check_consistency(
         recording: measured runs.
         rng: for the resampling.
         floors: noise floors, if they are known already.
+        draws: number of draws that p-values come from.
     """
     known = tuple(floors) if floors is not None else noise_floors(recording)
     noise = {f.channel: f.white.sd for f in known if f.white is not None and f.white.sd > 0.0}
     relations = [r for r in relations_of(recording.channels) if {*r.outputs, *r.inputs} <= {*noise}]
     start = _has_start(recording, noise)
     sharing = len(relations) + start
-    tested = [fit_relation(recording, r, noise, rng, sharing) for r in relations]
+    tested = [fit_relation(recording, r, noise, rng, sharing, draws) for r in relations]
     if start:
         tested.append(read_starts(recording, noise, sharing))
     effects = tuple(_shown(name, recording.channels, tested) for name in NEEDS)
@@ -174,7 +177,7 @@ def read_starts(recording: Recording, noise: Mapping[str, float], sharing: int =
             continue
         error = float(np.hypot(noise[name], AT_REST[name]) / np.sqrt(first.size))
         p = _chance(first.mean() / error, sharing * len(names))
-        critical = _quantile(LEVEL / (sharing * len(names)))
+        critical = _quantile(RECORDINGS.consistency_level / (sharing * len(names)))
         words = f"{name} reads this where a run is declared to begin level and at rest"
         estimates.append(
             Estimate(f"start.{name}", _UNITS[name], words, float(first.mean()), error, p,
@@ -278,9 +281,10 @@ def _unnamed(e: Estimate) -> str:
 def _nothing_to_compare(consistency: Consistency) -> str:
     short = [r for r in consistency.tested if r.name != "start"]
     if short:
+        fewest = RECORDINGS.fewest_consistency_windows
         return (
             f"The runs are too short to compare {', '.join(short[0].channels)} with each other: "
-            f"fewer than {FEWEST_WINDOWS} windows of {short[0].window_s:g} s."
+            f"fewer than {fewest} windows of {short[0].window_s:g} s."
         )
     return (
         f"No kinematic relation connects {', '.join(consistency.channels)}, so these channels "
@@ -291,7 +295,7 @@ def _nothing_to_compare(consistency: Consistency) -> str:
 def as_dict(consistency: Consistency) -> dict[str, Any]:
     """What ``diagnosis.json`` holds of step 2."""
     return {
-        "level": LEVEL,
+        "level": RECORDINGS.consistency_level,
         "relations": [_relation(r) for r in consistency.tested],
         "effects": [
             {

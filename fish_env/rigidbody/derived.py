@@ -14,14 +14,11 @@ import numpy as np
 
 from fish_env.arrays import FloatArray, IntArray
 from fish_env.rigidbody.noise_floor import Floor
+from fish_env.rigidbody.policy import RECORDINGS
 from fish_env.rigidbody.recording import RecordedRun, Recording
 
 REACH = 6
 """Samples on each side that a differentiation may use."""
-FEWEST = 200
-"""Samples that a test needs."""
-OWN_NOISE = 0.25
-"""Share of its noise that an independent channel keeps at least, whatever is taken off it."""
 RIDGE = 1e-13
 """Share of the trace that keeps the normal equations regular."""
 HALVES = 2
@@ -60,7 +57,7 @@ def derived_channels(recording: Recording, floors: Sequence[Floor]) -> tuple[Der
             continue
         sources = _sources(channel, measured)
         left = _left(recording, channel, sources) if sources else None
-        if left is not None and left < OWN_NOISE * noise[channel]:
+        if left is not None and left < RECORDINGS.own_noise * noise[channel]:
             found.append(Derived(channel, sources, left / noise[channel]))
     return tuple(found)
 
@@ -81,7 +78,7 @@ def _left(recording: Recording, channel: str, sources: tuple[str, ...]) -> float
     """Root mean square of what a filter of the sources leaves of a channel; None if unknown."""
     pairs = [_rows(run, channel, sources) for run in recording.runs]
     design, values = (np.concatenate(side) for side in zip(*pairs, strict=True))
-    if len(values) < FEWEST:
+    if len(values) < RECORDINGS.fewest_derived_samples:
         return None
     half = np.arange(len(values)) * HALVES // len(values)
     errors = []

@@ -14,11 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from fish_env.arrays import BoolArray, FloatArray, IntArray
+from fish_env.rigidbody.policy import RECORDINGS
 
 REACH = 4
 """Neighbours on each side that predict a sample."""
-FEWEST = 60
-"""Samples with all neighbours that the weights need, ten for each number and more."""
 BIWEIGHT = 4.685
 """Tuning constant with 95 % efficiency for normal noise (Holland and Welsch, 1977)."""
 ROUNDS = 8
@@ -64,7 +63,7 @@ def interpolator_of(windows: Sequence[FloatArray]) -> Interpolator | None:
         windows: of each run, (m, 2 REACH + 1).
     """
     every = np.concatenate(windows)
-    if len(every) < FEWEST:
+    if len(every) < RECORDINGS.fewest_interpolated_samples:
         return None
     near, pairs = _pairs(every)
     target = every[:, REACH] - near

@@ -18,14 +18,11 @@ from scipy.linalg import solveh_banded
 
 from fish_env.arrays import FloatArray, IntArray
 from fish_env.rigidbody.kinematics import Increments, Prepared, Relation
+from fish_env.rigidbody.policy import RECORDINGS
 from fish_env.rigidbody.recording import Recording
 
-LEVEL = 0.01
-"""Share of consistent datasets in which anything at all is called inconsistent."""
 WINDOWS_S = (3.0, 6.0, 12.0)
 """Lengths of window that are tried until the scores of neighbours are independent."""
-FEWEST_WINDOWS = 8
-DRAWS = 3999
 ROUNDS = 6
 POWER_80 = 0.8416
 """Quantile of the normal distribution at 0.8."""
@@ -56,7 +53,7 @@ class Estimate:
     @property
     def found(self) -> bool:
         """Whether the channels contradict each other in this."""
-        return self.p < LEVEL
+        return self.p < RECORDINGS.consistency_level
 
 
 @dataclass(frozen=True)
@@ -67,7 +64,7 @@ class Tested:
         name: "attitude" or "position".
         channels: that it relates.
         level: roll and pitch were taken to be zero.
-        windows: number of them; too few to test below `FEWEST_WINDOWS`.
+        windows: number of them; too few to test below `fewest_consistency_windows`.
         window_s: their length.
         estimates: of its settings; empty if it was not tested.
         left: root mean square of the whitened increments left over; 1 is noise.
@@ -111,6 +108,7 @@ def fit_relation(
     noise: Mapping[str, float],
     rng: np.random.Generator,
     sharing: int = 1,
+    draws: int = RECORDINGS.consistency_draws,
 ) -> Tested:
     """Fit a relation and test its settings.
 
@@ -120,14 +118,15 @@ def fit_relation(
         noise: standard deviation of the white noise of each channel.
         rng: for the random signs.
         sharing: how many relations share the level.
+        draws: number of draws that p-values come from.
     """
     about = relation.name, (*relation.outputs, *relation.inputs), relation.level
     fitted = _fit(recording, relation, noise)
     if fitted is None:
         return Tested(*about, 0, WINDOWS_S[0], (), float("nan"))
     values, scores, length = fitted
-    errors, largest = _resampled(scores, rng)
-    critical = float(np.quantile(largest, 1.0 - LEVEL / sharing))
+    errors, largest = _resampled(scores, rng, draws)
+    critical = float(np.quantile(largest, 1.0 - RECORDINGS.consistency_level / sharing))
     estimates = []
     for setting, value, error in zip(relation.settings, values, errors, strict=True):
         beyond = 1 + int(np.sum(largest >= abs(value) / error))
@@ -148,7 +147,7 @@ def _fit(
     for _ in range(ROUNDS):
         linear = [_linearised(run, relation, values) for run in prepared]
         scores = _scores(linear, relation, values, noise, WINDOWS_S[0])
-        if len(scores.score) < FEWEST_WINDOWS:
+        if len(scores.score) < RECORDINGS.fewest_consistency_windows:
             return None
         step = np.linalg.lstsq(scores.curvature.sum(0), scores.score.sum(0), rcond=None)[0]
         values = values + step
@@ -158,7 +157,7 @@ def _fit(
     linear = [_linearised(run, relation, values) for run in prepared]
     for length in WINDOWS_S:
         longer = _scores(linear, relation, values, noise, length)
-        if length > chosen and len(longer.score) < 2 * FEWEST_WINDOWS:
+        if length > chosen and len(longer.score) < 2 * RECORDINGS.fewest_consistency_windows:
             break
         scores, chosen = longer, length
         if not _neighbours_correlated(scores):
@@ -266,7 +265,9 @@ def _neighbours_correlated(scores: Scores) -> bool:
     return bool(np.any(mean > chance))
 
 
-def _resampled(scores: Scores, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+def _resampled(
+    scores: Scores, rng: np.random.Generator, draws: int
+) -> tuple[FloatArray, FloatArray]:
     """Standard errors of the settings, and draws of the largest studentised error of all.
 
     Errors are those of leaving one window out at a time, which few windows make large rather than
@@ -280,9 +281,9 @@ def _resampled(scores: Scores, rng: np.random.Generator) -> tuple[FloatArray, Fl
     influence = free @ total
     count = len(influence)
     errors = np.sqrt(np.sum(influence**2, axis=0) * (count - 1) / count)
-    largest = np.empty(DRAWS)
-    for first in range(0, DRAWS, 500):
-        signs = rng.choice([-1.0, 1.0], (min(500, DRAWS - first), count))
+    largest = np.empty(draws)
+    for first in range(0, draws, 500):
+        signs = rng.choice([-1.0, 1.0], (min(500, draws - first), count))
         moved = signs @ influence
         # Scores about the moved estimate.
         drawn = signs[:, :, None] * free - np.einsum("wij,dj->dwi", scores.curvature, moved)

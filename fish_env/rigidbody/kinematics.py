@@ -18,14 +18,13 @@ from scipy import sparse
 from scipy.interpolate import CubicSpline
 
 from fish_env.arrays import BoolArray, FloatArray
+from fish_env.rigidbody.policy import RECORDINGS
 from fish_env.rigidbody.recording import RecordedRun
 
 ANGLES, RATES = ("roll", "pitch", "yaw"), ("p", "q", "r")
 POSITIONS, VELOCITIES = ("x", "y", "z"), ("u", "v", "w")
 LONGEST_BRIDGE = 3.5
 """Usual sample intervals. Across a longer gap nothing is integrated."""
-MOST_JERKED = 0.3
-"""Share of the increments that may be left out because something jerks the body."""
 CHUNK, MEMORY = 60, 24
 """Samples that are integrated at a time, and how many beside them a spline takes into account."""
 FEWEST_SAMPLES = 5
@@ -239,7 +238,7 @@ def _unjerked(run: RecordedRun, t_out: FloatArray) -> BoolArray:
     keep = np.ones(len(t_out) - 1, bool)
     for at in run.jerks_s:
         keep &= (t_out[1:] < at - 0.5 * step) | (t_out[:-1] > at + 2.5 * step)
-    return keep if keep.mean() > 1.0 - MOST_JERKED else np.ones_like(keep)
+    return keep if keep.mean() > 1.0 - RECORDINGS.most_jerked else np.ones_like(keep)
 
 
 def integrator(t_in: FloatArray, t_out: FloatArray, breaks: FloatArray) -> sparse.csr_array:

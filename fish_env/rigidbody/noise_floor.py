@@ -18,19 +18,16 @@ import numpy as np
 from scipy.special import chdtri
 
 from fish_env.arrays import FloatArray
+from fish_env.rigidbody.policy import RECORDINGS
 from fish_env.rigidbody.recording import RecordedRun, Recording
 
 ORDERS = range(2, 11)
 SEGMENT = 32
 """Samples of a piece whose spectrum is taken."""
-FEWEST = 12
-"""Samples that a channel needs for any statement."""
 WINDOW, QUIET = 30, 0.15
 """Samples of a short window, and the quantile of the windows that counts as quiet."""
 UNCERTAIN_LEAKAGE = 0.5
 """Share of the motion expected in a difference that may be wrong after it has been taken off."""
-TOO_LARGE, TOO_SMALL = 0.85, 1.3
-"""Estimate over declared value, beyond which the declared one cannot be right."""
 SETTLING_S, SHORTEST_STILL_S = 1.0, 2.0
 _TURNING = ("roll", "yaw")
 
@@ -90,8 +87,9 @@ class Floor:
         if self.declared is None or self.white is None:
             return False
         low, high = self.white.ci95
-        too_large = high < TOO_LARGE * self.declared
-        return too_large or (low > TOO_SMALL * self.declared and not self.upper_bound)
+        too_large = high < RECORDINGS.declared_too_large * self.declared
+        too_small = low > RECORDINGS.declared_too_small * self.declared
+        return too_large or (too_small and not self.upper_bound)
 
 
 def noise_floors(recording: Recording) -> tuple[Floor, ...]:
@@ -126,7 +124,7 @@ def samples(run: RecordedRun, channel: str) -> tuple[FloatArray, FloatArray]:
 
 def _white(series: list[tuple[FloatArray, FloatArray]]) -> tuple[Spread | None, int, float, bool]:
     """White part, order of differences, share taken off, and whether it is only a bound."""
-    if sum(len(values) for _, values in series) < FEWEST:
+    if sum(len(values) for _, values in series) < RECORDINGS.fewest_noise_samples:
         return None, 0, 0.0, True
     spectrum = mean_spectrum(series)
     found = {order: _differences(series, order) for order in ORDERS}
@@ -301,7 +299,7 @@ def _still(recording: Recording, channel: str) -> Spread | None:
             if end - begin < SHORTEST_STILL_S + SETTLING_S:
                 continue
             inside = (times >= begin + SETTLING_S) & (times < end)
-            if inside.sum() < FEWEST:
+            if inside.sum() < RECORDINGS.fewest_noise_samples:
                 continue
             t = (times[inside] - begin) / (end - begin)
             left = values[inside] - np.polyval(np.polyfit(t, values[inside], 3), t)
@@ -318,7 +316,7 @@ def _repeats(recording: Recording, channel: str) -> Spread | None:
             continue
         (t1, a), (t2, b) = samples(first, channel), samples(second, channel)
         _, at1, at2 = np.intersect1d(t1 - t1[0], t2 - t2[0], return_indices=True)
-        if at1.size < FEWEST:
+        if at1.size < RECORDINGS.fewest_noise_samples:
             continue
         apart = (a[at1] - a[at1[0]]) - (b[at2] - b[at2[0]])
         squares += 0.5 * float(apart @ apart)

@@ -20,12 +20,8 @@ from fish_env.rigidbody.interpolation import (
     windows_of,
     without_turns,
 )
+from fish_env.rigidbody.policy import RECORDINGS
 from fish_env.rigidbody.recording import RecordedRun, Recording
-
-GATE = 6.0
-"""Standard deviations from which a sample is an outlier: of 500 million normal ones, one."""
-SETTLED = 2.5
-"""Samples after a jump of a command in which a spike of a rate may be motion."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +78,8 @@ def _outliers(recording: Recording, channel: str) -> Outliers:
              for v, e, f in zip(series, even, flagged, strict=True)]  # fmt: skip
     again = interpolator_of(clean) or known
     every = np.concatenate([again.errors(w) for w in clean])
-    every = every[np.abs(every) < GATE * again.scale]  # jerks, and outliers side by side
+    gate = RECORDINGS.outlier_gate_sd * again.scale
+    every = every[np.abs(every) < gate]  # not jerks, nor outliers side by side
     noise = float(np.sqrt(np.mean(every**2)) / again.gain) if every.size else None
     return Outliers(channel, unit, tuple(flagged), noise, np.array(sizes))
 
@@ -92,7 +89,7 @@ def _calm(run: RecordedRun) -> BoolArray:
     time_s, events = run.time_s, np.sort(np.r_[run.jumps_s, run.jerks_s])
     step = float(np.median(np.diff(time_s)))
     last = np.r_[-np.inf, events][np.searchsorted(events, time_s + step)]
-    return np.asarray(time_s - last > SETTLED * step)
+    return np.asarray(time_s - last > RECORDINGS.jump_settles_samples * step)
 
 
 def _flag(
@@ -106,7 +103,7 @@ def _flag(
         errors[at] = known.errors(windows)
         found = False
         for i in np.argsort(-np.abs(errors)):
-            if abs(errors[i]) < GATE * known.scale:
+            if abs(errors[i]) < RECORDINGS.outlier_gate_sd * known.scale:
                 break
             around = slice(max(i - REACH, 0), i + REACH + 1)
             if (
@@ -132,7 +129,7 @@ def _alone(values: FloatArray, error: float, i: int, known: Interpolator) -> boo
     at, windows = windows_of(around, np.ones(len(around), bool))
     left = known.errors(windows)[at != own]
     local = float(np.sqrt(np.mean(left**2))) if left.size else 0.0
-    return bool(abs(error) > GATE * max(known.scale, local))
+    return bool(abs(error) > RECORDINGS.outlier_gate_sd * max(known.scale, local))
 
 
 def as_dict(found: Sequence[Outliers]) -> Mapping[str, Mapping[str, float | int | None]]:

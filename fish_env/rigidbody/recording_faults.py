@@ -6,24 +6,11 @@ import numpy as np
 
 from fish_env.arrays import BoolArray, FloatArray
 from fish_env.errors import DatasetError
+from fish_env.rigidbody.policy import RECORDINGS
 from fish_env.rigidbody.recording import RecordedRun
 
-FEWEST_STUCK = 10
-"""Samples in a row of one value; fewer may be coarse digits."""
-CHANCE = 1e-6
-"""How likely such a row may be by coarse digits alone."""
-COARSE = 0.2
-"""Distinct values, as a share of all, below which digits hide the noise of a body at rest."""
-LEAP = 0.5
-"""Usual steps by which a channel leaps into or out of a row of one value; a fish that comes to
-move after a rest does so more smoothly."""
-GAP = 5.0
-"""Usual sample intervals, beyond which an interval is looked at for a jump of the clock."""
 SIDE = 6
-"""Samples on either side of it."""
-FITS, CONTRADICTS = 4.0, 8.0
-"""Standard errors within which motion goes on as if no time had passed, and beyond which it could
-not have stood still for so long."""
+"""Samples on either side of a gap."""
 _TURNING = ("roll", "yaw")
 
 
@@ -37,23 +24,24 @@ def check_stuck(place: str, run: RecordedRun, channel: str) -> None:
     """
     measured = np.isfinite(run.channels[channel])
     values, time = run.channels[channel][measured], run.time_s[measured]
-    if len(values) < 2 * FEWEST_STUCK:
+    if len(values) < 2 * RECORDINGS.fewest_stuck_samples:
         return
     steps = np.diff(values)
-    coarse = len(np.unique(values)) < COARSE * len(values)
+    coarse = len(np.unique(values)) < RECORDINGS.coarse_digits * len(values)
     at_rest = _during(run.still_s, time) & coarse
     begin, length = _longest_row((steps == 0.0) & ~(at_rest[1:] & at_rest[:-1]))
     rows = length + 1
     resting = run.from_rest and begin == 0
-    if rows < FEWEST_STUCK or resting:
+    if rows < RECORDINGS.fewest_stuck_samples or resting:
         return
     others = np.delete(steps, np.s_[begin : begin + length])
     repeated = max(float(np.mean(others == 0.0)) if others.size else 1.0, 1.0 / len(values))
     moving = np.abs(others[others != 0.0])
-    if repeated**length * len(values) > CHANCE or not moving.size:
+    by_chance = repeated**length * len(values)
+    if by_chance > RECORDINGS.stuck_level or not moving.size:
         return
     beside = [steps[i] for i in (begin - 1, begin + length) if 0 <= i < len(steps)]
-    if not beside or max(np.abs(beside)) < LEAP * np.median(moving):
+    if not beside or max(np.abs(beside)) < RECORDINGS.least_leap * np.median(moving):
         return
     raise DatasetError(
         f"{place}: {channel} is stuck at {values[begin]:g} for {rows} samples in a row, from t = "
@@ -85,7 +73,7 @@ def check_clock_jumps(place: str, run: RecordedRun) -> None:
     """
     times = run.time_s
     step = float(np.median(np.diff(times)))
-    for index in np.flatnonzero(np.diff(times) > GAP * step):
+    for index in np.flatnonzero(np.diff(times) > RECORDINGS.clock_gap * step):
         span = float(times[index + 1] - times[index])
         verdicts = [_goes_on(run, name, times[index], span, step) for name in run.channels]
         known = [v for v in verdicts if v is not None]
@@ -120,7 +108,8 @@ def _goes_on(
     if not pairs.size or error == 0.0:
         return None
     usual = float(np.median(np.abs(values[later[pairs]] - values[pairs])))
-    return abs(right - left) < FITS * error, usual > CONTRADICTS * error
+    fits = abs(right - left) < RECORDINGS.clock_jump_fits_sd * error
+    return fits, usual > RECORDINGS.clock_jump_excludes_sd * error
 
 
 def _extrapolated(time: FloatArray, values: FloatArray, at: float) -> tuple[float, float]:

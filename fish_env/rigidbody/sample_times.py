@@ -17,14 +17,12 @@ from fish_env.rigidbody.interpolation import (
     windows_of,
     without_turns,
 )
-from fish_env.rigidbody.outliers import GATE
+from fish_env.rigidbody.policy import RECORDINGS
 from fish_env.rigidbody.recording import Recording
 
 ROUNDS = 4
 BLOCK = 50
 """Samples whose errors may be alike: those of a block count as one when errors are judged."""
-SURE = 2.0
-"""Standard errors above the estimate: 97.5 % of normal ones are below."""
 
 
 def rate_of(time_s: FloatArray, values: FloatArray) -> FloatArray:
@@ -55,7 +53,8 @@ def largest_jitter_s(recording: Recording) -> float:
     variances, errors = np.array(told).T
     weights = 1.0 / np.maximum(errors, 1e-30) ** 2
     error = float(weights.sum()) ** -0.5
-    return float(np.sqrt(max(float(np.average(variances, weights=weights)) + SURE * error, 0.0)))
+    most = float(np.average(variances, weights=weights)) + RECORDINGS.jitter_bound_sd * error
+    return float(np.sqrt(max(most, 0.0)))
 
 
 def _growth(recording: Recording, channel: str) -> tuple[float, float]:
@@ -74,7 +73,7 @@ def _growth(recording: Recording, channel: str) -> tuple[float, float]:
         shown = np.zeros(len(values))
         speed = rate_of(run.time_s, values) ** 2
         shown[REACH:-REACH] = np.convolve(speed, known.weights_of_sample**2, "valid")
-        kept = np.abs(errors) < GATE * known.scale
+        kept = np.abs(errors) < RECORDINGS.outlier_gate_sd * known.scale
         squares.append(errors[kept] ** 2)
         shares.append(shown[at[kept]])
         blocks.append(at[kept] // BLOCK + len(values) * len(blocks))

@@ -21,13 +21,12 @@ EVERY = ("x", "y", "z", "roll", "pitch", "yaw", "u", "v", "w", "p", "q", "r")
 GYRO, ANGLES = ("p", "q", "r"), ("roll", "pitch", "yaw")
 
 
-@pytest.fixture(autouse=True)
-def few_draws(monkeypatch):
-    monkeypatch.setattr(kinematic_fit, "DRAWS", 599)
+DRAWS = 599
 
 
 def checked(seed=0, **wrong):
-    return check_consistency(recorded(measured(seed, **wrong)), np.random.default_rng(seed))
+    rng = np.random.default_rng(seed)
+    return check_consistency(recorded(measured(seed, **wrong)), rng, draws=DRAWS)
 
 
 def estimates(consistency):
@@ -138,7 +137,7 @@ def test_a_film_from_above_is_taken_to_be_level_and_says_so():
 
 def test_runs_that_do_not_begin_at_rest_though_declared_so():
     dataset = measured(0, start="rest")
-    found = check_consistency(recorded(dataset), np.random.default_rng(0))
+    found = check_consistency(recorded(dataset), np.random.default_rng(0), draws=DRAWS)
     assert any(e.name.startswith("start.") for e in found.unnamed)
     assert any("start: unknown" in s for s in sentences(found))
 
@@ -163,7 +162,7 @@ def test_gaps_and_patchy_samples_do_not_bias():
         for values in run.channels.values():
             values[rng.random(len(values)) < 0.05] = np.nan
             values[100:140] = np.nan
-    found = check_consistency(recorded(dataset), rng)
+    found = check_consistency(recorded(dataset), rng, draws=DRAWS)
     assert found.found == ()
     assert found.tested[0].windows >= 8
 

@@ -28,9 +28,9 @@ class ChecksPolicy(Numbers):
         fewest_constant_samples: samples of one value from which a channel counts as broken.
         suspicious_disagreement: disagreement of a comparison (0 the same, 1 unrelated, 2 opposite)
             from which its columns are read otherwise.
-        least_fall: fall of the disagreement by which a mistake, put right, is decisive.
-        most_left: share of the disagreement that may be left once a column is read right; a fish
-            whose file is wrong by a factor of two leaves more in a wrong unit.
+        least_fall: least fall of the disagreement by a decisive mistake, once it is put right.
+        most_left: share of the disagreement that a decisive mistake, once put right, may leave;
+            where the fish file is wrong by a factor of two, a wrong unit leaves more.
         input_fault_level: probability by chance below which a mistake is decisive.
         rival_reading: log likelihood within which another reading explains as much.
         clocks_tried: distinct rates and offsets of clocks that a search may end at.
@@ -38,7 +38,8 @@ class ChecksPolicy(Numbers):
         best_disagreement: disagreement below which a comparison cannot get better.
         comparison_weight: what a window of a comparison counts, as several comparisons are made of
             the same motion.
-        way_by_noise_level: probability that noise alone makes a way that counts.
+        way_by_noise_level: probability that noise alone makes a displacement from which a speed is
+            taken.
         compared_from_s: start of a run in motion that is not compared with a simulation (s).
         servo_beat_error: share of the commanded frequency within which a servo may be off; beyond,
             a command or a clock is wrong.
@@ -55,12 +56,14 @@ class ChecksPolicy(Numbers):
         sure_ratio_sd: standard errors from which a ratio of beats is not one.
         ratio_bias: what the ratio of beats is off by in good data.
         uneven_ratios: spread over runs of ratios of beats from which runs differ.
-        uneven_ratios_level: p-value of that spread.
+        uneven_ratios_level: p-value of the spread over runs of ratios of beats from which runs
+            differ.
         one_clock_sd: standard errors within which a beat and a scale of angles are one clock.
         clock_evidence: log likelihood by which the times of commands tell one clock from two.
         drive_law_level: p-value of a term of a law of the beat.
         certain_law_level: p-value of a law of the beat that is believed without a model of forces.
-        far_window_sd: robust standard deviations from which a window's beat is another thing's.
+        far_window_sd: robust standard deviations beyond which the beat of a window is left out of a
+            law of the beat.
         fewest_for_held_out: smallest number of runs, or conditions of runs, of which some are held
             out.
         held_out_runs: share of the runs that is held out.
@@ -68,17 +71,18 @@ class ChecksPolicy(Numbers):
         fewest_for_held_out_conditions: conditions of a table from which some are held out.
         held_out_conditions: share of the conditions that is held out.
         regime_level: p-value, over the whole table of regimes, of a place where misfit sits.
-        regime_draws: shuffles that these p-values come from.
+        regime_draws: number of shuffles for the p-values of regimes.
         fewest_regime_samples: samples from which a regime is judged.
-        residual_pool: most indicated wrenches that a model of the residual is chosen from.
-        most_residual_terms: largest number of terms of that model.
-        least_residual_share: share of a wrench that those chosen before it must leave.
-        residual_rounds: rounds of choosing and fitting it.
-        residual_rounds_beside: such rounds beside causes, or where runs differ.
+        residual_pool: most indicated wrenches that the model of the residual is chosen from.
+        most_residual_terms: largest number of terms of the model of the residual.
+        least_residual_share: share of a wrench that terms chosen before it must leave.
+        residual_rounds: largest number of rounds of choosing and fitting the model of the residual.
+        residual_rounds_beside: the same beside causes, or where runs differ.
         shown_separation: squared distance, in noise units, that a manoeuvre must make between an
             effect and the present explanation.
         held_repeats: repeats of a proposed condition of a table.
-        least_separation: squared distance, in noise units, that they must make together.
+        least_separation: squared distance, in noise units, that all repeats of a proposed condition
+            must make together.
     """
 
     longest_gap_s: float = number(

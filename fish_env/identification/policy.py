@@ -19,14 +19,15 @@ class IdentificationPolicy(Numbers):
     Attributes:
         fewest_beats: beats that a stretch of constant commands must last for its beat to be
             measured.
-        fewest_beat_samples: samples that it must have.
+        fewest_beat_samples: samples that a stretch of constant commands must have for its beat to
+            be measured.
         lowest_beat_ratio: lowest beat looked for, over the commanded frequency.
         highest_beat_ratio: highest beat looked for, over the commanded frequency; twice it is the
             beat of surge and power.
         sway_level: p-value of a sway that is taken for the beat of the tail.
         uneven_beats: spread over runs of measured over commanded frequency from which runs beat
             differently.
-        uneven_beats_level: p-value of that spread.
+        uneven_beats_level: p-value of the spread over runs from which runs beat differently.
         fewest_runs_for_beats: smallest number of runs for a comparison of their beats.
         least_beat_difference: relative difference of two beats that the comb of frequencies cannot
             tell apart.
@@ -38,7 +39,7 @@ class IdentificationPolicy(Numbers):
         ordinary_mean_sd: standard errors of a mean over runs within which beats and sags are
             ordinary.
         ordinary_beat_error: share of the commanded frequency within which a servo is usually off.
-        outlier_rounds: rounds in which samples far off the predictions are left out.
+        outlier_rounds: rounds in which samples far from their prediction are left out.
         unjudged_start_s: start of a run in which no sample is judged as an outlier (s).
         outliers_at_jumps_level: p-value of as many outliers near jumps of commands below which they
             are motion.
@@ -50,13 +51,14 @@ class IdentificationPolicy(Numbers):
         disturbance_arm: arm of the largest plausible disturbing moment, over the width of the hull.
         shortest_correlation_s: shortest plausible correlation time of a disturbance (s).
         longest_correlation_s: longest plausible correlation time of a disturbance (s).
-        at_limit_share: share of such a limit from which it counts as reached.
+        at_limit_share: share of the largest plausible disturbance, or correlation time, that counts
+            as at the limit.
         felt_disturbance: share of the largest plausible disturbance below which no run tells how
             long it stays.
         least_phase_walk: smallest random walk of the tail's phase where runs beat differently
             (rad/s^0.5).
-        largest_phase_walk: largest one; a larger one would hide what makes the tail late
-            (rad/s^0.5).
+        largest_phase_walk: largest random walk of the tail's phase (rad/s^0.5); a larger one would
+            hide what makes the tail late.
         least_jitter_s: smallest jitter of the sample times (s).
         largest_jitter_s: largest jitter of the sample times (s).
         slowest_steady_tail: beats that a tail makes, at least, in the time of a commanded one; a

@@ -48,17 +48,18 @@ class DecisionPolicy(Numbers):
         most_challenges: largest number of effects fitted in place of one found among many.
         most_single_searches: causes that are searched one at a time while a large misfit is
             unexplained, before many are searched together.
-        most_lookalikes: effects tried in place of each cause that is searched so.
+        most_lookalikes: confusable effects tried in place of each cause that is searched alone.
         most_substitutes: pairs of a cause and a substitute that are tried in coarse fits.
         most_turned_sizes: sizes of a substitute from which a coarse fit is tried in turn.
-        most_echoes: effects tried as what the first pick may be an echo of.
-        most_leads: best of these that are fitted with all other picks.
-        trial_steps: steps of a trial of an effect that a swamping disturbance hides.
+        most_echoes: confusable effects tried in place of the first cause picked.
+        most_leads: best of these effects and the first pick that are fitted with all other picks.
+        trial_steps: steps of a trial of an effect that a disturbance at its limit hides.
         least_independent_share: share of a signal that those picked before it must leave.
         least_learned_share: share of the prior variance of a coefficient that data must take away
             for a test of its prior.
-        smallest_signal: what a refit must leave of a tested signal, in squared noise units.
-        smallest_change: what a tested setting must change in the residuals, in squared noise
+        smallest_signal: least that a refit leaves of a signal that is tested, in squared noise
+            units.
+        smallest_change: least change of the residuals by a signal that is tested, in squared noise
             units.
         relaxed_log_p: added to the log p-value of a cause if the adequacy test fails.
         adequacy_level: share of adequate explanations that the adequacy test rejects.
@@ -81,7 +82,8 @@ class DecisionPolicy(Numbers):
         converged: predicted decrease of -2 log likelihood at which a fit has converged.
         same_noise: relative change of the noise below which its alternation with the fit ends.
         run_variation_gain: gain in -2 log likelihood from which a spread over runs is used.
-        most_variation_turns: turns in which what runs differ in and what they share settle.
+        most_variation_turns: largest number of turns between fitting what runs share and what they
+            differ in.
         largest_run_spread: largest spread over runs, over the usual one, that is looked for.
         surely_negative_sd: standard errors of a run's number by which its mean is surely negative.
         shown_spread_level: share of data sets in which chance alone shows a spread over runs.
@@ -98,8 +100,8 @@ class DecisionPolicy(Numbers):
         beyond_usual: spread over runs, over the usual one, from which it is a finding.
         visible_misfit: misfit over noise below which the error budget has no shares.
         smallest_gap: gap from baseline to noise below which no share of it is reported.
-        largest_squared_error: squared error of a prediction, in noise units, that a diverging model
-            counts with.
+        largest_squared_error: largest squared error of a prediction, in noise units; a diverging
+            model counts with it.
         least_share: share of the gap below which a named answer is called doubtful.
         prediction_window_s: length of predictions without feedback (s).
     """

@@ -14,15 +14,15 @@ class RecordingPolicy(Numbers):
     Attributes:
         fewest_stuck_samples: samples of one value in a row from which a sensor may be stuck; fewer
             may be coarse digits.
-        stuck_level: probability of such a row by coarse digits alone.
+        stuck_level: probability by coarse digits alone below which such a row is a fault.
         coarse_digits: distinct values, as a share of all, below which digits hide the noise of a
             body at rest.
-        least_leap: usual steps by which a stuck sensor leaps into or out of its value; a vehicle
-            that begins to move does so more smoothly.
+        least_leap: change into or out of a stuck value, in usual steps, from which a sensor is
+            stuck; a vehicle that begins to move changes less.
         clock_gap: usual sample intervals from which a gap is looked at for a jump of the clock.
         clock_jump_fits_sd: standard errors within which motion goes on as if no time had passed.
-        clock_jump_excludes_sd: standard errors beyond which it could not have stood still for so
-            long.
+        clock_jump_excludes_sd: standard errors of usual motion over a gap beyond which the vehicle
+            could not have stood still.
         fewest_noise_samples: samples that a channel needs for any statement on its noise.
         declared_too_large: estimated over declared noise below which the declared cannot be right.
         declared_too_small: estimated over declared noise above which the declared cannot be right.
@@ -32,9 +32,9 @@ class RecordingPolicy(Numbers):
         fewest_interpolated_samples: samples with all neighbours that interpolation needs.
         outlier_gate_sd: standard deviations from which a sample is an outlier.
         jump_settles_samples: samples after a jump of a command in which a spike may be motion.
-        jitter_bound_sd: standard errors above the estimate of jitter up to which it may be.
+        jitter_bound_sd: standard errors above the estimated jitter that its upper bound lies.
         consistency_level: share of consistent data sets in which anything is called inconsistent.
-        consistency_draws: draws that its p-values come from.
+        consistency_draws: number of draws for the p-values of consistency.
         fewest_consistency_windows: windows that a test of consistency needs.
         same_reading_sd: standard errors within which a reading at the start is what a found error
             makes of it.
@@ -60,7 +60,7 @@ class RecordingPolicy(Numbers):
     jump_settles_samples: float = number(2.5, 0.0, 100.0, BY_HAND)
     jitter_bound_sd: float = number(2.0, 0.0, 10.0, "97.5 % of normal estimates are below")
     consistency_level: float = number(0.01, 1e-4, 0.5, BY_HAND)
-    consistency_draws: int = number(3999, 99, 100_000, "smallest p-value 0.00025")
+    consistency_draws: int = number(3999, 99, 100_000, f"smallest p-value 0.00025; {BY_HAND}")
     fewest_consistency_windows: int = number(8, 2, 100, BY_HAND)
     same_reading_sd: float = number(3.0, 1.0, 10.0, BY_HAND)
     most_jerked: float = number(0.3, 0.0, 1.0, BY_HAND)

@@ -41,6 +41,10 @@ class IdentificationPolicy(Numbers):
         ordinary_beat_error: share of the commanded frequency within which a servo is usually off.
         outlier_rounds: rounds in which samples far from their prediction are left out.
         unjudged_start_s: start of a run in which no sample is judged as an outlier (s).
+        untold_start_s: start of a run from rest in which no sample judges anything (s): a late
+            servo still follows what it was told before.
+        smeared_gyro_s: time after a jump of a command in which no sample of a gyro judges anything
+            (s), as the gyro may have a low-pass inside.
         outliers_at_jumps_level: p-value of as many outliers near jumps of commands below which they
             are motion.
         copied_noise: root mean square by which the noise of two runs differs, over that of one,
@@ -97,6 +101,13 @@ class IdentificationPolicy(Numbers):
         4, 1, 20, f"an outlier turns the predictions after it, which hide others; {EFFORT}"
     )
     unjudged_start_s: float = number(0.6, 0.0, 10.0, BY_HAND)
+    untold_start_s: float = number(0.15, 0.0, 5.0, BY_HAND)
+    smeared_gyro_s: float = number(
+        0.16,
+        0.0,
+        5.0,
+        "0.14 s to a twentieth after a low-pass of 5 Hz, and 0.02 s by which clocks differ",
+    )
     outliers_at_jumps_level: float = number(0.01, 1e-6, 0.5, BY_HAND)
     copied_noise: float = number(
         0.5,

@@ -15,6 +15,7 @@ from fish_env.identification.channels import BY_NAME, Kind
 from fish_env.identification.command_jumps import SAME_INSTANT_S, jump_times, jumped, just_after
 from fish_env.identification.first_state import first_state
 from fish_env.identification.late_rows import in_earlier_rows, rows_to_spare
+from fish_env.identification.policy import IDENTIFICATION
 from fish_env.identification.state_blocks import PHASE_COLUMN
 from fish_env.identification.variation import (
     BEAT,
@@ -27,14 +28,6 @@ from fish_env.identification.variation import (
 from fish_env.sensing.devices import Device, devices_of
 
 PHASE = PHASE_COLUMN
-UNTOLD_S = 0.15
-"""A record does not say what a servo was told before it begins, and a late one still follows that:
-of a run from rest, the first samples judge nothing (s)."""
-
-
-SMEARED_S = 0.16
-"""How long a gyro with a low-pass of 5 Hz inside shows a jump: after 0.14 s its answer is within a
-twentieth, and its clock may be some 0.02 s off."""
 BEFORE_S = 1e3
 FREQUENCY = 2  # column of the commands
 HELD_S = 1.0
@@ -168,7 +161,7 @@ class RunData:
         recorded = self.measured.copy()
         gyro = np.array([name in ("p", "q", "r") for name in channels])
         since = self.clock[:, None] - jump_times(*self.commands)
-        smeared = ((since >= 0.0) & (since < SMEARED_S)).any(axis=1)
+        smeared = ((since >= 0.0) & (since < IDENTIFICATION.smeared_gyro_s)).any(axis=1)
         recorded[np.ix_(smeared, gyro)] = np.nan
         run = replace(self, devices=np.array(devices_of(channels)), recorded=recorded)
         return replace(run, measured=run._in_rows(run.moved))
@@ -179,7 +172,7 @@ class RunData:
         assert self.devices is not None
         seen = in_earlier_rows(self.recorded, self.devices, rows, self.most_rows)
         if not self.swimming:
-            seen[self.clock < UNTOLD_S] = np.nan
+            seen[self.clock < IDENTIFICATION.untold_start_s] = np.nan
         return seen
 
     @cached_property
@@ -327,7 +320,7 @@ def prepare_run(
     substeps = _steps(clock, np.where(fresh, dt / FINER, dt))
     state0, covariance0 = first_state(run, channels, measured, clock, noise_sd)
     if run.start == "rest":
-        measured[clock < UNTOLD_S] = np.nan
+        measured[clock < IDENTIFICATION.untold_start_s] = np.nan
     # Where the tail is at the first sample is known only once it has moved.
     measured[0, [BY_NAME[name].kind == Kind.DRIVE for name in channels]] = np.nan
     return RunData(

@@ -19,6 +19,8 @@ class DecisionPolicy(Numbers):
     Attributes:
         screen_level: share of data sets without a cause in which any cause passes the screening.
         null_draws: number of draws of the smallest p-value's distribution.
+        fewest_settings_apart: settings of an effect that are tested together from which each is
+            also tested alone.
         power: power at the smallest detectable sizes.
         evidence_doubt: difference of -2 log evidence below which explanations are rivals.
         linear_doubt: difference of -2 log likelihood by which a linear model may be off where a fit
@@ -109,6 +111,9 @@ class DecisionPolicy(Numbers):
     screen_level: float = number(0.05, 1e-4, 0.5, FISHER)
     null_draws: int = number(
         4000, 500, 100_000, "the 5 % quantile of 4000 draws is known to 0.3 points"
+    )
+    fewest_settings_apart: int = number(
+        4, 1, 100, f"six together ask for a quarter more of each than one alone; {BY_HAND}"
     )
     power: float = number(0.8, 0.5, 0.99, "convention (Cohen, 1988)")
     evidence_doubt: float = number(

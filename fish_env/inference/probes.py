@@ -12,14 +12,13 @@ import numpy as np
 from fish_env.arrays import FloatArray
 from fish_env.inference.effects import EffectParameter
 from fish_env.inference.hypotheses import CauseId, Coefficient, EffectName, EffectParameterId
+from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Problem
 from fish_env.inference.vehicle import Effect
 
 Probe = Mapping[str, float]
 MOST_FREQUENCIES = 96
 QUARTER = (0.0, np.pi / 2)
-MANY = 4
-"""Settings that are also tested one by one."""
 MOST_GRID_SIZES = 96
 """Of a starting grid."""
 DIRECTIONS = 6
@@ -180,7 +179,9 @@ def each_alone(probes: tuple[tuple[Probe, ...], ...]) -> tuple[tuple[Probe, ...]
     ask for a quarter more of each than one alone.
     """
     mildest = probes[0] if probes else ()
-    return (*probes, *((probe,) for probe in mildest)) if len(mildest) >= MANY else probes
+    if len(mildest) < POLICY.fewest_settings_apart:
+        return probes
+    return (*probes, *((probe,) for probe in mildest))
 
 
 def _milder(effect: Effect, probe: Probe) -> Probe:

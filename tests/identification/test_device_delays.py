@@ -10,7 +10,7 @@ import pytest
 from fish_env.data import CommandSteps
 from fish_env.identification.command_jumps import jump_times
 from fish_env.identification.open_loop import without_feedback
-from fish_env.identification.runs import SMEARED_S
+from fish_env.identification.policy import IDENTIFICATION
 from fish_env.identification.series import SeriesProblem
 from fish_env.identification.variation_slopes import leave_diverged
 from fish_env.inference.estimate.fit import fit
@@ -127,7 +127,7 @@ def test_a_gyro_says_nothing_just_after_a_jump(problem):
     (run,) = problem.runs
     movable = run.movable(problem.channels)
     since = run.clock[:, None] - jump_times(*run.commands)
-    after = ((since >= 0.0) & (since < SMEARED_S)).any(axis=1)
+    after = ((since >= 0.0) & (since < IDENTIFICATION.smeared_gyro_s)).any(axis=1)
     gyro = np.isin(problem.channels, ["p", "q", "r"])
     kept = np.isfinite(movable.recorded)
     assert 0 < after.sum() < 0.5 * len(after)

@@ -15,7 +15,7 @@ import numpy as np
 from fish_env.inference.estimate.again import finished
 from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
 from fish_env.inference.estimate.fit import Fit
-from fish_env.inference.explanation import FEW_RUNS, Explanation
+from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import (
     CauseId,
     Coefficient,
@@ -34,8 +34,6 @@ from fish_env.inference.starts import probed
 from fish_env.inference.substitution import swapped, what_may_lack
 
 Report = Callable[[str], None]
-STEPS = 4
-"""Of a fit with another lag, from one with the lag in whose place it is."""
 
 
 def look_alikes(current: Explanation) -> list[tuple[EffectName, EffectName]]:
@@ -71,7 +69,7 @@ def asked_again(
         return current, ()
     report(f"fitting {listed(closest.causes, ' and ')}")
     own = current.fit
-    whole = at_noise(own.problem.with_refinement(), closest.fit, own.noise, STEPS)
+    whole = at_noise(own.problem.with_refinement(), closest.fit, own.noise, POLICY.swap_steps)
     if whole is None:
         return current, ()
     other = Explanation(closest.causes, whole)
@@ -86,12 +84,12 @@ def asked_again(
 def _closest(current: Explanation, shown: Screen, report: Report) -> Explanation | None:
     """The best explanation of a few runs with another lag; None where none fits them as well."""
     own = current.fit
-    few, pairs = own.problem.with_refinement().subset(FEW_RUNS), _pairs(current, shown)
-    usual = at_noise(few, own, own.noise, STEPS) if pairs else None
+    few, pairs = own.problem.with_refinement().subset(POLICY.few_runs), _pairs(current, shown)
+    usual = at_noise(few, own, own.noise, POLICY.swap_steps) if pairs else None
     best, enough = None, usual.objective + POLICY.evidence_doubt if usual else np.inf
     for cause, signal in pairs:
         report(f"trying {signal.cause.effect} instead of {name_of(cause)}")
-        found = at_noise(few, _in_place(own, cause, signal), own.noise, STEPS, enough)
+        found = at_noise(few, _in_place(own, cause, signal), own.noise, POLICY.swap_steps, enough)
         if found is not None and found.objective < enough:
             causes = tuple(signal.cause.id if c == cause else c for c in current.causes)
             best, enough = Explanation(causes, found), found.objective

@@ -77,7 +77,8 @@ def _closest(
     if least > without.objective - POLICY.evidence_doubt:
         return {}
     enough = least + POLICY.coarse_fit_behind * (without.objective - least)
-    return {name: own for name, own in list(best.items())[:CLOSE] if own.objective <= enough}
+    few = list(best.items())[: POLICY.most_close_trials]
+    return {name: own for name, own in few if own.objective <= enough}
 
 
 def _in_all_runs(current: Explanation, name: EffectName, own: Fit) -> Explanation | None:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from fish_env.inference.estimate.fit import fit
-from fish_env.inference.explanation import FEW_RUNS, Explanation
+from fish_env.inference.explanation import Explanation
+from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import causes_of
 from fish_env.inference.screening import screen
 from fish_env.inference.trials import tried_out
@@ -57,7 +58,7 @@ def alike(seed=1):
     rng = np.random.default_rng(seed)
     x, y, more = rng.standard_normal((3, RUNS, SAMPLES))
     noise = rng.standard_normal((RUNS, SAMPLES))
-    tried = np.isin(np.arange(RUNS), Stated(lambda z, e: x).spread(FEW_RUNS))[:, None]
+    tried = np.isin(np.arange(RUNS), Stated(lambda z, e: x).spread(POLICY.few_runs))[:, None]
     other = np.where(tried, x + 0.1 * more, y)
     acts = np.where(tried, other, x)
 
@@ -80,7 +81,7 @@ def test_lags_that_explain_alike_are_compared_on_all_runs():
 def test_an_effect_that_ends_switched_off_is_no_cause():
     """Coefficients of a nominal vehicle may lead further; what that gains is not the effect's."""
     stated = problem(late=0.0)
-    shown_in = np.isin(np.arange(RUNS), stated.spread(FEW_RUNS))[:, None]
+    shown_in = np.isin(np.arange(RUNS), stated.spread(POLICY.few_runs))[:, None]
     x = np.random.default_rng(2).standard_normal((RUNS, SAMPLES))
     noise = np.random.default_rng(3).standard_normal((RUNS, SAMPLES))
     # The runs of a trial show it, the other one the contrary, which no size of it explains.

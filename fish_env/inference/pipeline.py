@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from fish_env.inference.adequacy import (
 from fish_env.inference.attribution import Attribution, attribute, extended
 from fish_env.inference.budget import Budget, error_budget
 from fish_env.inference.effort import FULL, Effort
-from fish_env.inference.estimate.again import finished
+from fish_env.inference.estimate.again import finished, refined
 from fish_env.inference.estimate.fit import FEWER_STEPS, Fit, fit
 from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.gain import gap_closed
@@ -173,6 +174,9 @@ def partly(
         found = without(found, doubtful) if doubtful else found
     if found is None or not found.causes:
         return attribution, verdict
+    # What is published was compared in the steps of a search, and is judged in usual ones.
+    finer = reached(partial(refined, found.fit))
+    found = replace(found, fit=finer) if finer else found
     rivals = tuple(e for e in attribution.rivals if len(e.causes) == len(found.causes))
     return replace(attribution, accepted=found, rivals=rivals), Verdict("partial", found.causes)
 

@@ -34,6 +34,29 @@ def test_a_cause_beside_an_unknown_force_is_named(seed):
     assert result.verdict.causes == ("current",)
 
 
+class LongSteps(BoatProblem):
+    """A boat in the steps of a search, with a disturbance at its limit: nothing is published yet.
+
+    The steps of published estimates are those of a boat.
+    """
+
+    def disturbance_at_limit(self, noise):
+        return ("a disturbance at its limit",)
+
+    def is_coarse(self, effects):
+        return True
+
+    def with_refinement(self):
+        return BoatProblem(self.runs)
+
+
+def test_what_is_published_of_it_is_fitted_in_usual_steps():
+    fitted, final = problems(3, {NORTH: 0.15, EAST: -0.2}, foreign=wind)
+    result = infer(LongSteps(fitted.runs), final, seed=3)
+    assert result.verdict.name == "partial"
+    assert type(result.attribution.accepted.fit.problem) is BoatProblem
+
+
 @pytest.mark.parametrize("seed", [3, 4, 5])
 def test_a_cause_that_a_force_of_no_origin_replaces_is_not_named(seed):
     """A rudder askew makes a moment with the square of the speed."""

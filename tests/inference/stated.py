@@ -144,6 +144,34 @@ class Stated(Problem):
         return np.full_like(rows, np.nan) if self.diverging(effects, noise) else rows
 
 
+class Numbered(Stated):
+    """A stated problem whose runs have numbers of their own, ``own`` (runs, K), from zero on.
+
+    A subclass sets them before it begins, and says what they leave.
+    """
+
+    own: FloatArray
+
+    def __init__(self, known: Iterable[Effect] = ()) -> None:
+        super().__init__(self.left, known)
+
+    def left(self, z: FloatArray, effects: Mapping[EffectParameterId, float]) -> FloatArray:
+        raise NotImplementedError
+
+    @property
+    def variation(self) -> FloatArray:
+        return self.own[self.which]
+
+    def with_variation(
+        self, values: FloatArray, point: Point, noise: Any, near: Any = ()
+    ) -> Numbered:
+        moved = copy(self)
+        moved.own = self.own.copy()
+        moved.own[self.which] = values
+        moved.residuals = moved.left
+        return moved
+
+
 def coefficients(paths: Sequence[str]) -> Coefficients:
     """Coefficients whose prior is standard normal, and that may be anything."""
     count = len(paths)

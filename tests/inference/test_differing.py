@@ -1,6 +1,5 @@
 """What runs share and also differ in: no better known than a mean over the runs."""
 
-from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +9,7 @@ from fish_env.effects import catalogue
 from fish_env.identification.variation import EVERY
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.estimate.run_variation import RunVariation
-from tests.inference.stated import Stated, White, effect, size_of
+from tests.inference.stated import Numbered, White, effect, size_of
 
 RUNS, SAMPLES = 6, 100
 DRIFT = size_of("drift")
@@ -21,7 +20,7 @@ class Spreading(White):
     spread: tuple[float, ...] = (1.0,)
 
 
-class Drifting(Stated):
+class Drifting(Numbered):
     """Runs in water that drifts, in each a little differently, seen very accurately.
 
     A run's own drift does the same as the drift of all, but its slopes were worked out in another
@@ -44,21 +43,10 @@ class Drifting(Stated):
         beside = DRIFT if declared else None
         self.variations = (RunVariation("own_drift", "1", 1.0, beside=beside),)
         self.own = np.zeros((RUNS, 1))
-        super().__init__(self._left, [effect("drift", 10.0)])
+        super().__init__([effect("drift", 10.0)])
 
-    def _left(self, z, effects):
+    def left(self, z, effects):
         return self.seen - (effects[DRIFT] + self.own) * self.along
-
-    @property
-    def variation(self):
-        return self.own[self.which]
-
-    def with_variation(self, values, point, noise, near=()):
-        moved = copy(self)
-        moved.own = self.own.copy()
-        moved.own[self.which] = values
-        moved.residuals = moved._left
-        return moved
 
     def variation_slopes(self, point, noise, filtered, steps):
         return -self.nearly[self.which].reshape(-1, 1)

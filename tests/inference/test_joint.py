@@ -1,6 +1,5 @@
 """Shared parameters and the runs' own numbers in one step: exact where the model is linear."""
 
-from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +13,7 @@ from fish_env.inference.estimate.run_variation import RunVariation
 from fish_env.inference.estimate.settle import predicted_variation
 from fish_env.inference.estimate.slopes import Slopes
 from fish_env.inference.problem import Point
-from tests.inference.stated import Evaluated, Stated, White
+from tests.inference.stated import Evaluated, Numbered, White
 
 RUNS, SAMPLES = 5, 80
 
@@ -24,7 +23,7 @@ class Spreading(White):
     spread: tuple[float, ...] = (1.0, 1.0)
 
 
-class Differing(Stated):
+class Differing(Numbered):
     """Runs with two numbers of their own: ``(1 + bend) * (z x + own . y)`` against a record.
 
     ``bend`` makes the model curved. The second number cannot be negative if ``positive``.
@@ -43,22 +42,14 @@ class Differing(Stated):
             RunVariation("first", "1", 1.0),
             RunVariation("second", "1", 1.0, positive=positive),
         )
-        super().__init__(lambda z, effects: self.data - self.model(z[0], self.own))
+        super().__init__()
+
+    def left(self, z, effects):
+        return self.data - self.model(z[0], self.own)
 
     def model(self, shared, own):
         linear = shared * self.x + np.einsum("rsk,rk->rs", self.y, own)
         return linear + self.bend * np.sin(linear)
-
-    @property
-    def variation(self):
-        return self.own[self.which]
-
-    def with_variation(self, values, point, noise, near=()):
-        moved = copy(self)
-        moved.own = self.own.copy()
-        moved.own[self.which] = values
-        moved.residuals = lambda z, effects: moved.data - moved.model(z[0], moved.own)
-        return moved
 
     def variation_slopes(self, point, noise, filtered, steps):
         columns = []

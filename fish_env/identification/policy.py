@@ -29,8 +29,8 @@ class IdentificationPolicy(Numbers):
             differently.
         uneven_beats_level: p-value of the spread over runs from which runs beat differently.
         fewest_runs_for_beats: smallest number of runs for a comparison of their beats.
-        least_beat_difference: relative difference of two beats that the comb of frequencies cannot
-            tell apart.
+        least_beat_difference: relative difference of two beats that the starting grid cannot tell
+            apart.
         clear_own_beat: share of what the common beat leaves that the own beat of one run takes
             away if runs differ.
         fewest_own_beats: number of runs with a noticeable own beat from which runs differ.

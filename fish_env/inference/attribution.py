@@ -179,11 +179,11 @@ def settled(found: Attribution, thoroughly: bool, report: Callable[[str], None])
         report("removing unnecessary causes")
     current, unnecessary = backward_elimination(found.accepted)
     failed = found.failed if current.causes == found.accepted.causes else frozenset()
-    # What else is missing moves estimates by more than a few steps more would.
     alike: tuple[Explanation, ...] = ()
+    # What else is missing moves estimates by more than a few steps more would.
     if current.causes and thoroughly and not disturbance_at_limit(current.fit):
-        searched, current = current.fit.problem, _published(current, report)
-        if searched.drive.uneven:
+        current = _published(current, report)
+        if current.fit.problem.drive.uneven:
             current, alike = asked_again(current, found.shown, report)
     rivals = (*found.rivals, *unnecessary, *alike)
     if thoroughly and rivals:

@@ -18,7 +18,6 @@ from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import (
     CauseId,
-    Coefficient,
     EffectName,
     listed,
     name_of,
@@ -128,5 +127,5 @@ def undecided(current: Explanation, shown: Screen, report: Report) -> frozenset[
 
 def _pairs(current: Explanation, shown: Screen) -> list[tuple[CauseId, Signal]]:
     """Lags with what may be in their place."""
-    signals = {s.cause.id: s for s in shown.best() if not isinstance(s.cause.id, Coefficient)}
+    signals = shown.by_effect()
     return [(c, signals[n]) for c, n in look_alikes(current) if n in signals]

@@ -96,7 +96,7 @@ def _against_likes(
     *_, last = current.causes
     assert not isinstance(last, Coefficient)
     known = current.fit.problem.known[last].confusable_with
-    signals = {s.cause.id: s for s in shown.best() if s.cause.is_effect}
+    signals = shown.by_effect()
     alike = [s for s in substitutes(current, shown) if s.cause == last and s.name in known]
     pairs = [(last, signals[s.name]) for s in alike[: POLICY.most_lookalikes]]
     return substituted(current, pairs, 1, report, beside_misfit=True)[0]
@@ -183,7 +183,7 @@ def challenged(
     if disturbance_at_limit(current.fit):
         return current, ()
     known = current.fit.problem.known  # a coefficient takes no effect's place
-    signals = {s.cause.id: s for s in shown.best() if s.cause.is_effect}
+    signals = shown.by_effect()
     close = _close(current, shown)
     pairs_of = (zip(current.causes, e.causes, strict=False) for e in rivals)
     earlier = [(a, b) for pairs in pairs_of for a, b in pairs if a != b]

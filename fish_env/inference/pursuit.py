@@ -267,7 +267,7 @@ def _together(
     """
     base = current.fit
     sizes = {pick.signal.cause.effect: pick for pick in picks}
-    signals = {s.cause.id: s for s in shown.best()}
+    signals = shown.by_effect()
     linear = dict(base.point.effects)
     for name in causes:
         pick = sizes.get(name)

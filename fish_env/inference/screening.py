@@ -11,7 +11,7 @@ from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.free import diverged
 from fish_env.inference.estimate.products import gram, inner
-from fish_env.inference.hypotheses import Coefficient, effects_of
+from fish_env.inference.hypotheses import CauseId, Coefficient, effects_of
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause, Probe, best_of_each, effect_values, finer, of_visible
 from fish_env.inference.problem import Problem
@@ -46,6 +46,10 @@ class Screen:
     def best(self) -> list[Signal]:
         """The best alternative of each cause, most significant first."""
         return best_of_each(self.signals, lambda signal: signal.log_p)
+
+    def by_effect(self) -> dict[CauseId, Signal]:
+        """The best alternative of each effect."""
+        return {signal.cause.id: signal for signal in self.best() if signal.cause.is_effect}
 
 
 def screen(

@@ -17,9 +17,9 @@ from fish_env.errors import ConfigError
 from fish_env.gpu import loops
 from fish_env.gpu.arrays import fetch, put, wait, zeros
 from fish_env.gpu.compiled import (
-    EnvironmentKernels,
     blocks_for,
     check_device,
+    environment_kernels,
     real_type,
     threads_for,
 )
@@ -114,7 +114,7 @@ class DeviceBatch:
         self.options, self.count = options, count
         self.max_episode_steps = max_episode_steps
         self.real = real = real_type(precision)
-        self._kernels = EnvironmentKernels(options, real, MODES[autoreset])
+        self._kernels = environment_kernels(options, precision, MODES[autoreset])
         self._rows = rows = self._kernels.module
         self._shape = shape = BatchShape.of(options)
         self._data = zeros((shape.data_rows, count), real)

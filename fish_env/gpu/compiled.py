@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Mapping
 from functools import cache
 from types import ModuleType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -70,39 +70,59 @@ def _target(module: ModuleType, real: type[Any], further: Mapping[str, Any]) -> 
     return Target(real, replacements, vars(module) | {"REAL": real} | dict(further))
 
 
-class EnvironmentKernels:
-    """CUDA kernels of an environment: reset, step, what follows a step, and the counters.
+class EnvironmentKernels(NamedTuple):
+    """CUDA kernels of an environment; each is compiled at its first launch.
 
     Attributes:
+        step: a control step of every fish.
+        finish: what follows a step.
+        reset: starts episodes.
+        count_step: advances the counters that all fish share.
         module: the composed module, which says where rows are.
     """
 
-    def __init__(self, options: EnvOptions, real: type[Any], mode: int) -> None:
-        """Prepare the kernels; each is compiled at its first launch.
+    step: Any
+    finish: Any
+    reset: Any
+    count_step: Any
+    module: ModuleType
 
-        Args:
-            options: the environment.
-            real: type of its numbers.
-            mode: when episodes are started anew (see :mod:`fish_env.gpu.loops`).
-        """
-        self.module = step_kernels(options).module
-        shape = BatchShape.of(options)
-        flow = [options.model.row_of(path) for path in FLOW]
-        constants = {
-            "BACK": options.observation_lag,
-            "FLOW_EAST_ROW": -1 if flow[1] is None else flow[1],
-            "FLOW_NORTH_ROW": -1 if flow[0] is None else flow[0],
-            "MODE": mode,
-            "SUBSTEPS": options.config.substeps,
-            "TASK": TASK_NUMBERS[options.task],
-            "TRACE_ROW": shape.trace_row,
-            "TRACE_ROWS": shape.ring_rows,
-        }
-        target = _target(self.module, real, constants)
-        self.step = target.launched(loops.step, max_registers=REGISTERS)
-        self.finish = target.launched(loops.finish)
-        self.reset = target.launched(loops.reset)
-        self.count_step = target.launched(loops.count_step)
+
+def environment_kernels(options: EnvOptions, precision: str, mode: int) -> EnvironmentKernels:
+    """The CUDA kernels of an environment; environments of one kind share them.
+
+    Args:
+        options: the environment.
+        precision: of its numbers, ``"float32"`` or ``"float64"``.
+        mode: when episodes are started anew (see :mod:`fish_env.gpu.loops`).
+    """
+    shape = BatchShape.of(options)
+    flow = [options.model.row_of(path) for path in FLOW]
+    return kernels_of(
+        step_kernels(options).module,
+        precision,
+        BACK=options.observation_lag,
+        FLOW_EAST_ROW=-1 if flow[1] is None else flow[1],
+        FLOW_NORTH_ROW=-1 if flow[0] is None else flow[0],
+        MODE=mode,
+        SUBSTEPS=options.config.substeps,
+        TASK=TASK_NUMBERS[options.task],
+        TRACE_ROW=shape.trace_row,
+        TRACE_ROWS=shape.ring_rows,
+    )
+
+
+@cache
+def kernels_of(module: ModuleType, precision: str, **constants: int) -> EnvironmentKernels:
+    """The CUDA kernels of a composed module, in which these names are constants."""
+    target = _target(module, real_type(precision), constants)
+    return EnvironmentKernels(
+        step=target.launched(loops.step, max_registers=REGISTERS),
+        finish=target.launched(loops.finish),
+        reset=target.launched(loops.reset),
+        count_step=target.launched(loops.count_step),
+        module=module,
+    )
 
 
 @cache

@@ -129,27 +129,31 @@ def tried(make: Callable[[], harness.Contender]) -> Callable[[], harness.Contend
     return made
 
 
-def trainings() -> list[dict[str, Any]]:
-    """Times and successes of the training on the device, under five seeds."""
+def trainings() -> tuple[list[dict[str, Any]], list[dict[str, str]]]:
+    """Times and successes of the training on the device under five seeds, and what failed."""
     from fish_env.gpu.vector import RoboticFish3DDeviceEnv
     from robofish_agents.training.actor_critic import HOLD, HOLD_FISH
     from robofish_agents.training.tensor_ppo import success_rate, train
 
-    env, judge = RoboticFish3DDeviceEnv(HOLD_FISH), RoboticFish3DDeviceEnv(1024)
-    train(env, HOLD.shortened(2), 0)  # compiles
-    rows = []
-    for seed in SEEDS:
-        trained = train(env, HOLD, seed)
-        rate = success_rate(judge, trained.policy, 1000 + seed)
-        rows.append(
-            {
-                "seed": seed,
-                "seconds": trained.seconds,
-                "control_steps": trained.steps,
-                "success_rate": rate,
-            }
-        )
-    return rows
+    rows: list[dict[str, Any]] = []
+    try:
+        env, judge = RoboticFish3DDeviceEnv(HOLD_FISH), RoboticFish3DDeviceEnv(1024)
+        train(env, HOLD.shortened(2), 0)  # compiles
+        for seed in SEEDS:
+            trained = train(env, HOLD, seed)
+            rate = success_rate(judge, trained.policy, 1000 + seed)
+            rows.append(
+                {
+                    "seed": seed,
+                    "seconds": trained.seconds,
+                    "control_steps": trained.steps,
+                    "success_rate": rate,
+                }
+            )
+            print(rows[-1], flush=True)
+    except Exception as error:
+        return rows, [{"name": "training", "reason": f"{type(error).__name__}: {error}"}]
+    return rows, []
 
 
 def page(content: dict[str, Any]) -> str:
@@ -188,6 +192,7 @@ def main(argv: list[str] | None = None) -> None:
         sys.exit(str(error))
     started = time.perf_counter()
     few = min(256, options.counts[-1])
+    trained, failed = ([], []) if options.no_train else trainings()
     rows, missing = speeds(options)
     content: dict[str, Any] = {
         "command": "python -m scripts.bench.gpu " + " ".join(argv or sys.argv[1:]),
@@ -196,9 +201,9 @@ def main(argv: list[str] | None = None) -> None:
         "versions": harness.versions(PACKAGES),
         "target_control_steps_per_s": TARGET,
         "speed": rows,
-        "missing": missing,
+        "missing": missing + failed,
         "accuracy": [accuracy(p, few, 3 if SIMULATED else 100) for p in ("float64", "float32")],
-        "training": [] if options.no_train else trainings(),
+        "training": trained,
         "seconds": time.perf_counter() - started,
     }
     print(page(content))

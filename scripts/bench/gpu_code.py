@@ -78,10 +78,12 @@ def kernels(options: dict[str, Any], real: type[Any]) -> dict[str, Any]:
             found[function.__name__] = self._retyped(function)
 
     original, compiled.Target = compiled.Target, Kept  # type: ignore[misc]
+    compiled.kernels_of.cache_clear()
     try:
-        compiled.EnvironmentKernels(env_options(**options), real, 2)
+        compiled.environment_kernels(env_options(**options), real.__name__, 2)
     finally:
         compiled.Target = original  # type: ignore[misc]
+        compiled.kernels_of.cache_clear()
     return found
 
 

@@ -27,6 +27,19 @@ def nothing(*_):
     """Does not do what it should."""
 
 
+def forget():
+    """Let no test have the kernels of another."""
+    compiled.rollout_kernel.cache_clear()
+    compiled.kernels_of.cache_clear()
+
+
+@pytest.fixture(autouse=True)
+def fresh():
+    forget()
+    yield
+    forget()
+
+
 @pytest.fixture
 def broken(monkeypatch):
     """Puts a function in the place of a kernel, on the device alone."""
@@ -41,10 +54,8 @@ def broken(monkeypatch):
             return made
 
         monkeypatch.setattr(compiled, "_target", target)
-        compiled.rollout_kernel.cache_clear()
 
-    yield put
-    compiled.rollout_kernel.cache_clear()
+    return put
 
 
 @pytest.mark.parametrize(

@@ -11,12 +11,15 @@ Schulman et al., "Proximal Policy Optimization Algorithms", arXiv:1707.06347; ad
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor, nn
 
 from robofish_agents.training.actor_critic import ActorCritic, Recipe
+from robofish_agents.training.replayed import Replayed, differentiable
 
 
 class Rollout(NamedTuple):
@@ -51,6 +54,10 @@ class Samples(NamedTuple):
     log_probability: Tensor
     advantage: Tensor
     returns: Tensor
+
+
+LossFunction = Callable[..., tuple[Tensor, ...]]
+"""Loss and distance moved, of the tensors of a minibatch in the order of :class:`Samples`."""
 
 
 class Trained(NamedTuple):
@@ -150,14 +157,16 @@ def loss_of(policy: ActorCritic, batch: Samples, recipe: Recipe) -> tuple[Tensor
     return loss, (ratio.detach() - 1.0 - change.detach()).mean()
 
 
-def update(
-    policy: ActorCritic, optimiser: torch.optim.Optimizer, taken: Rollout, recipe: Recipe
-) -> None:
-    """Improve policy and values by one rollout."""
+def loss_function(policy: ActorCritic, recipe: Recipe) -> LossFunction:
+    """:func:`loss_of` as a function of the tensors of a minibatch."""
+    return lambda *batch: loss_of(policy, Samples(*batch), recipe)
+
+
+def samples_of(policy: ActorCritic, taken: Rollout, recipe: Recipe) -> Samples:
+    """What there is to learn from a rollout; the critic sees what the policy sees."""
     advantage, returns = advantages(policy, taken, recipe)
     seen = taken.observed[:-1]
-    whole = Samples(seen, seen, taken.actions, taken.log_probability, advantage, returns)
-    improve(policy, optimiser, whole, recipe)
+    return Samples(seen, seen, taken.actions, taken.log_probability, advantage, returns)
 
 
 def improve(
@@ -166,6 +175,7 @@ def improve(
     whole: Samples,
     recipe: Recipe,
     target_kl: float | None = None,
+    loss_fn: LossFunction | None = None,
 ) -> float:
     """Take the gradient steps of an update.
 
@@ -175,17 +185,20 @@ def improve(
         whole: a rollout, (steps, N, ...) each.
         recipe: epochs, minibatches and weights of the loss.
         target_kl: the update ends where the policy has moved by 1.5 times this; None: never.
+        loss_fn: gives what :func:`loss_of` gives of the tensors of a minibatch; default: that.
 
     Returns:
         How far the policy had moved in the last minibatch.
     """
-    flat = Samples(*(rows.flatten(0, 1) for rows in whole))
-    size, moved = len(flat.returns) // recipe.minibatches, 0.0
+    flat = [rows.flatten(0, 1) for rows in whole]
+    count, moved = len(flat[0]), 0.0
+    size = count // recipe.minibatches
+    loss_fn = loss_fn or loss_function(policy, recipe)
     for _ in range(recipe.epochs):
-        order = torch.randperm(len(flat.returns), device=flat.returns.device)
+        order = torch.randperm(count, device=flat[0].device)
         for first in range(0, size * recipe.minibatches, size):
             chosen = order[first : first + size]
-            loss, distance = loss_of(policy, Samples(*(rows[chosen] for rows in flat)), recipe)
+            loss, distance = loss_fn(*(rows[chosen] for rows in flat))
             if target_kl is not None:
                 moved = float(distance)
                 if moved > 1.5 * target_kl:
@@ -246,11 +259,17 @@ def train(env: Any, recipe: Recipe, seed: int) -> Trained:
     started = time.perf_counter()
     sizes = observed.shape[1], env.single_action_space.shape[0]
     policy = ActorCritic(*sizes, recipe).to(observed.device)
-    optimiser = torch.optim.Adam(policy.parameters(), recipe.learning_rate, eps=1e-5)
+    optimiser = torch.optim.Adam(
+        policy.parameters(), recipe.learning_rate, eps=1e-5, fused=observed.is_cuda
+    )
+    swim = Replayed(partial(collect, env, policy, observed, recipe), observed.is_cuda)
+    loss_fn = None
     for iteration in range(recipe.iterations):
         for group in optimiser.param_groups:
             group["lr"] = recipe.learning_rate * (1.0 - iteration / recipe.iterations)
-        update(policy, optimiser, collect(env, policy, observed, recipe), recipe)
+        whole = samples_of(policy, swim(), recipe)
+        loss_fn = loss_fn or _loss_on_device(policy, whole, recipe)
+        improve(policy, optimiser, whole, recipe, loss_fn=loss_fn)
     _wait(observed)
     return Trained(
         policy,
@@ -258,6 +277,14 @@ def train(env: Any, recipe: Recipe, seed: int) -> Trained:
         recipe.iterations * recipe.steps * len(observed),
         recipe.iterations * recipe.epochs * recipe.minibatches,
     )
+
+
+def _loss_on_device(policy: ActorCritic, whole: Samples, recipe: Recipe) -> LossFunction:
+    """The loss of minibatches of such samples, replayed where they are on a GPU."""
+    flat = [rows.flatten(0, 1) for rows in whole]
+    size = len(flat[0]) // recipe.minibatches
+    like = tuple(rows[:size] for rows in flat)
+    return differentiable(policy, loss_function(policy, recipe), like)
 
 
 def success_rate(env: Any, policy: ActorCritic, seed: int) -> float:

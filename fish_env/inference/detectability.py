@@ -107,13 +107,14 @@ def simulated(fit: Fit, screen: Screen, settings: Sequence[Setting]) -> FloatArr
     target = last_energy * wanted**2
     at: FloatArray = np.maximum(wanted, least)
     moving = np.ones(len(settings), bool)
-    endless, sought = ~moving, ~moving
+    endless, sought, nothing = ~moving, ~moving, np.zeros(len(settings))
     for turn in range(ROUNDS + MORE_ROUNDS):
         moving &= sought | (turn < ROUNDS)
         energy = _energies(fit, screen, settings, at, moving)
         moving &= np.isfinite(energy)
         silent = moving & (energy < SILENT * target) & (at < last)
         sought |= silent
+        nothing = np.where(silent, np.maximum(nothing, at), nothing)
         power = _power(at, energy, last, last_energy)
         suspect = moving & (at <= probe) & (power < FADING)
         halved = _energies(fit, screen, settings, 0.5 * at, suspect)
@@ -124,7 +125,9 @@ def simulated(fit: Fit, screen: Screen, settings: Sequence[Setting]) -> FloatArr
             steps = np.log(target / energy) / (believed if turn else SMOOTH)
         steps = np.where(silent, 0.5 * np.log(last / at), steps)
         last, last_energy = np.where(silent, last, at), np.where(silent, last_energy, energy)
-        corrected = np.where(moving, np.maximum(at * np.exp(steps), least), at)
+        # A larger size is known to do nothing, wherever the energy seems to lead.
+        lowest = np.maximum(np.sqrt(nothing * at), least)
+        corrected = np.where(moving, np.maximum(at * np.exp(steps), lowest), at)
         moving &= np.abs(np.log(corrected / at)) > TOLERANCE
         at = corrected
     energy = _energies(fit, screen, settings, probe, endless)

@@ -184,6 +184,25 @@ def each_alone(probes: tuple[tuple[Probe, ...], ...]) -> tuple[tuple[Probe, ...]
     return (*probes, *((probe,) for probe in mildest))
 
 
+def farthest(effect: Effect, probe: Probe, step: float) -> Probe | None:
+    """A setting with what is switched on in it at the end of its plausible range.
+
+    For an effect that does nothing up to some size: a limit that is never met, a surface that is
+    never touched. None where simulation steps (s) do not follow it there, or it is there already.
+    """
+    ends = {p.name: _far(p) for p in effect.switching if probe[p.name] != p.neutral}
+    there = {**probe, **ends}
+    return there if there != dict(probe) and effect.is_followed(there, step) else None
+
+
+def _far(p: EffectParameter) -> float:
+    """The end of the plausible range that is farthest from neutral; of infinity, the near one."""
+    low, high = p.plausible
+    if np.isinf(p.neutral):
+        return low if p.neutral > 0.0 else high
+    return p.far_end(p.neutral)
+
+
 def _milder(effect: Effect, probe: Probe) -> Probe:
     """A third of the setting: with more of it the drive is out of step before a run ends."""
     third = {p.name: p.neutral + (probe[p.name] - p.neutral) / 3.0 for p in effect.switching}

@@ -13,7 +13,15 @@ from fish_env.inference.estimate.free import diverged
 from fish_env.inference.estimate.products import gram, inner
 from fish_env.inference.hypotheses import CauseId, Coefficient, effects_of
 from fish_env.inference.policy import POLICY
-from fish_env.inference.probes import Cause, Probe, best_of_each, effect_values, finer, of_visible
+from fish_env.inference.probes import (
+    Cause,
+    Probe,
+    best_of_each,
+    effect_values,
+    farthest,
+    finer,
+    of_visible,
+)
 from fish_env.inference.problem import Problem
 from fish_env.inference.projection import Projector, Signal, in_parts
 from fish_env.inference.tails import chi2_log_tail, noncentrality
@@ -87,15 +95,42 @@ def zoomed(fit: Fit, signal: Signal) -> Signal:
 
 
 def _effect_signals(fit: Fit, projector: Projector, causes: Sequence[Cause]) -> list[Signal]:
+    """Signals of all alternatives; of one that shows nothing, also at its farthest setting."""
     tests = [
         (cause, index) for cause in causes if cause.is_effect for index in range(len(cause.probes))
     ]
+    found = _signals_of(fit, projector, tests)
+    unseen = [test for test, signal in zip(tests, found, strict=True) if signal is None]
+    further = _signals_of(fit, projector, _far_tests(fit.problem, unseen))
+    return [signal for signal in (*found, *further) if signal is not None]
+
+
+def _far_tests(problem: Problem, tests: Sequence[tuple[Cause, int]]) -> list[tuple[Cause, int]]:
+    """The alternatives with their settings at the ends of what is plausible, where they have one.
+
+    Each is the last alternative of its cause.
+    """
+    far = []
+    for cause, index in tests:
+        effect = problem.known[cause.effect]
+        ends = [farthest(effect, probe, problem.longest_step) for probe in cause.probes[index]]
+        settings = tuple(end for end in ends if end is not None)
+        if settings and settings not in cause.probes:
+            further = replace(cause, probes=(*cause.probes, settings))
+            far.append((further, len(cause.probes)))
+    return far
+
+
+def _signals_of(
+    fit: Fit, projector: Projector, tests: Sequence[tuple[Cause, int]]
+) -> list[Signal | None]:
+    """Signals of alternatives; None of one that leaves nothing."""
     found: list[Signal | None] = [None] * len(tests)
     for part in _parts(fit, tests):
         seen = _signals_together(fit, projector, [tests[i] for i in part])
         for i, signal in zip(part, seen, strict=True):
             found[i] = signal
-    return [signal for signal in found if signal is not None]
+    return found
 
 
 def _parts(fit: Fit, tests: Sequence[tuple[Cause, int]]) -> list[list[int]]:

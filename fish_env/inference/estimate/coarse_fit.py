@@ -23,6 +23,8 @@ from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
 
 STEPS = 5
+SILENT = 1e-6
+"""Change of the objective below which a size of an effect does nothing."""
 TOLERANCE = 0.5
 """A coarse fit ends when no parameter moves by more of its standard deviation."""
 
@@ -157,12 +159,44 @@ class CoarseFitter:
         """The best of some vectors, and the problem settled there."""
         noise = self.fit.noise
         if few.starts_known:
-            values = self._objectives(few, free, vectors)
-            return few, vectors[int(np.argmin(values))]
+            return few, self._best_acting(few, free, vectors)
         vectors = self._likeliest(few, free, vectors, POLICY.most_settled_starts)
         settled = [few.settled(free.unpack(v), noise, nearby=True) for v in vectors]
         pairs = zip(settled, vectors, strict=True)
         return min(pairs, key=lambda pair: self._objectives(pair[0], free, [pair[1]])[0])
+
+    def _best_acting(self, few: Problem, free: Free, vectors: Sequence[FloatArray]) -> FloatArray:
+        """The best of those vectors that change something, or of all where none does.
+
+        Some effects do nothing up to a size: a limit that is never met. There they have no slope,
+        and however bad a larger size may be, it leads on.
+        """
+        off = self._switched_off(few, free, vectors)
+        values = np.array(self._objectives(few, free, [*vectors, *off.values()]))
+        without = dict(zip(off, values[len(vectors) :], strict=True))
+        own = values[: len(vectors)]
+        silent = [
+            abs(value - without.get(vector[: free.count].tobytes(), np.inf)) < SILENT
+            for value, vector in zip(own, vectors, strict=True)
+        ]
+        return vectors[int(np.argmin(own if all(silent) else np.where(silent, np.inf, own)))]
+
+    def _switched_off(
+        self, few: Problem, free: Free, vectors: Sequence[FloatArray]
+    ) -> dict[bytes, FloatArray]:
+        """Coefficients of the vectors, as bytes -> the vector with further effects off.
+
+        Empty where that is not a number, and where there is no choice.
+        """
+        names = {f.id.effect for f in free.freedoms} - {*self.fit.effects}
+        neutral = few.neutral(names)
+        if len(vectors) < 2 or not np.isfinite(list(neutral.values())).all():
+            return {}
+        points = [free.unpack(vector) for vector in vectors]
+        return {
+            point.z.tobytes(): free.pack(Point(point.z, {**point.effects, **neutral}))
+            for point in points
+        }
 
     def _surveyed(
         self, problem: Problem, slopes: Slopes, vector: FloatArray

@@ -175,10 +175,8 @@ class CoarseFitter:
         values = np.array(self._objectives(few, free, [*vectors, *off.values()]))
         without = dict(zip(off, values[len(vectors) :], strict=True))
         own = values[: len(vectors)]
-        silent = [
-            abs(value - without.get(vector[: free.count].tobytes(), np.inf)) < SILENT
-            for value, vector in zip(own, vectors, strict=True)
-        ]
+        beside = [without.get(vector[: free.count].tobytes(), np.nan) for vector in vectors]
+        silent = [a == b or abs(a - b) < SILENT for a, b in zip(own, beside, strict=True)]
         return vectors[int(np.argmin(own if all(silent) else np.where(silent, np.inf, own)))]
 
     def _switched_off(

@@ -127,6 +127,32 @@ def test_a_curved_model_ends_where_nothing_is_gained(seed):
     assert worth(again, further[0]) > worth(moved, vector[0]) - 2.0
 
 
+class Steep(Differing):
+    """Steeper, the farther down the shared number is: whole steps lead beyond a limit."""
+
+    lowest = -0.9
+
+    def model(self, shared, own):
+        return super().model(np.exp(-5.0 * shared), own)
+
+    def filtered(self, point, noise, near=()):
+        self.tried.add(round(float(point.z[0]), 6))
+        return super().filtered(point, noise, near)
+
+    def _rows(self, z, effects, noise):
+        rows = super()._rows(z, effects, noise)
+        return np.full_like(rows, np.nan) if z[0] < self.lowest else rows
+
+
+def test_steps_go_on_with_the_damping_that_was_needed():
+    """Without that every step would begin with whole ones, which diverge."""
+    problem = Steep(truth=(-0.8, 0.1, 0.1))
+    problem.tried = set()
+    _, vector, _, _, _ = descended(problem, iterations=30)
+    assert vector[0] == pytest.approx(-0.8, abs=0.02)
+    assert sum(z < problem.lowest for z in problem.tried) == 3
+
+
 def test_no_number_is_negative_that_cannot_be():
     problem = Differing(positive=True)
     assert (problem.true[:, 1] < -0.5).any()

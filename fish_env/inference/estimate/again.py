@@ -33,10 +33,8 @@ def finished(own: Fit) -> Fit:
         lin = own.linearised
         hessian = information(lin.slopes, free.prior)
         pull = gradient(lin.slopes, lin.residuals, free.prior, vector)
-        if (
-            predicted_decrease(hessian, pull, free.bounds.step(hessian, pull, vector))
-            < POLICY.converged
-        ):
+        step = free.bounds.beside(vector).step(hessian, pull, vector)
+        if predicted_decrease(hessian, pull, step) < POLICY.converged:
             break
         again = fit(own.problem, own.effects, own.point, own.noise, own.released, rounds=2)
         gained = own.objective - again.objective

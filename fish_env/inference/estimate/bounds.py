@@ -9,8 +9,9 @@ of the normalised numbers that a fit works with, so they stand as rows of the pr
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -27,19 +28,46 @@ AT = 0.01
 """A vector is at a bound when it is as near to it, in standard deviations."""
 
 
+class Gap(NamedTuple):
+    """Values that a number must not have: a lag between off and where simulation steps are stable.
+
+    Attributes:
+        number: which; a row of its own bounds it.
+        off: below the gap.
+        least: above it.
+    """
+
+    number: int
+    off: float
+    least: float
+
+
 @dataclass(frozen=True, eq=False)
 class LinearBounds:
-    """Where a vector may go: ``low <= rows @ vector <= high``.
+    """Where a vector may go: ``low <= rows @ vector <= high``, outside some gaps.
 
     Attributes:
         rows: (n, n) what is bounded, invertible.
         low: (n,) lower bounds.
         high: (n,) upper bounds.
+        gaps: values between that are not allowed.
     """
 
     rows: FloatArray
     low: FloatArray
     high: FloatArray
+    gaps: tuple[Gap, ...] = ()
+
+    def beside(self, vector: FloatArray) -> LinearBounds:
+        """The bounds of steps from a vector, whose numbers above a gap stay above it.
+
+        Steps into a gap would be shortened until nothing else moves either. Whether what a number
+        switches on is needed at all is asked elsewhere.
+        """
+        above = [gap for gap in self.gaps if vector[gap.number] >= gap.least]
+        low = self.low.copy()
+        low[[gap.number for gap in above]] = [gap.least for gap in above]
+        return replace(self, low=low) if above else self
 
     @cached_property
     def inverse(self) -> FloatArray:
@@ -50,6 +78,9 @@ class LinearBounds:
         """The vector (n,) with what is bounded moved to the nearest value allowed."""
         values = self.rows @ vector
         inside = np.clip(values, self.low, self.high)
+        for number, off, least in self.gaps:
+            if off < inside[number] < least:
+                inside[number] = off if inside[number] - off < least - inside[number] else least
         unmoved = np.array_equal(inside, values)
         return vector.copy() if unmoved else np.asarray(self.inverse @ inside)
 

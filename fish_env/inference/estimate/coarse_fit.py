@@ -119,8 +119,8 @@ class CoarseFitter:
             return quadratic(free, at, slopes.exact(few, at, self.filtered, self.marginal))
 
         vector, value, _ = descend(
-            vector, partial(self._surveyed, few, slopes), exactly, free.bounds, STEPS, TOLERANCE,
-            give_up_above, quickly=lambda _, known: known,
+            vector, partial(self._surveyed, few, slopes), exactly, free.bounds.beside(vector),
+            STEPS, TOLERANCE, give_up_above, quickly=lambda _, known: known,
         )  # fmt: skip
         return CoarseFit(tuple(effects), tuple(released), free.unpack(vector), value)
 

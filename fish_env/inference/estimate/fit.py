@@ -275,7 +275,7 @@ def gauss_newton(
 
         return model
 
-    limits = (free.bounds, iterations, tolerance, give_up_above)
+    limits = (free.bounds.beside(vector), iterations, tolerance, give_up_above)
     exactly, quickly = modelled(slopes.exact), modelled(slopes.quick)
     return descend(vector, evaluate, exactly, *limits, quickly=quickly)
 
@@ -296,9 +296,8 @@ def _extrapolated(own: Fit) -> Fit:
     defect = (own.marginalised(finer) - lin.residuals) * finer_by / (finer_by - 1)
     before = lin.residuals + defect
     pull = gradient(lin.slopes, before, free.prior, vector)
-    moved = free.bounds.clip(
-        vector + free.bounds.step(information(lin.slopes, free.prior), pull, vector)
-    )
+    bounds = free.bounds.beside(vector)
+    moved = bounds.clip(vector + bounds.step(information(lin.slopes, free.prior), pull, vector))
     (usual,) = residuals_at(problem, free, moved[:, None], own.noise, own.filtered)
     after = own.marginalised(usual) + defect
     if objective_of(problem, free, moved, after) >= objective_of(problem, free, vector, before):
@@ -358,5 +357,6 @@ def _finish(
     return Fit(
         problem, effects, released, point, noise, free.ids, estimates, physical,
         float(sum(r.log_likelihood for r in filtered)), value, bounds,
-        free.bounds.active(hessian, pull, vector), condition, problem.lasting(filtered), lin,
+        free.bounds.beside(vector).active(hessian, pull, vector), condition,
+        problem.lasting(filtered), lin,
     )  # fmt: skip

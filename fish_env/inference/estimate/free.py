@@ -6,20 +6,20 @@ With what estimates are made of: the objective at a vector, residuals and their 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from fish_env.arrays import BoolArray, FloatArray, IntArray
-from fish_env.inference.estimate.bounds import LinearBounds, parameter_bounds
+from fish_env.inference.estimate.bounds import Gap, LinearBounds, parameter_bounds
 from fish_env.inference.estimate.information import gradient, information, prior_precision
 from fish_env.inference.estimate.run_variation import Marginal
 from fish_env.inference.evaluation import Evaluation
 from fish_env.inference.hypotheses import Coefficient, EffectParameterId, ParameterId
 from fish_env.inference.problem import Point, Problem
-from fish_env.inference.vehicle import finite_values
+from fish_env.inference.vehicle import diverging, finite_values
 
 SHORTEST = 0.02
 """Shortest step for differences, as a share of the longest."""
@@ -117,7 +117,20 @@ class Free:
     def bounds(self) -> LinearBounds:
         """Bounds of the vector: of coefficients in physical units, of effects' parameters."""
         lower, upper = [f.lower for f in self.freedoms], [f.upper for f in self.freedoms]
-        return parameter_bounds(self.problem.baseline, lower, upper, self.released)
+        bounds = parameter_bounds(self.problem.baseline, lower, upper, self.released)
+        return replace(bounds, gaps=self._gaps)
+
+    @property
+    def _gaps(self) -> tuple[Gap, ...]:
+        """Where lags are too quick for the steps of the problem."""
+        found, step = [], self.problem.longest_step
+        for i, freedom in enumerate(self.freedoms, start=self.count):
+            effect = self.problem.known[freedom.id.effect]
+            (parameter,) = (p for p in effect.parameters if p.name == freedom.id.name)
+            off, least = diverging(effect, parameter, step)
+            if least > off:
+                found.append(Gap(i, off, least))
+        return tuple(found)
 
     def effects_at_bounds(self, vector: FloatArray) -> list[EffectParameterId]:
         """Effect parameters that ended at the edge of what they may be."""

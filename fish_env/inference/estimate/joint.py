@@ -11,7 +11,7 @@ others, 2000).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -32,9 +32,10 @@ from fish_env.inference.estimate.slopes import Slopes
 from fish_env.inference.evaluation import Evaluation
 from fish_env.inference.problem import Problem
 
-SHARES = (1.0, 0.4)
-DAMPINGS = (0.03, 0.3, 3.0, 30.0)
-"""Of a step that is too long: parts of it first, then damped ones (Marquardt, 1963)."""
+TRIALS = ((0.0, 1.0), (0.0, 0.4), (0.03, 1.0), (0.3, 1.0), (3.0, 1.0), (30.0, 1.0))
+"""Damping and share of the way: the whole step, then part of it, then damped ones (Marquardt, 1963,
+J. SIAM 11, 431)."""
+UNDAMPED = sum(damping == 0.0 for damping, _ in TRIALS)
 OWN_SHARES = (0.4, 0.0)
 """Parts of its own step that a run goes which loses by the whole."""
 ENOUGH, FORESEEN = 1.0, 0.1
@@ -100,16 +101,16 @@ def descend_jointly(
     if not np.isfinite(at.value):
         raise np.linalg.LinAlgError("the simulation diverges at the start of the fit")
     at = _agreed(at, free, noise)
-    left, exact = iterations, True
+    left, exact, first = iterations, True, 0
     model: _Model | None = None
     while left:
         model = _Model(slopes, at, None if exact else model)
         predicted = at.value - model.foreseen(*model.step(0.0))
         if at.value - left * predicted > give_up_above:
             break
-        better = None
+        better, used = None, first
         if predicted >= tolerance**2:
-            better = next(_descending(model, free, noise, at), None)
+            better, used = _better(model, noise, at, first)
         gained = 0.0 if better is None else at.value - better.value
         if better is not None:
             at = _agreed(better, free, noise)
@@ -117,8 +118,12 @@ def descend_jointly(
             break
         nearly_linear = gained > 0.0 and gained >= AS_PROMISED * predicted
         left -= int(exact or nearly_linear)
-        exact = not nearly_linear
-    marginal = slopes.marginal(at.problem, at.vector, at.filtered)
+        first = max(used - 1, 0)
+        exact = not nearly_linear or first >= UNDAMPED
+    if model is not None and model.exact and model.at is at:
+        marginal: Marginal | None = model.own
+    else:
+        marginal = slopes.marginal(at.problem, at.vector, at.filtered)
     assert marginal is not None
     value = objective_with(free, at.vector, at.filtered, marginal)
     return at.problem, at.vector, value, at.filtered, marginal
@@ -166,6 +171,7 @@ class _Model:
     def __init__(self, slopes: Slopes, at: Joint, near: _Model | None) -> None:
         problem, free, noise = at.problem, slopes.free, slopes.noise
         self.free, self.at, self.exact = free, at, near is None
+        self.bounds = free.bounds.beside(at.vector)
         self.active = np.flatnonzero(spread_of(problem, noise))
         self.spread = spread_of(problem, noise)[self.active]
         self.least = least_of(problem, self.active)
@@ -194,7 +200,7 @@ class _Model:
             damping: by how much more curvature than there is both are held where they are.
             share: how much of the way both go.
         """
-        bounds, vector = self.free.bounds, self.at.vector
+        bounds, vector = self.bounds, self.at.vector
         stiff = self.hessian + damping * np.diag(np.diag(self.hessian))
         moved = bounds.clip(vector + bounds.step(stiff, self.gradient, vector))
         left = self.lin.residuals + self.lin.slopes @ (moved - vector)
@@ -217,19 +223,30 @@ class _Model:
         return found
 
 
-def _descending(model: _Model, free: Free, noise: Any, at: Joint) -> Iterator[Joint]:
-    """Points with a lower value, the boldest first; no damped ones by slopes that are not exact."""
-    dampings = DAMPINGS if model.exact else ()
-    for damping, share in (*((0.0, s) for s in SHARES), *((d, 1.0) for d in dampings)):
-        vector, own = model.step(damping, share)
-        if not at.problem.baseline.possible(vector[: free.count]):
+def _better(model: _Model, noise: Any, at: Joint, first: int) -> tuple[Joint | None, int]:
+    """The boldest step that leads to a lower value, None where none does, and its number.
+
+    Args:
+        model: about where steps begin; where its slopes are not exact, no damped one is tried.
+        noise: noise model.
+        at: where steps begin.
+        first: number of the first to try. After one that needed so much damping, bolder ones lead
+            nowhere, often to where the simulation diverges.
+    """
+    last = len(TRIALS) if model.exact else UNDAMPED
+    for number in range(first, last):
+        vector, own = model.step(*TRIALS[number])
+        if number > first and at.value - model.foreseen(vector, own) < ENOUGH:
+            break  # a decrease that would end the steps anyway
+        if not at.problem.baseline.possible(vector[: model.free.count]):
             continue
         try:
             tried = _with_own_steps(model, noise, at, vector, own)
         except np.linalg.LinAlgError:
             continue
         if tried.value < at.value:
-            yield tried
+            return tried, number
+    return None, first
 
 
 def _with_own_steps(

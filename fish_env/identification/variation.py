@@ -13,12 +13,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from fish_env.arrays import FloatArray
+from fish_env.identification.policy import IDENTIFICATION
 from fish_env.inference.estimate.run_variation import RunVariation
 from fish_env.inference.hypotheses import EffectParameterId as Shared
 from fish_env.params.packing import RECORD_FIELDS
 from fish_env.sensing.devices import Device, devices_of
 
-USUAL_BEAT, USUAL_SAG = 4e-3, 3e-4
+USUAL_BEAT, USUAL_SAG = IDENTIFICATION.ordinary_beat_error, 3e-4
 """Ordinary spreads over runs of servos' frequencies, and of what batteries lose each second (1/s).
 Within these a beat that runs share is none: a narrower spread about what combs have found would
 take the mean of their errors for a cause."""

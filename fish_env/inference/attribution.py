@@ -18,8 +18,8 @@ from fish_env.inference.estimate.again import to_publish
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.hypotheses import CauseId, Coefficient
-from fish_env.inference.lags import asked_again
 from fish_env.inference.left_out import left_out_scores
+from fish_env.inference.lookalikes import asked_again
 from fish_env.inference.many_causes import challenged, pursue
 from fish_env.inference.parallel import both, side_by_side
 from fish_env.inference.policy import POLICY

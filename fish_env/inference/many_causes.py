@@ -10,7 +10,7 @@ import numpy as np
 from fish_env.inference.adequacy import disturbance_at_limit
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import CauseId, Coefficient, EffectName
-from fish_env.inference.lags import look_alikes
+from fish_env.inference.lookalikes import late
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause
 from fish_env.inference.problem import Problem
@@ -187,7 +187,7 @@ def challenged(
     close = _close(current, shown)
     pairs_of = (zip(current.causes, e.causes, strict=False) for e in rivals)
     earlier = [(a, b) for pairs in pairs_of for a, b in pairs if a != b]
-    first = [*_of_drive(current), *look_alikes(current), *replaced]
+    first = [*_of_drive(current), *late(current), *replaced]
     tried = [*first, *[*earlier, *each_in_turn(close)][: POLICY.most_substitutes]]
     pairs = [(c, signals[n]) for c, n in dict.fromkeys(tried) if n in signals and c in known]
     best, *others = substituted(current, pairs, POLICY.most_challenges, report)

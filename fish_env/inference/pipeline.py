@@ -25,7 +25,7 @@ from fish_env.inference.estimate.again import finished, refined
 from fish_env.inference.estimate.fit import FEWER_STEPS, Fit, fit
 from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.gain import gap_closed
-from fish_env.inference.lags import undecided
+from fish_env.inference.lookalikes import decided, undecided
 from fish_env.inference.partial import Describe, confirmed, sustained
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause, causes_of
@@ -177,6 +177,9 @@ def partly(
     # What is published was compared in the steps of a search, and is judged in usual ones.
     finer = reached(partial(refined, found.fit))
     found = replace(found, fit=finer) if finer else found
+    found = decided(found, attribution.shown, report)
+    if not found.causes:
+        return attribution, verdict
     rivals = tuple(e for e in attribution.rivals if len(e.causes) == len(found.causes))
     return replace(attribution, accepted=found, rivals=rivals), Verdict("partial", found.causes)
 

@@ -1,6 +1,5 @@
 """Random effects over runs: found where they act, absent where they do not, integrated exactly."""
 
-from copy import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +9,7 @@ from fish_env.inference.estimate.run_variation import Marginal, RunVariation, sh
 from fish_env.inference.estimate.settle import predicted_variation
 from fish_env.inference.estimate.spread import Likelihood, fit_spread
 from fish_env.inference.problem import Point
-from tests.inference.stated import Evaluated, Stated, White
+from tests.inference.stated import Numbered, White
 
 RUNS, PER_RUN = 8, 200
 
@@ -133,7 +132,7 @@ def test_integrating_out_whitens_by_the_whole_covariance():
     )
 
 
-class Growing(Stated):
+class Growing(Numbered):
     """Runs whose growth differs: far from it the linear model says little."""
 
     variations = (RunVariation("rate", "1", 1.0),)
@@ -142,28 +141,14 @@ class Growing(Stated):
     def __init__(self, rates):
         self.rates = np.asarray(rates)
         self.own = np.zeros((len(rates), 1))
-        super().__init__(lambda z, effects: np.zeros((len(rates), len(self._TIME))))
+        super().__init__()
 
-    @property
-    def variation(self):
-        return self.own
-
-    def with_variation(self, values, point, noise, near=()):
-        moved = copy(self)
-        moved.own = values
-        return moved
-
-    def some(self, runs):
-        part = Growing(self.rates[runs])
-        part.own = self.own[runs]
-        return part
-
-    def filtered(self, point, noise, near=()):
-        missed = 5.0 * (np.exp(np.outer(self.rates, self._TIME)) - np.exp(self.own * self._TIME))
-        return [Evaluated(float(-0.5 * row @ row), row) for row in missed]
+    def left(self, z, effects):
+        grown = np.exp(np.outer(self.rates, self._TIME))
+        return 5.0 * (grown - np.exp(self.own * self._TIME))
 
     def variation_slopes(self, point, noise, filtered, steps):
-        return (-5.0 * self._TIME * np.exp(self.own * self._TIME)).reshape(-1, 1)
+        return (-5.0 * self._TIME * np.exp(self.variation * self._TIME)).reshape(-1, 1)
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ import pytest
 
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.explanation import Explanation
-from fish_env.inference.lags import asked_again, look_alikes, undecided
+from fish_env.inference.lookalikes import asked_again, decided, late, rates, undecided
 from fish_env.inference.probes import causes_of
 from fish_env.inference.screening import screen
 from fish_env.inference.vehicle import Drive
@@ -38,6 +38,13 @@ def problem(share, lag=0.5, limit=0.0):
     return stated
 
 
+def of_rates(share, **sizes):
+    """The same of what makes a clock or a drive slow."""
+    stated = problem(share, **sizes)
+    stated.hidden_by_drive, stated.out_of_step = (), (LAG, LIMIT)
+    return stated
+
+
 def explained(stated, name):
     """A fit with one of the lags, and what its screen shows of the other."""
     current = Explanation((name,), fit(stated, [name]))
@@ -46,7 +53,7 @@ def explained(stated, name):
 
 def test_each_lag_is_compared_with_those_known_to_look_like_it():
     current, _ = explained(problem(0.9), LIMIT)
-    assert look_alikes(current) == [(LIMIT, LAG)]
+    assert late(current) == [(LIMIT, LAG)]
 
 
 def test_the_lag_that_fits_best_takes_the_place_of_another():
@@ -91,3 +98,39 @@ def test_beside_the_unknown_only_a_lag_that_none_can_replace_is_named(share, lag
     assert told == [
         f"rejecting {name}: {LIMIT} explains nearly as much in its place" for name in lags
     ]
+
+
+def test_rates_are_compared_too():
+    current, _ = explained(of_rates(0.9), LIMIT)
+    assert rates(current) == [(LIMIT, LAG)]
+    assert late(current) == []
+    best, alike = asked_again(*explained(of_rates(0.9), LIMIT), [].append)
+    assert best.causes == (LAG,)
+    assert alike == ()
+
+
+def test_a_rate_takes_the_place_of_another_at_its_size():
+    """From the mildest probe the fit would not come so far."""
+    stated = of_rates(1.0 - 1e-6, lag=0.9)
+    begun = []
+    stated.filtered = lambda point, *args: (
+        begun.append(dict(point.effects)), Stated.filtered(stated, point, *args))[1]  # fmt: skip
+    current, shown = explained(stated, LAG)
+    begun.clear()
+    asked_again(current, shown, [].append)
+    first = next(effects for effects in begun if size_of(LIMIT) in effects)
+    assert first[size_of(LIMIT)] == pytest.approx(0.9, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("share", "named"), [(1.0 - 1e-6, ()), (0.9, (LAG,))], ids=["alike", "told apart"]
+)
+def test_beside_the_unknown_a_rate_is_named_if_no_other_does_as_well(share, named):
+    told = []
+    assert decided(*explained(of_rates(share), LAG), told.append).causes == named
+    rejected = [words for words in told if words.startswith("rejecting")]
+    assert rejected == ([] if named else [f"rejecting {LAG}: others explain as much in its place"])
+
+
+def test_beside_the_unknown_a_rate_leaves_its_place_to_a_better_one():
+    assert decided(*explained(of_rates(0.9), LIMIT), [].append).causes == (LAG,)

@@ -10,7 +10,7 @@ CLEANRL := .venv-cleanrl
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test kernels test-long lint docs bench benchmark-diagnosis benchmark-realistic benchmark-power benchmark-time benchmark-agents benchmark-loop clients measure-export fuzz check-release walks clone-to-verdict clean
+.PHONY: help setup demo test kernels test-long lint docs bench bench-gpu benchmark-diagnosis benchmark-realistic benchmark-power benchmark-time benchmark-agents benchmark-loop clients measure-export fuzz check-release walks clone-to-verdict clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 28
@@ -56,6 +56,9 @@ bench: $(VENV)/.with-bench  ## measure speed beside other environments, and put 
 	$(BIN)/python -m scripts.bench.c_loop
 	$(BIN)/python -m scripts.bench.speed
 	$(BIN)/python -m scripts.update_readme
+
+bench-gpu: setup  ## measure the environment and a training on an NVIDIA GPU (extra gpu, see docs/gpu.md)
+	$(BIN)/python -m scripts.bench.gpu
 
 benchmark-diagnosis: setup  ## hide effects in made-up measurements, and count what is found
 	$(BIN)/python scripts/benchmark_diagnosis.py

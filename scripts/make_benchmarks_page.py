@@ -26,6 +26,13 @@ SPEED_HEAD = """\
 
 `make bench` runs this simulator and other simulators in one process, in turn.
 """
+GPU_HEAD = """\
+## Speed on a GPU
+
+`make bench-gpu` measures the environment on a GPU, the training on it, and a swimmer of MJX, in one
+process. A control step of the environment includes goal, observation, reward and restarts; the
+swimmer is bare physics. "Bare physics" of the fish copies its commands from the host. [On a GPU](gpu.md) describes the environment.
+"""
 AGENTS_HEAD = """\
 ## Agents
 """
@@ -54,7 +61,8 @@ is. Intervals are 95 % (Clopper-Pearson).
 
 def page(speed: Path = SPEED, diagnosis: Path = DIAGNOSIS) -> str:
     """The page as Markdown."""
-    parts = [HEAD, SPEED_HEAD, _latest(speed, "speed"), AGENTS_HEAD, agents_report.section()]
+    parts = [HEAD, SPEED_HEAD, _latest(speed, "speed"), GPU_HEAD, _latest(diagnosis, "gpu")]
+    parts += [AGENTS_HEAD, agents_report.section()]
     parts += [DIAGNOSIS_HEAD, _latest(diagnosis, "diagnosis")]
     parts += [REALISTIC_HEAD, _latest(diagnosis, "realistic")]
     return "\n".join([*parts, ""]).rstrip() + "\n"

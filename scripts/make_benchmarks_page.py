@@ -31,7 +31,8 @@ GPU_HEAD = """\
 
 `make bench-gpu` measures the environment on a GPU, the training on it, and a swimmer of MJX, in one
 process. A control step of the environment includes goal, observation, reward and restarts; the
-swimmer is bare physics. "Bare physics" of the fish copies its commands from the host. [On a GPU](gpu.md) describes the environment.
+swimmer is bare physics. "Bare physics" of the fish copies its commands from the host. [On a
+GPU](gpu.md) describes the environment.
 """
 AGENTS_HEAD = """\
 ## Agents

@@ -32,7 +32,6 @@ from fish_env.inference.screening import Screen
 from fish_env.inference.search import at_noise
 from fish_env.inference.starts import probed
 from fish_env.inference.substitution import swapped, what_may_lack, without
-from fish_env.inference.vehicle import Effect
 
 Report = Callable[[str], None]
 Pair = tuple[EffectName, EffectName]
@@ -49,14 +48,14 @@ def late(current: Explanation) -> list[Pair]:
 
 
 def rates(current: Explanation) -> list[Pair]:
-    """What makes a clock or a drive slow, each with what else may, by as much.
+    """What makes a clock or a drive slow, each with what else may.
 
     A clock that is slow by half a percent differs from a drive that is by half a percent of all
-    forces, which coefficients make up for.
+    forces, which coefficients make up for. One that is slow by its load differs by as little.
     """
-    known = current.fit.problem.known
-    pairs = _pairs_among(current, current.fit.problem.out_of_step)
-    return [(c, n) for c, n in pairs if _switches(known[c]) == _switches(known[n])]
+    problem = current.fit.problem
+    drifting = [EffectName(name) for name, e in problem.known.items() if e.drifts_in_phase]
+    return _pairs_among(current, list(dict.fromkeys((*problem.out_of_step, *drifting))))
 
 
 def _pairs_among(current: Explanation, names: Collection[EffectName]) -> list[Pair]:
@@ -65,10 +64,6 @@ def _pairs_among(current: Explanation, names: Collection[EffectName]) -> list[Pa
     causes = [name for name in names if name in current.causes]
     others = [name for name in names if name not in current.causes]
     return [(c, n) for c in causes for n in others if n in known[c].confusable_with]
-
-
-def _switches(effect: Effect) -> set[str]:
-    return {parameter.name for parameter in effect.switching}
 
 
 def asked_again(
@@ -141,13 +136,13 @@ def _closest(
 def _in_place(own: Fit, cause: CauseId, signal: Signal) -> CoarseFit:
     """Where a fit begins that has a look-alike in the place of a cause.
 
-    At its mildest; where the two have parameters of the same name, at the values of the cause.
+    As it was measured; else where the two have parameters of the same name, at the values of the
+    cause; else at its mildest.
     """
-    (mildest, *_) = probed(own.problem, signal)
-    name = signal.cause.effect
-    values = own.point.effects
-    same = {id: EffectParameterId(str(cause), id.name) for id in mildest}
-    begin = {id: values.get(other, mildest[id]) for id, other in same.items()}
+    name, values, measured = signal.cause.effect, own.point.effects, own.problem.drive.in_step
+    (first, *_) = probed(own.problem, signal)
+    same = {id: values.get(EffectParameterId(str(cause), id.name), first[id]) for id in first}
+    begin = {id: first[id] if id in measured else same[id] for id in first}
     kept = of_effects(values, {*own.effects} - {cause})
     effects = tuple(name if e == cause else e for e in own.effects)
     return CoarseFit(effects, own.released, Point(own.point.z, {**kept, **begin}), np.inf)

@@ -8,7 +8,7 @@ import numpy as np
 
 from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.fit import Fit
-from fish_env.inference.hypotheses import EffectParameterId
+from fish_env.inference.hypotheses import EffectParameterId, of_effects
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import combined, effect_values, mirrored
 from fish_env.inference.problem import Point, Problem
@@ -69,10 +69,11 @@ def baselines(base: Fit) -> tuple[FloatArray, ...]:
 def probed(
     problem: Problem, signal: Signal, every: bool = False
 ) -> list[dict[EffectParameterId, float]]:
-    """Settings to begin from: of the best shape at every size, or of every alternative.
+    """Settings to begin from: as measured, of the best shape at every size, or every alternative.
 
-    On either side of neutral where there are two: of a strong effect no linear estimate tells the
-    sign. Never from neutral itself, where many an effect begins too flat to be left again.
+    What was measured of a drive comes first. On either side of neutral where there are two: of a
+    strong effect no linear estimate tells the sign. Never from neutral itself, where many an effect
+    begins too flat to be left again.
     """
     cause, effect = signal.cause, problem.known[signal.cause.effect]
     shaped = len(effect.switching) < len(effect.parameters)
@@ -81,4 +82,6 @@ def probed(
     settings = [p for i, p in enumerate(every_one) if p not in every_one[:i]]
     opposite = [o for o in (mirrored(effect, p) for p in settings) if o not in settings]
     settings += [o for o in opposite if any(o[p.name] != p.neutral for p in effect.switching)]
-    return [effect_values(problem, cause.effect, p) for p in settings]
+    begin = [effect_values(problem, cause.effect, p) for p in settings]
+    measured = of_effects(problem.drive.in_step, {cause.effect})
+    return [{**begin[0], **measured}, *begin] if measured else begin

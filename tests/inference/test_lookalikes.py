@@ -109,17 +109,21 @@ def test_rates_are_compared_too():
     assert alike == ()
 
 
-def test_a_rate_takes_the_place_of_another_at_its_size():
+@pytest.mark.parametrize(
+    ("measured", "first"), [({}, 0.9), ({size_of(LIMIT): 0.7}, 0.7)], ids=["nothing", "it"]
+)
+def test_a_rate_takes_the_place_of_another_as_measured_or_at_its_size(measured, first):
     """From the mildest probe the fit would not come so far."""
     stated = of_rates(1.0 - 1e-6, lag=0.9)
     begun = []
     stated.filtered = lambda point, *args: (
         begun.append(dict(point.effects)), Stated.filtered(stated, point, *args))[1]  # fmt: skip
     current, shown = explained(stated, LAG)
+    stated.drive = Drive(measured, uneven=True)
     begun.clear()
     asked_again(current, shown, [].append)
-    first = next(effects for effects in begun if size_of(LIMIT) in effects)
-    assert first[size_of(LIMIT)] == pytest.approx(0.9, abs=0.05)
+    effects = next(effects for effects in begun if size_of(LIMIT) in effects)
+    assert effects[size_of(LIMIT)] == pytest.approx(first, abs=0.05)
 
 
 @pytest.mark.parametrize(

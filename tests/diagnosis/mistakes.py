@@ -141,6 +141,13 @@ UNITS = {
 
 def _frames(dataset: Dataset) -> dict[str, Mistake]:
     found = {}
+    if {"roll", "yaw"} <= set(dataset.channels):
+        found["commands exchanged"] = Mistake(
+            crossed, ("commands: {tail_offset: {unit: rad, column: block_angle}",)
+        )
+        own = [name for name in ("y", "v", "roll", "yaw", "p", "r") if name in dataset.channels]
+        signs = ", ".join(f"{name}: {{unit: {SI[name]}, sign: -1}}" for name in own)
+        found["mirrored"] = Mistake(mirrored, (f"channels: {{{signs}}}",))
     if {"x", "y"} <= set(dataset.channels):
         found["x and y exchanged"] = Mistake(exchanged, ("channels: {x: {unit: m, column: y}",))
     if {"z", "pitch"} <= set(dataset.channels):
@@ -203,6 +210,20 @@ def exchanged(run: Run) -> Run:
     """x and y in each other's columns."""
     x, y = run.channels["x"], run.channels["y"]
     return replace(run, channels={**run.channels, "x": y, "y": x})
+
+
+def crossed(run: Run) -> Run:
+    """The commands of the tail's offset and of the block's angle in each other's columns."""
+    order = [list(COMMANDS).index(name) for name in COMMANDS]
+    one, other = list(COMMANDS).index("tail_offset"), list(COMMANDS).index("block_angle")
+    order[one], order[other] = other, one
+    return replace(run, commands=CommandSteps(run.commands.times_s, run.commands.values[:, order]))
+
+
+def mirrored(run: Run) -> Run:
+    """Left and right exchanged."""
+    names = [name for name in ("y", "v", "roll", "yaw", "p", "r") if name in run.channels]
+    return replace(run, channels={**run.channels, **{name: -run.channels[name] for name in names}})
 
 
 def as_enu(run: Run) -> Run:

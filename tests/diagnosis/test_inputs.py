@@ -40,6 +40,8 @@ QUICK = (
     (NINE, "z reversed"),
     (NINE, "p in the finer unit"),
     (NINE, "frame enu"),
+    (NINE, "mirrored"),
+    (NINE, "commands exchanged"),
     (NINE, "clock 2.1"),
     (NINE, "clock of the commands 1.3"),
     (NINE, "clock of the measurements 0.5"),

@@ -19,7 +19,7 @@ BOUNDED = {"pitch": 0.5 * math.pi, "roll": math.pi}
 
 @dataclass(frozen=True)
 class Column:
-    """How a channel is read: factor times its source, plus an offset (SI)."""
+    """How a channel or command is read: factor times its source, plus an offset (SI)."""
 
     source: str
     factor: float = 1.0
@@ -31,15 +31,15 @@ class Change:
     """Another reading of a dataset.
 
     Attributes:
-        kind: "sign", "unit", "swap", "frame", "offset", "clock", "clock_skew", "clock_offset" or
-            "beat".
+        kind: "sign", "unit", "swap", "mirror", "frame", "offset", "clock", "clock_skew",
+            "clock_offset" or "beat".
         target: what is read otherwise: columns, or the clock.
         value: the sign, factor, offset or scale; None for a swap or a frame.
         unit: of the value.
         line: what to write into dataset.yaml.
         words: what is wrong, in words.
         channels: columns that are read otherwise.
-        commands: factor by command.
+        commands: commands that are.
         clocks: corrections of the clocks and beats by run; the key "" stands for all others.
         turned: the whole dataset is in the other frame.
     """
@@ -51,7 +51,7 @@ class Change:
     line: str
     words: str
     channels: Mapping[str, Column] = field(default_factory=dict)
-    commands: Mapping[str, float] = field(default_factory=dict)
+    commands: Mapping[str, Column] = field(default_factory=dict)
     clocks: Mapping[str, Clocks] = field(default_factory=dict)
     turned: bool = False
 
@@ -71,8 +71,10 @@ class Change:
         changed = {name: self._read(run, name, c) for name, c in self.channels.items()}
         steps = run.commands
         if self.commands:
-            factors = np.array([self.commands.get(name, 1.0) for name in COMMANDS])
-            steps = CommandSteps(steps.times_s, steps.values * factors + 0.0)
+            read = [self.commands.get(name, Column(name)) for name in COMMANDS]
+            values = steps.values[:, [list(COMMANDS).index(column.source) for column in read]]
+            factors = np.array([column.factor for column in read])
+            steps = CommandSteps(steps.times_s, values * factors + 0.0)
         run = replace(run, channels={**run.channels, **changed}, commands=steps)
         return retimed(run, self.clocks.get(run.id, self.clocks.get("", Clocks())))
 

@@ -30,6 +30,8 @@ SHORT = {"metres": "m", "centimetres": "cm", "millimetres": "mm", "radians": "ra
          "degrees": "deg"}  # fmt: skip
 SIGNED = ("tail_offset", "block_displacement", "block_angle")
 """Commands that have a sign."""
+LEFT_HANDED = ("y", "v", "roll", "yaw", "p", "r")
+"""Channels whose sign a mirror reverses that exchanges left and right."""
 HEADINGS = (
     ("yaw points to the tail", 1.0, math.pi),
     ("yaw is zero at east", 1.0, 0.5 * math.pi),
@@ -44,6 +46,7 @@ def readings(dataset: Dataset) -> list[Change]:
     return [
         _other_frame(dataset.frame),
         *_signs(channels, lines),
+        *_mirrored(channels, lines),
         *_units(channels, lines),
         *_swaps(channels, lines),
         *_headings(channels, lines),
@@ -59,7 +62,8 @@ def _other_frame(frame: str) -> Change:
     reversed_ = ("y", "z", "pitch", "yaw", "v", "w", "q", "r")
     return Change(
         "frame", "frame", None, "", f"frame: {other}", words, turned=True,
-        channels={name: Column(name) for name in reversed_}, commands={"tail_offset": -1.0},
+        channels={name: Column(name) for name in reversed_},
+        commands={"tail_offset": Column("tail_offset", -1.0)},
     )  # fmt: skip
 
 
@@ -86,7 +90,18 @@ def _signs(channels: Sequence[str], lines: Lines) -> Iterator[Change]:
     for name in SIGNED:
         yield Change(
             "sign", name, -1.0, "", lines.signs((name,)),
-            f"the command {name} has the wrong sign", commands={name: -1.0},
+            f"the command {name} has the wrong sign", commands={name: Column(name, -1.0)},
+        )  # fmt: skip
+
+
+def _mirrored(channels: Sequence[str], lines: Lines) -> Iterator[Change]:
+    own = tuple(name for name in LEFT_HANDED if name in channels)
+    if len(own) > 1:
+        yield Change(
+            "mirror", ", ".join(own), -1.0, "", lines.signs(own),
+            f"the motion is that of a mirrored fish, in a left-handed frame: {_and(own)} have the "
+            "wrong sign",
+            channels={name: Column(name, -1.0) for name in own},
         )  # fmt: skip
 
 
@@ -107,7 +122,7 @@ def _units(channels: Sequence[str], lines: Lines) -> Iterator[Change]:
             yield Change(
                 "unit", name, factor, unit, lines.units((name,), unit),
                 f"the command {name} is in {coarse} but declared as {fine}",
-                commands={name: factor},
+                commands={name: Column(name, factor)},
             )  # fmt: skip
 
 
@@ -119,6 +134,14 @@ def _swaps(channels: Sequence[str], lines: Lines) -> Iterator[Change]:
                 lines.swap(one, other),
                 f"{one} and {other} are swapped",
                 channels={one: Column(other), other: Column(one)},
+            )  # fmt: skip
+    for one, other in combinations(COMMANDS, 2):
+        if COMMANDS[one].dimension == COMMANDS[other].dimension:
+            yield Change(
+                "swap", f"{one}, {other}", None, "",
+                lines.swap(one, other),
+                f"the commands {one} and {other} are swapped",
+                commands={one: Column(other), other: Column(one)},
             )  # fmt: skip
 
 

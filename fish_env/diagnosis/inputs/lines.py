@@ -32,7 +32,7 @@ class Lines:
         return self._line({name: {"unit": unit} for name in names})
 
     def swap(self, one: str, other: str) -> str:
-        """Two channels in each other's columns."""
+        """Two channels, or two commands, in each other's columns."""
         first, second = (self._declared(name)[0] for name in (one, other))
         return self._line({one: {"column": second}, other: {"column": first}})
 

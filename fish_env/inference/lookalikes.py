@@ -27,7 +27,7 @@ from fish_env.inference.hypotheses import (
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point
 from fish_env.inference.projection import Signal
-from fish_env.inference.rivals import rivals_of
+from fish_env.inference.rivals import as_likely, rivals_of
 from fish_env.inference.screening import Screen
 from fish_env.inference.search import at_noise
 from fish_env.inference.starts import probed
@@ -173,7 +173,8 @@ def undecided(current: Explanation, shown: Screen, report: Report) -> frozenset[
 def decided(found: Explanation, shown: Screen, report: Report) -> Explanation:
     """The explanation without what another effect does as well, beside something unknown.
 
-    A verdict that leaves something unknown names no alternatives.
+    A verdict that leaves something unknown names no alternatives. That runs disagree on which is
+    better says little there: what is unknown may act in some of them.
 
     Args:
         found: causes that act.
@@ -181,6 +182,7 @@ def decided(found: Explanation, shown: Screen, report: Report) -> Explanation:
         report: told what is being done.
     """
     found, rivals = asked_of_rates(found, shown, report)
+    rivals = tuple(other for other in rivals if as_likely(found, other))
     doubtful = {*found.causes} - frozenset[CauseId]().union(*(e.causes for e in rivals))
     if not rivals or not doubtful:
         return found

@@ -54,12 +54,17 @@ def alike(best: Explanation, other: Explanation) -> bool:
     are alike too when the runs do not agree on which predicts better: what one run gains by an
     explanation that others lose by is an error of that run's, of which the evidence knows nothing.
     """
+    return as_likely(best, other) or not agreed(best, other)
+
+
+def as_likely(best: Explanation, other: Explanation) -> bool:
+    """Whether the evidence for two explanations differs too little to tell them apart."""
     gap = other.score - best.score
     left, there = best.fit.linearised.residuals, other.fit.linearised.residuals
     apart = (there - left)[:, None]
     noise = left - apart[:, 0] * (apart[:, 0] @ left) / max(float(apart[:, 0] @ apart[:, 0]), 1e-12)
     inflation = Projector(best.fit).variance_inflation(apart, noise)
-    return bool(gap < POLICY.evidence_doubt * inflation or not agreed(best, other))
+    return bool(gap < POLICY.evidence_doubt * inflation)
 
 
 def agreed(best: Explanation, other: Explanation) -> bool:

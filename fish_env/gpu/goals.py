@@ -23,7 +23,6 @@ from fish_env.envs.guides import (
 )
 from fish_env.envs.layout import GOAL, WAYPOINTS, GoalKind
 from fish_env.envs.tasks.path import (
-    ALIKE,
     DRAWN_LEGS,
     DRAWS_PER_LEG,
     FIRST_DRAW,
@@ -194,6 +193,6 @@ def course_inside(ranges, north, east, length, course, turn):
                 min(ends_north - ranges[WALLS_NORTH], ranges[WALLS_NORTH + 1] - ends_north),
                 min(ends_east - ranges[WALLS_EAST], ranges[WALLS_EAST + 1] - ends_east),
             )
-            if (room > widest + ALIKE) & (widest < WALL_MARGIN):
+            if (room > widest) & (widest < WALL_MARGIN):
                 widest, best = room, tried
     return best

@@ -20,9 +20,6 @@ WALL_MARGIN = 0.4
 """Least distance of a waypoint from a wall (m): about the smallest radius a fish turns on."""
 WAYS_ROUND = 8
 """Directions that are tried for a leg that would end beyond a wall."""
-ALIKE = 1e-9
-"""Distances from a wall that differ by less (m) are alike: the first direction is taken then. In a
-square tank two directions often are, and rounding, which no two machines share, would decide."""
 
 
 def path_goal(config: EnvConfig, draws: FloatArray) -> dict[str, FloatArray]:
@@ -141,8 +138,7 @@ def _inside(
     ways = course + np.where(turn < 0, turn - steps, turn + steps)
     room = _room(walls, north + length * np.cos(ways), east + length * np.sin(ways))
     fits: BoolArray = room >= WALL_MARGIN
-    widest: BoolArray = room >= room.max(axis=0) - ALIKE
-    best = np.where(fits.any(axis=0), fits.argmax(axis=0), widest.argmax(axis=0))
+    best = np.where(fits.any(axis=0), fits.argmax(axis=0), room.argmax(axis=0))
     return np.asarray(ways[best, np.arange(len(course))])
 
 

@@ -8,7 +8,7 @@ apart no better than by what they make up for, none is named.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -44,7 +44,8 @@ def late(current: Explanation) -> list[Pair]:
     The linear model is of no help. It begins from sizes at which the one follows another course
     than the other.
     """
-    return _pairs_among(current, current.fit.problem.hidden_by_drive)
+    hidden = current.fit.problem.hidden_by_drive
+    return pairs_alike(current, hidden, hidden)
 
 
 def rates(current: Explanation) -> list[Pair]:
@@ -55,13 +56,16 @@ def rates(current: Explanation) -> list[Pair]:
     """
     problem = current.fit.problem
     drifting = [EffectName(name) for name, e in problem.known.items() if e.drifts_in_phase]
-    return _pairs_among(current, list(dict.fromkeys((*problem.out_of_step, *drifting))))
+    names = tuple(dict.fromkeys((*problem.out_of_step, *drifting)))
+    return pairs_alike(current, names, names)
 
 
-def _pairs_among(current: Explanation, names: Collection[EffectName]) -> list[Pair]:
-    """Causes among some effects, each with those of the others that are known to look like it."""
+def pairs_alike(
+    current: Explanation, among: Sequence[EffectName], names: Sequence[EffectName]
+) -> list[Pair]:
+    """Causes among some effects, each with those of others that are known to look like it."""
     known = current.fit.problem.known
-    causes = [name for name in names if name in current.causes]
+    causes = [name for name in among if name in current.causes]
     others = [name for name in names if name not in current.causes]
     return [(c, n) for c in causes for n in others if n in known[c].confusable_with]
 
@@ -141,8 +145,10 @@ def _in_place(own: Fit, cause: CauseId, signal: Signal) -> CoarseFit:
     """
     name, values, measured = signal.cause.effect, own.point.effects, own.problem.drive.in_step
     (first, *_) = probed(own.problem, signal)
-    same = {id: values.get(EffectParameterId(str(cause), id.name), first[id]) for id in first}
-    begin = {id: first[id] if id in measured else same[id] for id in first}
+    begin = {
+        id: value if id in measured else values.get(EffectParameterId(str(cause), id.name), value)
+        for id, value in first.items()
+    }
     kept = of_effects(values, {*own.effects} - {cause})
     effects = tuple(name if e == cause else e for e in own.effects)
     return CoarseFit(effects, own.released, Point(own.point.z, {**kept, **begin}), np.inf)
@@ -184,7 +190,7 @@ def decided(found: Explanation, shown: Screen, report: Report) -> Explanation:
     found, rivals = asked_of_rates(found, shown, report)
     rivals = tuple(other for other in rivals if as_likely(found, other))
     doubtful = {*found.causes} - frozenset[CauseId]().union(*(e.causes for e in rivals))
-    if not rivals or not doubtful:
+    if not rivals:
         return found
     report(
         f"rejecting {listed(sorted(doubtful, key=name_of))}: others explain as much in its place"

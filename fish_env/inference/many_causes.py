@@ -10,7 +10,7 @@ import numpy as np
 from fish_env.inference.adequacy import disturbance_at_limit
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import CauseId, Coefficient, EffectName
-from fish_env.inference.lookalikes import late
+from fish_env.inference.lookalikes import late, pairs_alike
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause
 from fish_env.inference.problem import Problem
@@ -219,13 +219,12 @@ def _close(current: Explanation, shown: Screen) -> list[tuple[EffectName, Effect
 def _of_drive(current: Explanation) -> list[tuple[EffectName, EffectName]]:
     """What was measured of a drive, with what else in the clocks or the drive may have shown it."""
     problem = current.fit.problem
-    return [
-        (cause, name)
+    measured = [
+        cause
         for cause in current.causes
-        if cause in problem.drive.effects and not isinstance(cause, Coefficient)
-        for name in problem.out_of_step
-        if name in problem.known[cause].confusable_with and name not in current.causes
+        if not isinstance(cause, Coefficient) and cause in problem.drive.effects
     ]
+    return pairs_alike(current, measured, problem.out_of_step)
 
 
 def each_in_turn(

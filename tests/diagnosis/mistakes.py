@@ -30,6 +30,7 @@ ROUND = 18
 """Kinds that the tiers go through in order: seeds are multiples of it, plus the kind."""
 FACTORS = (0.2, 0.5, 0.75, 1.3, 2.1, 5.0)
 SIGNED = ("tail_offset", "block_displacement", "block_angle")
+LEFT_HANDED = ("y", "v", "roll", "yaw", "p", "r")
 SI = {name: SI_UNIT[quantity.dimension] for name, quantity in {**CHANNELS, **COMMANDS}.items()}
 Spoil = Callable[[Run], Run]
 
@@ -145,7 +146,7 @@ def _frames(dataset: Dataset) -> dict[str, Mistake]:
         found["commands exchanged"] = Mistake(
             crossed, ("commands: {tail_offset: {unit: rad, column: block_angle}",)
         )
-        own = [name for name in ("y", "v", "roll", "yaw", "p", "r") if name in dataset.channels]
+        own = [name for name in LEFT_HANDED if name in dataset.channels]
         signs = ", ".join(f"{name}: {{unit: {SI[name]}, sign: -1}}" for name in own)
         found["mirrored"] = Mistake(mirrored, (f"channels: {{{signs}}}",))
     if {"x", "y"} <= set(dataset.channels):
@@ -222,7 +223,7 @@ def crossed(run: Run) -> Run:
 
 def mirrored(run: Run) -> Run:
     """Left and right exchanged."""
-    names = [name for name in ("y", "v", "roll", "yaw", "p", "r") if name in run.channels]
+    names = [name for name in LEFT_HANDED if name in run.channels]
     return replace(run, channels={**run.channels, **{name: -run.channels[name] for name in names}})
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field
@@ -155,8 +156,9 @@ class Numbered(Stated):
     def __init__(self, known: Iterable[Effect] = ()) -> None:
         super().__init__(self.left, known)
 
+    @abstractmethod
     def left(self, z: FloatArray, effects: Mapping[EffectParameterId, float]) -> FloatArray:
-        raise NotImplementedError
+        """What the runs leave, as :data:`Residuals`."""
 
     @property
     def variation(self) -> FloatArray:

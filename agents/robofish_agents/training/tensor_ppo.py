@@ -169,6 +169,12 @@ def samples_of(policy: ActorCritic, taken: Rollout, recipe: Recipe) -> Samples:
     return Samples(seen, seen, taken.actions, taken.log_probability, advantage, returns)
 
 
+def _in_a_row(whole: Samples, recipe: Recipe) -> tuple[list[Tensor], int]:
+    """The samples (steps * N, ...) one after another, and how many a minibatch has."""
+    flat = [rows.flatten(0, 1) for rows in whole]
+    return flat, len(flat[0]) // recipe.minibatches
+
+
 def improve(
     policy: ActorCritic,
     optimiser: torch.optim.Optimizer,
@@ -190,9 +196,8 @@ def improve(
     Returns:
         How far the policy had moved in the last minibatch.
     """
-    flat = [rows.flatten(0, 1) for rows in whole]
+    flat, size = _in_a_row(whole, recipe)
     count, moved = len(flat[0]), 0.0
-    size = count // recipe.minibatches
     loss_fn = loss_fn or loss_function(policy, recipe)
     for _ in range(recipe.epochs):
         order = torch.randperm(count, device=flat[0].device)
@@ -281,8 +286,7 @@ def train(env: Any, recipe: Recipe, seed: int) -> Trained:
 
 def _loss_on_device(policy: ActorCritic, whole: Samples, recipe: Recipe) -> LossFunction:
     """The loss of minibatches of such samples, replayed where they are on a GPU."""
-    flat = [rows.flatten(0, 1) for rows in whole]
-    size = len(flat[0]) // recipe.minibatches
+    flat, size = _in_a_row(whole, recipe)
     like = tuple(rows[:size] for rows in flat)
     return differentiable(policy, loss_function(policy, recipe), like)
 

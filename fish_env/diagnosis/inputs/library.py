@@ -129,20 +129,22 @@ def _units(channels: Sequence[str], lines: Lines) -> Iterator[Change]:
 def _swaps(channels: Sequence[str], lines: Lines) -> Iterator[Change]:
     for group in GROUPS:
         for one, other in combinations([name for name in group if name in channels], 2):
-            yield Change(
-                "swap", f"{one}, {other}", None, "",
-                lines.swap(one, other),
-                f"{one} and {other} are swapped",
-                channels={one: Column(other), other: Column(one)},
-            )  # fmt: skip
+            yield _swap(one, other, lines)
     for one, other in combinations(COMMANDS, 2):
         if COMMANDS[one].dimension == COMMANDS[other].dimension:
-            yield Change(
-                "swap", f"{one}, {other}", None, "",
-                lines.swap(one, other),
-                f"the commands {one} and {other} are swapped",
-                commands={one: Column(other), other: Column(one)},
-            )  # fmt: skip
+            yield _swap(one, other, lines)
+
+
+def _swap(one: str, other: str, lines: Lines) -> Change:
+    """Two channels, or two commands, in each other's columns."""
+    crossed = {one: Column(other), other: Column(one)}
+    commanded = one in COMMANDS
+    return Change(
+        "swap", f"{one}, {other}", None, "",
+        lines.swap(one, other),
+        f"{'the commands ' if commanded else ''}{one} and {other} are swapped",
+        channels={} if commanded else crossed, commands=crossed if commanded else {},
+    )  # fmt: skip
 
 
 def _headings(channels: Sequence[str], lines: Lines) -> Iterator[Change]:

@@ -6,7 +6,9 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
+from fish_env.arrays import IntArray
 from fish_env.errors import ConfigError
 from fish_env.model.state import INPUTS
 from fish_env.reading import is_number, shown
@@ -28,6 +30,24 @@ def speed_range(name: str, value: Any) -> list[float]:
     if len(speeds) != 2 or not all(map(is_number, speeds)) or not 0 <= speeds[0] <= speeds[1]:
         raise ConfigError(f"{name} {shown(value)}: a speed >= 0 (m/s) or a range [low, high]")
     return [float(speed) for speed in speeds]
+
+
+def elapsed_steps(value: npt.ArrayLike, count: int, most: int) -> IntArray:
+    """Control steps that fish count as taken already, (count,).
+
+    Args:
+        value: what is given for it.
+        count: number of fish.
+        most: control steps of an episode.
+
+    Raises:
+        ConfigError: other numbers than whole ones from 0 to most - 1.
+    """
+    given = np.asarray(value)
+    whole = given.dtype.kind in "iu" and given.shape == (count,)
+    if not whole or given.min() < 0 or given.max() >= most:
+        raise ConfigError(f"elapsed steps: {count} whole numbers from 0 to {most - 1}")
+    return given.astype(np.int64)
 
 
 def check_count(name: str, value: Any, most: int) -> None:

@@ -14,7 +14,7 @@ from gymnasium.vector.utils import batch_space
 
 from fish_env.arrays import BoolArray, FloatArray, IntArray
 from fish_env.envs.batch import FishBatch, generator, real_actions
-from fish_env.envs.config_checks import check_count
+from fish_env.envs.config_checks import check_count, elapsed_steps
 from fish_env.envs.layout import OUTPUTS
 from fish_env.envs.options import env_options
 from fish_env.envs.robotic_fish_3d import (
@@ -179,14 +179,7 @@ class RoboticFish3DVectorEnv(Watched, VectorEnv[Float32Array, Float32Array, npt.
         Raises:
             ConfigError: other numbers.
         """
-        given = np.asarray(steps)
-        whole = given.dtype.kind in "iu" and given.shape == (self.num_envs,)
-        if not whole or given.min() < 0 or given.max() >= self.max_episode_steps:
-            raise ConfigError(
-                f"elapsed steps: {self.num_envs} whole numbers from 0 to "
-                f"{self.max_episode_steps - 1}"
-            )
-        self._steps[:] = given
+        self._steps[:] = elapsed_steps(steps, self.num_envs, self.max_episode_steps)
 
     def save_state(self) -> dict[str, Any]:
         """All that steps change, as arrays and plain values; :meth:`load_state` takes it."""

@@ -10,7 +10,8 @@ import numpy.typing as npt
 from fish_env.arrays import BoolArray, FloatArray
 from fish_env.envs import start
 from fish_env.envs.batch import BatchShape, FishBatch
-from fish_env.envs.layout import OBSERVATION, OUTPUTS, SENSORS, Failure, Setup
+from fish_env.envs.config_checks import elapsed_steps
+from fish_env.envs.layout import GOAL, OBSERVATION, OUTPUTS, SENSORS, Failure, Setup
 from fish_env.envs.options import EnvOptions
 from fish_env.envs.randomization import Randomization
 from fish_env.errors import ConfigError
@@ -172,6 +173,29 @@ class DeviceBatch:
     def records(self) -> Any:
         """(parameters, N) parameter records."""
         return self._data[self._rows.ROW_PAR : self._rows.ROW_TIME]
+
+    @property
+    def goal(self) -> Any:
+        """(len(GOAL), N) goals."""
+        return self._data[self._rows.ROW_GOAL : self._rows.ROW_GOAL + len(GOAL)]
+
+    @property
+    def time(self) -> Any:
+        """(N,) time since the start of the episodes (s)."""
+        return self._data[self._rows.ROW_TIME]
+
+    def set_elapsed(self, steps: npt.ArrayLike) -> None:
+        """Count control steps as taken already, so that present episodes are truncated earlier.
+
+        Args:
+            steps: (N,) control steps, from 0 to max_episode_steps - 1.
+
+        Raises:
+            ConfigError: other numbers.
+        """
+        counted = fetch(self._whole)
+        counted[loops.STEPS] = elapsed_steps(steps, self.count, self.max_episode_steps)
+        self._whole.copy_to_device(counted)
 
     def data(self) -> npt.NDArray[Any]:
         """A copy on the host of all numbers that last through an episode, rows as in a batch."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 
@@ -61,7 +62,7 @@ class RoboticFish3DDeviceEnv(VectorEnv[Any, Any, Any]):
         check_count("max_episode_steps", max_episode_steps, 2**31)
         mode = AutoresetMode(autoreset_mode)
         options = env_options(**kwargs)
-        self.num_envs = num_envs
+        self.num_envs, self.max_episode_steps = num_envs, max_episode_steps
         self.metadata = {**self.metadata, "autoreset_mode": mode}
         self.single_action_space = action_space()
         self.single_observation_space = observation_space()
@@ -84,6 +85,10 @@ class RoboticFish3DDeviceEnv(VectorEnv[Any, Any, Any]):
             "final_obs": tensor(batch.final_obs),
             "final_info": {name: final[row] for row, name in enumerate(OUTPUTS)},
         }
+
+    def set_elapsed(self, steps: npt.ArrayLike) -> None:
+        """As of ``RoboticFish3DVectorEnv``; waits for the device."""
+        self.batch.set_elapsed(steps)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

@@ -21,8 +21,8 @@ from robofish_agents.training.config import (
 )
 from robofish_agents.training.run import train
 from robofish_agents.training.stack import make_stack, seed_episodes
-from robofish_agents.training.tensor_engine import GROUPS, TensorEngine, _ends, _set_rate
-from robofish_agents.training.tensor_ppo import Taken, generalised
+from robofish_agents.training.tensor_engine import TensorEngine, _ends, _set_rate
+from robofish_agents.training.tensor_ppo import GROUPS, Taken, generalised
 from tests.agents.test_training import PPO, Quiet, same
 
 TENSOR = replace(
@@ -157,16 +157,6 @@ def test_the_rate_falls_to_its_end():
         _set_rate(optimiser, LearningRate(1e-2, 1e-3), done)
         rates.append(optimiser.param_groups[0]["lr"])
     assert rates == pytest.approx([1e-2, 5.5e-3, 1e-3, 1e-3])
-
-
-def test_the_teacher_explores_less_and_less():
-    teacher = Teaching(768, 768, (16,), log_std_init=-0.5, log_std_end=-2.5)
-    learner = engine(replace(TAUGHT, teacher=teacher))
-    learner._limit_noise(0.25)
-    assert learner.teacher.log_std.tolist() == pytest.approx([-1.0] * 5)
-    learner.teacher.log_std.data[:] = -3.0
-    learner._limit_noise(1.0)
-    assert learner.teacher.log_std.tolist() == [-3.0] * 5
 
 
 def test_ends_tell_failures_from_time_limits():

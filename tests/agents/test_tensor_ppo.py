@@ -65,6 +65,15 @@ def test_actions_have_the_deviation_of_the_policy():
     assert torch.allclose(actions.std(0), torch.full((2,), np.exp(-1.0)), rtol=0.03)
 
 
+def test_a_policy_explores_less_and_less():
+    policy, recipe = ActorCritic(3, 2, Recipe()), Recipe(log_std=-0.5, log_std_end=-2.5)
+    policy.limit_noise(recipe, 0.25)
+    assert policy.log_std.tolist() == pytest.approx([-1.0] * 2)
+    policy.log_std.data[:] = -3.0
+    policy.limit_noise(recipe, 1.0)
+    assert policy.log_std.tolist() == [-3.0] * 2
+
+
 def summed(policy, taken, recipe):
     """Advantages (steps, N) from their definition: surprises up to the end of an episode."""
     with torch.no_grad():

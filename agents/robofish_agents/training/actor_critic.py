@@ -8,6 +8,9 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor, nn
 
+from fish_env.arrays import FloatArray
+from robofish_agents.policies.network import Network
+
 ACTIVATION: dict[str, type[nn.Module]] = {"tanh": nn.Tanh, "relu": nn.ReLU}
 
 
@@ -31,6 +34,9 @@ class Recipe:
         entropy: weight of the entropy of actions in the loss.
         value_weight: weight of the squared error of values in the loss.
         largest_gradient: longer gradients are shortened to this norm.
+        reward_scale: rewards are multiplied by this.
+        log_std_end: largest logarithm of the deviation at the end; the limit falls linearly from
+            ``log_std``. None: no limit.
     """
 
     iterations: int = 40
@@ -48,6 +54,8 @@ class Recipe:
     entropy: float = 0.0
     value_weight: float = 0.5
     largest_gradient: float = 0.5
+    reward_scale: float = 1.0
+    log_std_end: float | None = None
 
     def shortened(self, iterations: int) -> Recipe:
         """The same with fewer iterations."""
@@ -76,6 +84,7 @@ class ActorCritic(nn.Module):
         """
         super().__init__()
         widths = recipe.layers if recipe.critic_layers is None else recipe.critic_layers
+        self.activation = recipe.activation
         between = ACTIVATION[recipe.activation]
         self.mean = _perceptron(observed, recipe.layers, actions, 0.01, between)
         self.value = _perceptron(judged or observed, widths, 1, 1.0, between)
@@ -88,6 +97,13 @@ class ActorCritic(nn.Module):
         density: Tensor = -0.5 * (scaled * scaled).sum(-1) - self.log_std.sum() - constant
         return density
 
+    def limit_noise(self, recipe: Recipe, done: float) -> None:
+        """Let the policy explore less, the larger the share of a training is that is done."""
+        if recipe.log_std_end is not None:
+            limit = recipe.log_std + (recipe.log_std_end - recipe.log_std) * min(done, 1.0)
+            with torch.no_grad():
+                self.log_std.clamp_(max=limit)
+
     def act(self, observed: Tensor) -> tuple[Tensor, Tensor]:
         """Drawn actions (N, actions) and the logarithm of their density (N,)."""
         mean = self.mean(observed)
@@ -95,6 +111,29 @@ class ActorCritic(nn.Module):
         constant = noise.shape[-1] * 0.5 * math.log(2.0 * math.pi)
         density = -0.5 * (noise * noise).sum(-1) - self.log_std.sum() - constant
         return mean + noise * torch.exp(self.log_std), density
+
+
+def network_of(
+    policy: ActorCritic, mean: FloatArray, deviation: FloatArray, limit: float
+) -> Network:
+    """The deterministic policy in NumPy.
+
+    Args:
+        policy: trained on normalised observations.
+        mean: (n,) what was subtracted from observations.
+        deviation: (n,) what the rest was divided by.
+        limit: what the result was clipped to.
+    """
+    layers = [layer for layer in policy.mean if isinstance(layer, nn.Linear)]
+    return Network(
+        mean,
+        deviation,
+        limit,
+        tuple(layer.weight.detach().cpu().numpy().copy() for layer in layers),
+        tuple(layer.bias.detach().cpu().numpy().copy() for layer in layers),
+        policy.activation,
+        "clip",
+    )
 
 
 def _perceptron(

@@ -8,13 +8,14 @@ it. Values that are known better make advantages less noisy.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
+from types import ModuleType
+from typing import Any
 
 import numpy as np
 
-from fish_env.arrays import FloatArray
-from fish_env.envs.batch import FishBatch
 from fish_env.envs.layout import GOAL, OBSERVATION, REFERENCE
-from robofish_agents.training.teacher import Float32Array, true_observations
+from robofish_agents.training.teacher import TrueFish, true_observations
 
 AHEAD_S = (0.5, 1.0, 2.0, 4.0)
 """Times from now (s) at which the critic knows the goals."""
@@ -33,10 +34,11 @@ class Sight:
 
     Args:
         batches: the fish; each batch may draw other parameters.
+        xp: ``numpy``, or ``torch`` if their arrays are tensors.
     """
 
-    def __init__(self, batches: Sequence[FishBatch]) -> None:
-        self._batches = tuple(batches)
+    def __init__(self, batches: Sequence[TrueFish], xp: ModuleType = np) -> None:
+        self._batches, self._xp = tuple(batches), xp
         drawn = [path for batch in self._batches for path in batch.drawn]
         self.paths = tuple(dict.fromkeys(drawn))
         """Parameters that any of the batches draws."""
@@ -46,99 +48,99 @@ class Sight:
         self.present = known
         """The first of them know nothing of steps and ramps to come: what a teacher may see."""
 
-    def see(self, observations: Float32Array) -> Float32Array:
+    def see(self, observations: Any) -> Any:
         """Returns privileged observations (N, m), float32.
 
         Args:
             observations: (N, 33) of the environment; they give the goals, commands and actuators.
         """
-        ends = np.cumsum([batch.count for batch in self._batches])[:-1]
-        rows = zip(np.split(observations, ends), self._batches, strict=True)
-        return np.concatenate([self._of(*row) for row in rows]).astype(np.float32)
+        ends = np.cumsum([0, *(batch.count for batch in self._batches)]).tolist()
+        rows = [observations[first:last] for first, last in pairwise(ends)]
+        seen = [self._of(*row) for row in zip(rows, self._batches, strict=True)]
+        return self._xp.asarray(self._xp.concatenate(seen), dtype=self._xp.float32)
 
-    def _of(self, observations: Float32Array, batch: FishBatch) -> FloatArray:
-        true = true_observations(observations, batch)
-        own = np.reshape([drawn(batch, path) for path in self.paths], (-1, batch.count))
-        now = (true.T, *foreseeable(batch), flow(batch), own)
-        return np.concatenate([*now, *future(batch)]).T
+    def _of(self, observations: Any, batch: TrueFish) -> Any:
+        xp = self._xp
+        true = true_observations(observations, batch, xp)
+        own = [drawn(batch, path, xp)[None] for path in self.paths]
+        now = (true.T, *foreseeable(batch, xp), flow(batch, xp), *own)
+        return xp.concatenate([*now, *future(batch, xp)]).T
 
 
-def foreseeable(batch: FishBatch) -> list[FloatArray]:
+def foreseeable(batch: TrueFish, xp: ModuleType = np) -> list[Any]:
     """As :func:`future`, if no step and no ramp begins or ends: what the past of a goal tells."""
     goal, now = batch.goal, batch.time
     changes = []
     for name in ("depth", "heading"):
         given = {field: goal[GOAL.index(f"{name}_{field}")] for field in REFERENCE}
         ramping = (now >= given["ramp_start"]) & (now < given["ramp_end"])
-        rate = np.where(ramping, given["ramp_rate"], 0.0)
+        rate = given["ramp_rate"] * ramping
         omega = 2.0 * np.pi * given["sine_frequency"]
         rows = [
             rate * ahead
             + given["sine_amplitude"]
             * (
-                np.sin(omega * (now + ahead) + given["sine_phase"])
-                - np.sin(omega * now + given["sine_phase"])
+                xp.sin(omega * (now + ahead) + given["sine_phase"])
+                - xp.sin(omega * now + given["sine_phase"])
             )
             for ahead in AHEAD_S
         ]
-        changes.append(np.stack(rows) / SCALE[name])
+        changes.append(xp.stack(rows) / SCALE[name])
     return changes
 
 
-def future(batch: FishBatch) -> list[FloatArray]:
+def future(batch: TrueFish, xp: ModuleType = np) -> list[Any]:
     """Changes (times, N) of the goals of depth and heading from now on, scaled."""
-    goal = batch.goal
-    return [
-        np.stack(
-            [
-                (reference(goal, name, batch.time + ahead) - reference(goal, name, batch.time))
-                / SCALE[name]
-                for ahead in AHEAD_S
-            ]
-        )
-        for name in ("depth", "heading")
-    ]
+    goal, now = batch.goal, batch.time
+    found = []
+    for name in ("depth", "heading"):
+        present = reference(goal, name, now, xp)
+        rows = [reference(goal, name, now + ahead, xp) - present for ahead in AHEAD_S]
+        found.append(xp.stack(rows) / SCALE[name])
+    return found
 
 
-def reference(goal: FloatArray, name: str, time: FloatArray) -> FloatArray:
+def reference(goal: Any, name: str, time: Any, xp: ModuleType = np) -> Any:
     """Value (N,) of a goal's signal, see :data:`fish_env.envs.layout.REFERENCE`.
 
     Args:
         goal: (len(GOAL), N) goals of the fish.
         name: ``depth`` or ``heading``.
         time: (N,) time since the start of the episode (s).
+        xp: ``numpy``, or ``torch`` if these are tensors.
     """
     given = {field: goal[GOAL.index(f"{name}_{field}")] for field in REFERENCE}
     start, end = given["ramp_start"], given["ramp_end"]
     phase = 2.0 * np.pi * given["sine_frequency"] * time + given["sine_phase"]
-    return np.asarray(
+    return (
         given["base"]
         + given["step"] * (time >= given["step_time"])
-        + given["ramp_rate"] * (np.clip(time, start, np.maximum(start, end)) - start)
-        + given["sine_amplitude"] * np.sin(phase)
+        + given["ramp_rate"] * (xp.clip(time, start, xp.maximum(start, end)) - start)
+        + given["sine_amplitude"] * xp.sin(phase)
     )
 
 
-def flow(batch: FishBatch) -> FloatArray:
+def flow(batch: TrueFish, xp: ModuleType = np) -> Any:
     """Speed (2, N) of the water along and across the fish, scaled; zero without a drawn flow."""
     if not set(FLOW) <= set(batch.drawn):
-        return np.zeros((2, batch.count))
+        return xp.stack([xp.zeros_like(batch.time)] * 2)
     north, east = (batch.drawn[path] / FLOW_SCALE for path in FLOW)
     qw, qx, qy, qz = batch.state[3:7]
-    along = np.stack([1.0 - 2.0 * (qy * qy + qz * qz), 2.0 * (qx * qy + qw * qz)])
-    cosine, sine = along / np.hypot(*along)
-    return np.stack([cosine * north + sine * east, cosine * east - sine * north])
+    along, across = 1.0 - 2.0 * (qy * qy + qz * qz), 2.0 * (qx * qy + qw * qz)
+    length = xp.hypot(along, across)
+    cosine, sine = along / length, across / length
+    return xp.stack([cosine * north + sine * east, cosine * east - sine * north])
 
 
-def drawn(batch: FishBatch, path: str) -> FloatArray:
+def drawn(batch: TrueFish, path: str, xp: ModuleType = np) -> Any:
     """A drawn parameter (N,), scaled by its distribution; zeros where a batch does not draw it."""
     random = batch.options.random
     if random is None or path not in batch.drawn:
-        return np.zeros(batch.count)
+        return xp.zeros_like(batch.time)
     row = random.paths.index(path)
-    first, second = random.first[row], random.second[row]
+    first, second = float(random.first[row]), float(random.second[row])
     if random.uniform[row]:
         centre, scale = (first + second) / 2.0, (second - first) / 2.0
     else:
         centre, scale = first, second
-    return np.asarray((batch.drawn[path] - centre) / max(scale, 1e-12))
+    return (batch.drawn[path] - centre) / max(scale, 1e-12)

@@ -7,12 +7,17 @@ estimate from past observations what the teacher knows.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import ModuleType
+from typing import Any, Protocol
+
 import numpy as np
 import numpy.typing as npt
 
 from fish_env.arrays import FloatArray
 from fish_env.envs.batch import FishBatch
 from fish_env.envs.layout import OBSERVATION, OUTPUTS
+from fish_env.envs.options import EnvOptions
 from fish_env.envs.sb3 import FishVecEnv
 from robofish_agents.controllers.pid import PIDController
 from robofish_agents.controllers.seen import Seen
@@ -24,6 +29,38 @@ Float32Array = npt.NDArray[np.float32]
 JUMP_OF_DEPTH, JUMP_OF_HEADING = 0.05, 0.3
 """Largest smooth change of a goal's rate (m/s^2, rad/s^2)."""
 MOMENT, LIFT = "mass.static_moment_rest[0]", "mass.buoyancy"
+
+
+class TrueFish(Protocol):
+    """What is true of N fish: arrays of NumPy, or tensors of the device they swim on.
+
+    Attributes:
+        options: what the environment is.
+        count: N.
+        state: (states, N).
+        goal: (len(GOAL), N).
+        time: (N,) since the start of the episode (s).
+        outputs: (len(OUTPUTS), N).
+        drawn: path -> (N,) randomised parameters.
+    """
+
+    options: EnvOptions
+    count: int
+    state: Any
+    outputs: Any
+
+    @property
+    def goal(self) -> Any:
+        """See the class."""
+
+    @property
+    def time(self) -> Any:
+        """See the class."""
+
+    @property
+    def drawn(self) -> Mapping[str, Any]:
+        """See the class."""
+        ...
 
 
 class ForesightPID(PIDController):
@@ -129,22 +166,28 @@ def beyond(path: str, batch: FishBatch) -> FloatArray:
     return np.zeros(batch.count) if drawn is None else drawn - nominal
 
 
-def true_observations(observations: Float32Array, batch: FishBatch) -> FloatArray:
-    """Returns observations (N, 33) of sensors without noise and delay."""
+def true_observations(observations: Any, batch: TrueFish, xp: ModuleType = np) -> Any:
+    """Returns observations (N, 33) of sensors without noise and delay.
+
+    Args:
+        observations: (N, 33) of the environment: goals, commands and actuators are taken from them.
+        batch: the fish.
+        xp: ``numpy``, or ``torch`` if these are tensors.
+    """
     outputs = dict(zip(OUTPUTS, batch.outputs, strict=True))
     qw, qx, qy, qz = batch.state[3:7]
     u, v, w, p, q, r = batch.state[7:13]
     zx, zy = 2.0 * (qx * qz - qw * qy), 2.0 * (qy * qz + qw * qx)
     zz = 1.0 - 2.0 * (qx * qx + qy * qy)
-    level = np.sqrt(1.0 - zx * zx)
+    level = xp.sqrt(1.0 - zx * zx)
     heading, instant = outputs["heading_error"], outputs["heading_error_instant"]
     now = {
         "depth error (goal - depth)": outputs["depth_error"] / 0.3,
         "rate of depth": (zx * u + zy * v + zz * w) / 0.1,
-        "sine of the heading error over the last beat": np.sin(heading),
-        "cosine of the heading error over the last beat": np.cos(heading),
-        "sine of the instantaneous heading error": np.sin(instant),
-        "cosine of the instantaneous heading error": np.cos(instant),
+        "sine of the heading error over the last beat": xp.sin(heading),
+        "cosine of the heading error over the last beat": xp.cos(heading),
+        "sine of the instantaneous heading error": xp.sin(instant),
+        "cosine of the instantaneous heading error": xp.cos(instant),
         "speed error (goal - surge speed over the last beat)": outputs["speed_error"] / 0.1,
         "sine of roll": zy / level,
         "cosine of roll": zz / level,
@@ -157,8 +200,5 @@ def true_observations(observations: Float32Array, batch: FishBatch) -> FloatArra
         "pitch rate": q,
         "yaw rate": r,
     }
-    true = np.array(observations, float)
-    names = [name for name, _ in OBSERVATION]
-    for name, values in now.items():
-        true[:, names.index(name)] = values
-    return true
+    names = (name for name, _ in OBSERVATION)
+    return xp.stack([now.get(name, observations[:, i]) for i, name in enumerate(names)], 1)

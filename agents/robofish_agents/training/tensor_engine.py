@@ -22,13 +22,12 @@ import torch
 from stable_baselines3.common import logger
 from stable_baselines3.common.running_mean_std import RunningMeanStd
 from stable_baselines3.common.utils import set_random_seed
-from torch import Tensor, nn
+from torch import Tensor
 
 from fish_env.envs.layout import OBSERVATION
 from fish_env.envs.registration import ENV_ID
 from robofish_agents.policies.files import ACTIONS, PolicyFile
-from robofish_agents.policies.network import Network
-from robofish_agents.training.actor_critic import ActorCritic, Recipe
+from robofish_agents.training.actor_critic import ActorCritic, Recipe, network_of
 from robofish_agents.training.books import Books
 from robofish_agents.training.config import TrainConfig
 from robofish_agents.training.learner_state import (
@@ -48,10 +47,9 @@ from robofish_agents.training.tensor_ppo import (
     follow,
     generalised,
     improve,
+    staggered,
 )
 
-GROUPS = 16
-"""Fish of a batch begin their episodes in so many groups, one after the other."""
 LIMIT = 10.0
 """Normalised inputs of the critic are clipped to this."""
 
@@ -85,6 +83,7 @@ def teacher_recipe(config: TrainConfig) -> Recipe:
         layers=teacher.layers,
         log_std=teacher.log_std_init,
         learning_rate=teacher.learning_rate.start,
+        log_std_end=teacher.log_std_end,
     )
 
 
@@ -162,7 +161,7 @@ class TensorEngine:
         rate = _set_rate(self.teacher_optimiser, self.config.teacher.learning_rate, share)
         kl = self.config.ppo.target_kl
         moved = improve(self.teacher, self.teacher_optimiser, samples, self.lessons, kl)
-        self._limit_noise(share)
+        self.teacher.limit_noise(self.lessons, share)
         return _row(self.teacher, taken, samples) | {"approx_kl": moved, "learning_rate": rate}
 
     def _graduate(self) -> None:
@@ -174,14 +173,6 @@ class TensorEngine:
         assert self.teacher
         self.learner.value.load_state_dict(self.teacher.value.state_dict())
         self.optimiser = _adam(self.learner)
-
-    def _limit_noise(self, share: float) -> None:
-        """Lets the teacher explore less, the more of its lessons are over."""
-        settings = self.config.teacher
-        if self.teacher and settings.log_std_end is not None:
-            first, last = settings.log_std_init, settings.log_std_end
-            with torch.no_grad():
-                self.teacher.log_std.clamp_(max=first + (last - first) * min(share, 1.0))
 
     def _distil(self, books: Books, steps: int, share: float) -> dict[str, float]:
         """Lets the policy swim, and fits it to what the teacher would have done."""
@@ -206,9 +197,7 @@ class TensorEngine:
     def _stagger(self) -> None:
         """Lets the fish begin their later episodes in turn."""
         for part in self.stack.fish.parts:
-            env = part.env
-            group = np.arange(env.num_envs) * GROUPS // env.num_envs
-            env.set_elapsed(group * (env.max_episode_steps // GROUPS))
+            part.env.set_elapsed(staggered(part.env.num_envs, part.env.max_episode_steps))
 
     def _collect(
         self, books: Books, steps: int, actor: ActorCritic, privileged: bool
@@ -285,16 +274,11 @@ class TensorEngine:
     def policy(self, about: Mapping[str, Any]) -> PolicyFile:
         """Returns the present deterministic policy, with a card."""
         outside = self._outside
-        layers = [layer for layer in self.learner.mean if isinstance(layer, nn.Linear)]
-        network = Network(
+        scale = (
             np.array(outside.obs_rms.mean, float),
-            np.sqrt(np.array(outside.obs_rms.var, float) + outside.epsilon),
-            float(outside.clip_obs),
-            tuple(layer.weight.detach().numpy().copy() for layer in layers),
-            tuple(layer.bias.detach().numpy().copy() for layer in layers),
-            self.config.network.activation,
-            "clip",
+            np.sqrt(outside.obs_rms.var + outside.epsilon),
         )
+        network = network_of(self.learner, *scale, float(outside.clip_obs))
         spec = self.stack.past.history.spec
         return PolicyFile(network, spec, self.config.task, ENV_ID, about)
 

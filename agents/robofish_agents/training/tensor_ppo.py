@@ -15,17 +15,26 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 
+from fish_env.arrays import IntArray
 from robofish_agents.training.actor_critic import ActorCritic, Recipe
 from robofish_agents.training.replayed import Replayed, differentiable
 
+GROUPS = 16
+"""Fish of a batch begin their later episodes in so many groups, one after the other."""
+
 
 class Rollout(NamedTuple):
-    """A rollout, (steps, N, ...) each; ``observed`` has the observations behind it too."""
+    """A rollout, (steps, N, ...) each; ``observed`` and ``judged`` have those behind it too.
+
+    ``judged`` and ``final`` are what the critic sees.
+    """
 
     observed: Tensor
+    judged: Tensor
     actions: Tensor
     log_probability: Tensor
     reward: Tensor
@@ -76,32 +85,57 @@ class Trained(NamedTuple):
     updates: int
 
 
-def collect(env: Any, policy: ActorCritic, observed: Tensor, recipe: Recipe) -> Rollout:
-    """Take the steps of one rollout; ``observed`` is the environment's own tensor."""
+def staggered(count: int, longest: int) -> IntArray:
+    """Control steps (count,) that fish count as taken, so that they begin their episodes in turn.
+
+    Args:
+        count: number of fish.
+        longest: control steps of an episode.
+    """
+    group = np.arange(count) * GROUPS // count
+    return group * (longest // GROUPS)
+
+
+def collect(
+    env: Any, policy: ActorCritic, observed: Tensor, recipe: Recipe, judged: Tensor | None = None
+) -> Rollout:
+    """Take the steps of one rollout.
+
+    Args:
+        env: an environment of tensors.
+        policy: acts.
+        observed: the environment's own tensor of observations.
+        recipe: says how many steps.
+        judged: its own tensor of what the critic sees; None: the observations.
+    """
     steps, device = recipe.steps, observed.device
+    known = observed if judged is None else judged
     count, actions = observed.shape[0], env.single_action_space.shape[0]
 
     def rows(*shape: int) -> Tensor:
         return torch.empty(shape, device=device)
 
+    seen = rows(steps + 1, *observed.shape)
     taken = Rollout(
-        rows(steps + 1, *observed.shape),
+        seen,
+        seen if judged is None else rows(steps + 1, *known.shape),
         rows(steps, count, actions),
         rows(steps, count),
         rows(steps, count),
         rows(steps, count),
         rows(steps, count),
-        rows(steps, *observed.shape),
+        rows(steps, *known.shape),
     )
+    final = "final_obs" if judged is None else "final_judged"
     with torch.no_grad():
         for step in range(steps):
-            taken.observed[step] = observed
+            taken.observed[step], taken.judged[step] = observed, known
             taken.actions[step], taken.log_probability[step] = policy.act(observed)
             _, reward, terminated, truncated, infos = env.step(taken.actions[step])
-            taken.reward[step] = reward
+            taken.reward[step] = recipe.reward_scale * reward
             taken.terminated[step], taken.truncated[step] = terminated, truncated
-            taken.final[step] = infos["final_obs"]
-        taken.observed[steps] = observed
+            taken.final[step] = infos[final]
+        taken.observed[steps], taken.judged[steps] = observed, known
     return taken
 
 
@@ -116,7 +150,7 @@ def advantages(policy: ActorCritic, taken: Rollout, recipe: Recipe) -> tuple[Ten
         recipe: discount and decay.
     """
     with torch.no_grad():
-        value = policy.value(taken.observed).squeeze(-1)
+        value = policy.value(taken.judged).squeeze(-1)
         cut_off = policy.value(taken.final).squeeze(-1)
     return generalised(taken, value, cut_off, recipe)
 
@@ -163,10 +197,10 @@ def loss_function(policy: ActorCritic, recipe: Recipe) -> LossFunction:
 
 
 def samples_of(policy: ActorCritic, taken: Rollout, recipe: Recipe) -> Samples:
-    """What there is to learn from a rollout; the critic sees what the policy sees."""
+    """What there is to learn from a rollout."""
     advantage, returns = advantages(policy, taken, recipe)
-    seen = taken.observed[:-1]
-    return Samples(seen, seen, taken.actions, taken.log_probability, advantage, returns)
+    seen, judged = taken.observed[:-1], taken.judged[:-1]
+    return Samples(seen, judged, taken.actions, taken.log_probability, advantage, returns)
 
 
 def _in_a_row(whole: Samples, recipe: Recipe) -> tuple[list[Tensor], int]:
@@ -250,38 +284,61 @@ def follow(
     return float(distance.detach())
 
 
-def train(env: Any, recipe: Recipe, seed: int) -> Trained:
+def train(
+    env: Any, recipe: Recipe, seed: int, watch: Callable[[int, ActorCritic], None] | None = None
+) -> Trained:
     """Train a policy.
 
     Args:
-        env: an environment of tensors that restarts episodes within a step.
+        env: an environment of tensors that restarts episodes within a step. If ``infos`` of its
+            ``reset`` have ``judged``, the critic sees that.
         recipe: what to do.
         seed: of weights, actions and fish.
+        watch: called with the number of rollouts so far and the policy, before each of them and
+            at the end; its time does not count.
     """
     torch.manual_seed(seed)
-    observed, _ = env.reset(seed=seed)
+    observed, infos = env.reset(seed=seed)
+    judged = infos.get("judged")
     _wait(observed)
-    started = time.perf_counter()
+    started, watched = time.perf_counter(), 0.0
     sizes = observed.shape[1], env.single_action_space.shape[0]
-    policy = ActorCritic(*sizes, recipe).to(observed.device)
+    wide = None if judged is None else judged.shape[1]
+    policy = ActorCritic(*sizes, recipe, wide).to(observed.device)
     optimiser = torch.optim.Adam(
         policy.parameters(), recipe.learning_rate, eps=1e-5, fused=observed.is_cuda
     )
-    swim = Replayed(partial(collect, env, policy, observed, recipe), observed.is_cuda)
+    swim = Replayed(partial(collect, env, policy, observed, recipe, judged), observed.is_cuda)
     loss_fn = None
     for iteration in range(recipe.iterations):
+        if watch:
+            watched += _timed(observed, partial(watch, iteration, policy))
+        done = iteration / recipe.iterations
         for group in optimiser.param_groups:
-            group["lr"] = recipe.learning_rate * (1.0 - iteration / recipe.iterations)
+            group["lr"] = recipe.learning_rate * (1.0 - done)
         whole = samples_of(policy, swim(), recipe)
         loss_fn = loss_fn or _loss_on_device(policy, whole, recipe)
         improve(policy, optimiser, whole, recipe, loss_fn=loss_fn)
+        policy.limit_noise(recipe, done)
     _wait(observed)
+    seconds = time.perf_counter() - started - watched
+    if watch:
+        watch(recipe.iterations, policy)
     return Trained(
         policy,
-        time.perf_counter() - started,
+        seconds,
         recipe.iterations * recipe.steps * len(observed),
         recipe.iterations * recipe.epochs * recipe.minibatches,
     )
+
+
+def _timed(tensor: Tensor, function: Callable[[], None]) -> float:
+    """Time (s) that a function takes, once the device of a tensor has done all before."""
+    _wait(tensor)
+    started = time.perf_counter()
+    function()
+    _wait(tensor)
+    return time.perf_counter() - started
 
 
 def _loss_on_device(policy: ActorCritic, whole: Samples, recipe: Recipe) -> LossFunction:
@@ -326,9 +383,10 @@ class HostEnv:
     """
 
     def __init__(self, envs: Any) -> None:
-        self._envs = envs
+        self._envs, self.batch = envs, envs.batch
         self.single_action_space = envs.single_action_space
-        self.num_envs = envs.num_envs
+        self.num_envs, self.max_episode_steps = envs.num_envs, envs.max_episode_steps
+        self.set_elapsed = envs.set_elapsed
         self._observed = torch.zeros(self.num_envs, envs.single_observation_space.shape[0])
         self._final = torch.zeros_like(self._observed)
         self._succeeded = torch.zeros(self.num_envs)

@@ -74,7 +74,6 @@ class Course:
             recipe_of(config),
             iterations=config.total_steps // (config.ppo.n_steps * fish),
             reward_scale=0.1,
-            log_std_end=-2.0,
         )
         names = config.disturbances
         shares = {name: fish * times // len(names) for name, times in Counter(names).items()}

@@ -5,11 +5,15 @@ Run by test_simulated.py in a process with ``NUMBA_ENABLE_CUDASIM=1``.
 
 import numpy as np
 import pytest
+import torch
 
 from fish_env.envs.options import env_options
+from fish_env.errors import ConfigError
 from fish_env.gpu import random
 from fish_env.gpu.batch import DeviceBatch
 from fish_env.gpu.starting import STREAM_START
+from robofish_agents.training.privileged import Sight
+from robofish_agents.training.tensor_shoal import TensorTruth
 from tests.gpu import checkers
 
 LAG = {"servo_lag": {"time_constant": 0.05}}
@@ -128,3 +132,26 @@ def drawn_by(device):
             rows = numbers[i : i + 4, lane]
             rows[:] = [random.unit(word) for word in words][: len(rows)]
     return numbers
+
+
+def test_a_critic_sees_the_same_fish_on_the_device():
+    options = env_options(task="track", randomization={"mass.buoyancy": {"sd": 0.001}})
+    batch = checkers.started(options, checkers.uniforms(options, 3))
+    batch.step(np.full((3, 5), 0.5))
+    device = DeviceBatch(options, 3, precision="float64", autoreset="disabled")
+    device.load(batch)
+    found = Sight([TensorTruth(device)], torch).see(torch.from_numpy(batch.obs))
+    assert np.allclose(found.numpy(), Sight([batch]).see(batch.obs), atol=1e-6)
+
+
+def test_fish_that_count_steps_as_taken_end_earlier():
+    device = DeviceBatch(env_options(), 3, precision="float64", max_episode_steps=4)
+    device.reset(seed=0)
+    device.set_elapsed([0, 2, 3])
+    ended = []
+    for _ in range(4):
+        device.step()
+        ended.append(device.truncated.copy_to_host().tolist())
+    assert np.array(ended).argmax(0).tolist() == [3, 1, 0]
+    with pytest.raises(ConfigError, match="elapsed steps: 3 whole numbers from 0 to 3"):
+        device.set_elapsed([0, 2, 4])

@@ -112,6 +112,7 @@ class TrainConfig:
         else:
             check(self.critic == Critic(), f"critic: engine {self.engine} has none of its own")
             check(self.teacher == Teaching(), f"teacher: engine {self.engine} has none")
+            check(self.network.log_std_end is None, f"network.log_std_end: not with {self.engine}")
         check(0 <= self.seed < 1_000_000, "seed: 0 to 999999")
         check(1 <= self.num_envs <= MOST_FISH, f"num_envs: 1 to {MOST_FISH}")
         check(min(self.total_steps, self.checkpoint_every) > 0, "steps must be positive")
@@ -179,6 +180,8 @@ class TrainConfig:
         if self.engine != "tensor":
             left_out += ["critic", "teacher"]
         tree = {key: value for key, value in asdict(self).items() if key not in left_out}
+        if self.network.log_std_end is None:
+            del tree["network"]["log_std_end"]  # for the same reason
         return dict(yaml.safe_load(yaml.safe_dump(_plain(tree))))
 
 

@@ -22,6 +22,11 @@ def check(holds: bool, message: str) -> None:
         raise ConfigError(message)
 
 
+def _check_falls(section: str, first: float, last: float | None) -> None:
+    """Refuses a limit of the deviation that would rise."""
+    check(last is None or last <= first, f"{section}.log_std_end: at most log_std_init")
+
+
 @dataclass(frozen=True)
 class History:
     """Past observations that the policy sees; :class:`robofish_agents.policies.HistorySpec`."""
@@ -38,16 +43,20 @@ class NetworkSettings:
         layers: widths of the hidden layers.
         activation: ``tanh`` or ``relu``.
         log_std_init: logarithm of the first standard deviation of actions (PPO).
+        log_std_end: an upper limit of that logarithm falls to it in a straight line (engine
+            ``tensor``); None: none.
         first_action: mean action before anything is learnt (PPO); zeros if empty.
     """
 
     layers: tuple[int, ...] = (64, 64)
     activation: str = "tanh"
     log_std_init: float = -0.5
+    log_std_end: float | None = None
     first_action: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         check(bool(self.layers) and min(self.layers) > 0, "network.layers: positive widths")
+        _check_falls("network", self.log_std_init, self.log_std_end)
         names = ", ".join(ACTIVATIONS)
         check(self.activation in ACTIVATIONS, f"network.activation: one of {names}")
         first = self.first_action
@@ -115,8 +124,7 @@ class Teaching:
         check(self.distil_steps == 0 or self.steps > 0, "teacher.distil_steps: needs steps")
         check(bool(self.layers) and min(self.layers) > 0, "teacher.layers: positive widths")
         check(self.distil_epochs > 0, "teacher.distil_epochs: positive")
-        end = self.log_std_init if self.log_std_end is None else self.log_std_end
-        check(end <= self.log_std_init, "teacher.log_std_end: at most log_std_init")
+        _check_falls("teacher", self.log_std_init, self.log_std_end)
 
 
 @dataclass(frozen=True)

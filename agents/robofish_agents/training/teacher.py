@@ -46,8 +46,11 @@ class TrueFish(Protocol):
 
     options: EnvOptions
     count: int
-    state: Any
     outputs: Any
+
+    @property
+    def state(self) -> Any:
+        """See the class."""
 
     @property
     def goal(self) -> Any:

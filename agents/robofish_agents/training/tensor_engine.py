@@ -67,6 +67,7 @@ def recipe_of(config: TrainConfig) -> Recipe:
         clip=ppo.clip_range,
         layers=network.layers,
         log_std=network.log_std_init,
+        log_std_end=network.log_std_end,
         critic_layers=config.critic.layers or None,
         activation=network.activation,
         entropy=ppo.ent_coef,
@@ -192,6 +193,7 @@ class TensorEngine:
         rate = _set_rate(self.optimiser, self.config.ppo.learning_rate, share)
         kl = self.config.ppo.target_kl
         moved = improve(self.learner, self.optimiser, samples, self.recipe, kl)
+        self.learner.limit_noise(self.recipe, share)
         return _row(self.learner, taken, samples) | {"approx_kl": moved, "learning_rate": rate}
 
     def _stagger(self) -> None:

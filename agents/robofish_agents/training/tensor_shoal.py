@@ -166,7 +166,7 @@ class TensorShoal:
         raw = torch.cat([part.reset(seed=0)[0] for part in self.parts])
         self._raw = raw
         self.observed = raw.new_zeros(self.num_envs, spec.width(len(OBSERVATION)))
-        self.seen = like.seen if like else Scale(self.observed)
+        self.seen: Scale = like.seen if like else Scale(self.observed)
         self._critic = None if like else CriticView(self.parts)
 
     def reset(self, *, seed: int) -> tuple[Tensor, dict[str, Tensor]]:
@@ -194,7 +194,7 @@ class TensorShoal:
         ``infos["final_judged"]`` is what the critic saw before the step: the value of a state at
         which an episode is cut off is taken from there, a control step earlier.
         """
-        steps = zip(self.parts, actions.split(self._sizes), strict=True)
+        steps = zip(self.parts, torch.split(actions, self._sizes), strict=True)
         raw, reward, terminated, truncated, infos = zip(
             *(part.step(rows) for part, rows in steps), strict=True
         )

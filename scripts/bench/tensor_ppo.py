@@ -16,7 +16,8 @@ import gymnasium as gym
 
 import fish_env  # noqa: F401  (registers the environment)
 from robofish_agents.training.actor_critic import HOLD, HOLD_FISH
-from robofish_agents.training.tensor_ppo import HostEnv, success_rate, train
+from robofish_agents.training.host_env import HostEnv
+from robofish_agents.training.tensor_ppo import success_rate, train
 from scripts.bench.harness import machine, versions
 from scripts.results import RESULTS, write_dated
 

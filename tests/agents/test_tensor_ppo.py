@@ -10,7 +10,8 @@ from torch.distributions import Normal
 import fish_env  # noqa: F401  (registers the environment)
 from robofish_agents.training import tensor_ppo
 from robofish_agents.training.actor_critic import HOLD, HOLD_FISH
-from robofish_agents.training.tensor_ppo import ActorCritic, HostEnv, Recipe, Rollout
+from robofish_agents.training.host_env import HostEnv
+from robofish_agents.training.tensor_ppo import ActorCritic, Recipe, Rollout
 
 
 class Aim:

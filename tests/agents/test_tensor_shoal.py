@@ -10,8 +10,9 @@ from robofish_agents.policies.files import PolicyFile
 from robofish_agents.policies.history import History, HistorySpec
 from robofish_agents.policies.pretrained import PretrainedPolicy
 from robofish_agents.training.actor_critic import ActorCritic, Recipe, network_of
+from robofish_agents.training.host_env import HostEnv
 from robofish_agents.training.privileged import Sight
-from robofish_agents.training.tensor_ppo import HostEnv, train
+from robofish_agents.training.tensor_ppo import train
 from robofish_agents.training.tensor_shoal import LIMIT, Scale, TensorHistory, TensorShoal
 
 SPEC = HistorySpec(frames=2, low_pass_s=(0.3, 3.0))

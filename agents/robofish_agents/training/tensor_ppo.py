@@ -1,8 +1,8 @@
 """PPO over tensors: rollouts and updates stay on the device of the environment.
 
 For :class:`fish_env.gpu.vector.RoboticFish3DDeviceEnv`, whose tensors are the memory of the GPU, so
-that nothing goes through the host. On the CPU :class:`HostEnv` gives the same interface, with which
-recipes can be tried without a GPU.
+that nothing goes through the host. On the CPU :class:`robofish_agents.training.host_env.HostEnv`
+gives the same interface, with which recipes can be tried without a GPU.
 
 Schulman et al., "Proximal Policy Optimization Algorithms", arXiv:1707.06347; advantages by
 "High-Dimensional Continuous Control Using Generalized Advantage Estimation", arXiv:1506.02438.
@@ -373,42 +373,3 @@ def _wait(tensor: Tensor) -> None:
     """Wait for the device of a tensor."""
     if tensor.is_cuda:
         torch.cuda.synchronize()
-
-
-class HostEnv:
-    """A vector environment on the CPU, with tensors in place of arrays.
-
-    Args:
-        envs: a ``RoboticFish3DVectorEnv`` with ``autoreset_mode="SameStep"``.
-    """
-
-    def __init__(self, envs: Any) -> None:
-        self._envs, self.batch = envs, envs.batch
-        self.single_action_space = envs.single_action_space
-        self.num_envs, self.max_episode_steps = envs.num_envs, envs.max_episode_steps
-        self.set_elapsed = envs.set_elapsed
-        self._observed = torch.zeros(self.num_envs, envs.single_observation_space.shape[0])
-        self._final = torch.zeros_like(self._observed)
-        self._succeeded = torch.zeros(self.num_envs)
-
-    def reset(self, *, seed: int | None = None) -> tuple[Tensor, dict[str, Any]]:
-        """As of a vector environment."""
-        observed, infos = self._envs.reset(seed=seed)
-        self._observed.copy_(torch.from_numpy(observed))
-        return self._observed, infos
-
-    def step(self, actions: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor, dict[str, Any]]:
-        """As of a vector environment; ``final_obs`` and ``final_info`` hold for ended episodes."""
-        observed, reward, terminated, truncated, infos = self._envs.step(actions.numpy())
-        self._observed.copy_(torch.from_numpy(observed))
-        for lane in (terminated | truncated).nonzero()[0]:
-            self._final[lane] = torch.from_numpy(infos["final_obs"][lane])
-            self._succeeded[lane] = infos["final_info"]["is_success"][lane]
-        left = {"final_obs": self._final, "final_info": {"is_success": self._succeeded}}
-        return (
-            self._observed,
-            torch.from_numpy(reward).float(),
-            torch.from_numpy(terminated),
-            torch.from_numpy(truncated),
-            left,
-        )

@@ -153,6 +153,20 @@ def test_steps_go_on_with_the_damping_that_was_needed():
     assert sum(z < problem.lowest for z in problem.tried) == 3
 
 
+class Bounded(Differing):
+    """Whole steps from far away lead nearly as far to the other side."""
+
+    def model(self, shared, own):
+        return super().model(np.arctan(shared), own)
+
+
+def test_a_whole_step_that_hardly_gains_does_not_end_the_steps():
+    problem = Bounded(truth=(0.0, 0.0, 0.0))
+    problem.y *= 0.01
+    _, vector, _, _, _ = descended(problem, iterations=1, start=1.38)
+    assert abs(vector[0]) < 0.5
+
+
 def test_no_number_is_negative_that_cannot_be():
     problem = Differing(positive=True)
     assert (problem.true[:, 1] < -0.5).any()

@@ -234,19 +234,25 @@ def _better(model: _Model, noise: Any, at: Joint, first: int) -> tuple[Joint | N
             nowhere, often to where the simulation diverges.
     """
     last = len(TRIALS) if model.exact else UNDAMPED
+    best, used = at, first
     for number in range(first, last):
         vector, own = model.step(*TRIALS[number])
-        if number > first and at.value - model.foreseen(vector, own) < ENOUGH:
-            break  # a decrease that would end the steps anyway
+        foreseen = at.value - model.foreseen(vector, own)
+        if number > first and foreseen < max(ENOUGH, at.value - best.value):
+            break  # a decrease that would end the steps anyway, or one that was reached
         if not at.problem.baseline.possible(vector[: model.free.count]):
             continue
         try:
             tried = _with_own_steps(model, noise, at, vector, own)
         except np.linalg.LinAlgError:
             continue
-        if tried.value < at.value:
-            return tried, number
-    return None, first
+        if tried.value < best.value:
+            best, used = tried, number
+        elif best is not at:
+            break
+        if best is not at and not (model.exact and at.value - best.value < FORESEEN * foreseen):
+            break
+    return (None if best is at else best), used
 
 
 def _with_own_steps(

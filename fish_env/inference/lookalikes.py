@@ -9,28 +9,29 @@ apart no better than by what they make up for, none is named.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
+from fish_env.inference.elimination import surely_acts
 from fish_env.inference.estimate.again import finished
 from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
 from fish_env.inference.estimate.fit import Fit
-from fish_env.inference.explanation import Explanation
+from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.hypotheses import (
     CauseId,
     EffectName,
-    EffectParameterId,
     listed,
     name_of,
-    of_effects,
 )
+from fish_env.inference.in_place import in_step, moved_to_runs, with_lookalike, without_cause
 from fish_env.inference.policy import POLICY
-from fish_env.inference.problem import Point
+from fish_env.inference.problem import Problem
 from fish_env.inference.projection import Signal
 from fish_env.inference.rivals import as_likely, rivals_of
 from fish_env.inference.screening import Screen
 from fish_env.inference.search import at_noise
-from fish_env.inference.starts import probed
 from fish_env.inference.substitution import swapped, what_may_lack, without
 
 Report = Callable[[str], None]
@@ -54,10 +55,14 @@ def rates(current: Explanation) -> list[Pair]:
     A clock that is slow by half a percent differs from a drive that is by half a percent of all
     forces, which coefficients make up for. One that is slow by its load differs by as little.
     """
-    problem = current.fit.problem
-    drifting = [EffectName(name) for name, e in problem.known.items() if e.drifts_in_phase]
-    names = tuple(dict.fromkeys((*problem.out_of_step, *drifting)))
+    names = _rates(current.fit.problem)
     return pairs_alike(current, names, names)
+
+
+def _rates(problem: Problem) -> tuple[EffectName, ...]:
+    """Effects that make a clock or a drive slow."""
+    drifting = [EffectName(name) for name, e in problem.known.items() if e.drifts_in_phase]
+    return tuple(dict.fromkeys((*problem.out_of_step, *drifting)))
 
 
 def pairs_alike(
@@ -94,64 +99,87 @@ def asked_again(
 def asked_of_rates(
     current: Explanation, shown: Screen, report: Report
 ) -> tuple[Explanation, tuple[Explanation, ...]]:
-    """As :func:`asked_again`, of what makes a clock or a drive slow alone."""
+    """As :func:`asked_again`, of what makes a clock or a drive slow alone.
+
+    None of that is a cause where the numbers of the runs explain as much.
+    """
     if current.fit.problem.is_coarse(current.fit.point.effects):
         return current, ()
+    current = _left_to_runs(current, report)
     return _asked(current, _shown(rates(current), shown), report)
+
+
+def _left_to_runs(current: Explanation, report: Report) -> Explanation:
+    """The explanation without rates in whose place the runs' own numbers explain as much.
+
+    Elimination takes few steps, and begins where the runs are out of step without the cause.
+    """
+    for cause in _rates(current.fit.problem):
+        own = current.fit
+        alone = len(current.causes) == 1 or cause not in current.causes
+        if alone or not moved_to_runs(own, cause) or surely_acts(own, cause):
+            continue
+        report(f"fitting without {name_of(cause)}")
+        enough = own.objective + POLICY.evidence_doubt + current.narrowed_by((cause,))
+        runs = own.problem.with_refinement()
+        fitted = _fitted(runs, own, cause, without_cause(own, cause), enough)
+        causes = tuple(c for c in current.causes if c != cause)
+        if fitted and Explanation(causes, fitted).score < current.score + POLICY.evidence_doubt:
+            current = Explanation(causes, fitted)
+    return current
 
 
 def _asked(
     current: Explanation, pairs: Sequence[tuple[CauseId, Signal]], report: Report
 ) -> tuple[Explanation, tuple[Explanation, ...]]:
-    closest = _closest(current, pairs, report)
-    if closest is None:
+    own, found = current.fit, list[Explanation]()
+    runs = own.problem.with_refinement()
+    for cause, other, begin in _closest(current, pairs, report)[: POLICY.most_lookalikes]:
+        causes = tuple(other if c == cause else c for c in current.causes)
+        report(f"fitting {listed(causes, ' and ')}")
+        whole = _fitted(runs, own, cause, begin, own.objective + POLICY.out_of_reach)
+        if whole is not None:
+            found.append(Explanation(causes, whole))
+    if not found:
         return current, ()
-    report(f"fitting {listed(closest.causes, ' and ')}")
-    own = current.fit
-    whole = at_noise(own.problem.with_refinement(), closest.fit, own.noise, POLICY.swap_steps)
-    if whole is None:
-        return current, ()
-    other = Explanation(closest.causes, whole)
     if own.problem.is_coarse(own.point.effects):
-        return Explanation(other.causes, finished(whole)), ()
-    best, last = sorted((current, other), key=lambda e: e.score)
-    if best is other:
-        best = Explanation(best.causes, finished(whole))
-    return best, rivals_of(best, [last])
+        best = min(found, key=lambda e: e.score)
+        return Explanation(best.causes, finished(best.fit)), ()
+    best, *others = sorted((current, *found), key=lambda e: e.score)
+    if best is not current:
+        best = Explanation(best.causes, finished(best.fit))
+    return best, rivals_of(best, others)
 
 
 def _closest(
     current: Explanation, pairs: Sequence[tuple[CauseId, Signal]], report: Report
-) -> Explanation | None:
-    """The best explanation of a few runs with a look-alike; None where none fits them as well."""
+) -> list[tuple[CauseId, EffectName, CoarseFit]]:
+    """Causes, each with a look-alike that fits a few runs as well and its fit, best first."""
     own = current.fit
     few = own.problem.with_refinement().subset(POLICY.few_runs)
     usual = at_noise(few, own, own.noise, POLICY.swap_steps) if pairs else None
-    best, enough = None, usual.objective + POLICY.evidence_doubt if usual else np.inf
+    least, found = usual.objective if usual else np.inf, []
     for cause, signal in pairs:
         report(f"trying {signal.cause.effect} instead of {name_of(cause)}")
-        found = at_noise(few, _in_place(own, cause, signal), own.noise, POLICY.swap_steps, enough)
-        if found is not None and found.objective < enough:
-            causes = tuple(signal.cause.id if c == cause else c for c in current.causes)
-            best, enough = Explanation(causes, found), found.objective
-    return best
+        begin = with_lookalike(own, cause, signal)
+        tried = _fitted(few, own, cause, begin, least + POLICY.evidence_doubt)
+        if tried is not None:
+            begin = replace(begin, point=tried.point, objective=tried.objective)
+            found.append((cause, signal.cause.effect, begin))
+            least = min(least, tried.objective)
+    close = [one for one in found if one[2].objective < least + POLICY.evidence_doubt]
+    return sorted(close, key=lambda one: one[2].objective)
 
 
-def _in_place(own: Fit, cause: CauseId, signal: Signal) -> CoarseFit:
-    """Where a fit begins that has a look-alike in the place of a cause.
+def _fitted(runs: Problem, own: Fit, cause: CauseId, begin: CoarseFit, enough: float) -> Fit | None:
+    """A fit without a cause under the same noise; None where the simulation diverges.
 
-    As it was measured; else where the two have parameters of the same name, at the values of the
-    cause; else at its mildest.
+    It is given up where no step will lead below an objective.
     """
-    name, values, measured = signal.cause.effect, own.point.effects, own.problem.drive.in_step
-    (first, *_) = probed(own.problem, signal)
-    begin = {
-        id: value if id in measured else values.get(EffectParameterId(str(cause), id.name), value)
-        for id, value in first.items()
-    }
-    kept = of_effects(values, {*own.effects} - {cause})
-    effects = tuple(name if e == cause else e for e in own.effects)
-    return CoarseFit(effects, own.released, Point(own.point.z, {**kept, **begin}), np.inf)
+    kept = reached(partial(in_step, runs, own, cause, begin))
+    if kept is None:
+        return None
+    return at_noise(kept, begin, own.noise, POLICY.swap_steps, enough)
 
 
 def undecided(current: Explanation, shown: Screen, report: Report) -> frozenset[CauseId]:

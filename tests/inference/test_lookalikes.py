@@ -67,6 +67,22 @@ def test_lags_that_fit_alike_are_rivals():
     assert {best.causes, *(e.causes for e in alike)} == {(LAG,), (LIMIT,)}
 
 
+def test_all_that_fit_alike_are_rivals():
+    names = (LAG, LIMIT, "third")
+    rng = np.random.default_rng(3)
+    x, noise = rng.standard_normal((2, RUNS, SAMPLES))
+    like = {name: x + 1e-3 * rng.standard_normal(x.shape) for name in names}
+
+    def residuals(z, effects):
+        return noise + 20.0 * (0.5 * x - sum(effects[size_of(n)] * like[n] for n in names))
+
+    known = [effect(n, confusable_with=tuple({*names} - {n})) for n in names]
+    stated = Stated(residuals, known)
+    stated.hidden_by_drive, stated.drive = names, Drive(uneven=True)
+    best, alike = asked_again(*explained(stated, LAG), [].append)
+    assert {best.causes, *(e.causes for e in alike)} == {(name,) for name in names}
+
+
 class LongSteps(Stated):
     """A problem in steps of a search, in which a fit of the published ones may diverge."""
 

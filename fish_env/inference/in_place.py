@@ -1,0 +1,114 @@
+"""Where a fit begins that has a look-alike, or nothing, in the place of one of its causes.
+
+What all runs have in common of a beat may be in an effect, or in the numbers of every run. A swap
+that changes the one and keeps the other begins out of step, from where no whole step leads back.
+So the numbers take on what a cause leaves behind, and give up what a look-alike brings.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fish_env.arrays import FloatArray
+from fish_env.inference.estimate.coarse_fit import CoarseFit
+from fish_env.inference.estimate.fit import Fit
+from fish_env.inference.estimate.free import spread_of
+from fish_env.inference.hypotheses import (
+    CauseId,
+    EffectName,
+    EffectParameterId,
+    effects_of,
+    of_effects,
+)
+from fish_env.inference.problem import Point, Problem
+from fish_env.inference.projection import Signal
+from fish_env.inference.starts import probed
+
+
+def with_lookalike(own: Fit, cause: CauseId, signal: Signal) -> CoarseFit:
+    """Where a fit begins that has a look-alike in the place of a cause.
+
+    As it was measured; else where the two have parameters of the same name, at the values of the
+    cause; else at its mildest.
+
+    Args:
+        own: fit with the cause.
+        cause: an effect.
+        signal: of the look-alike.
+    """
+    name, values, measured = signal.cause.effect, own.point.effects, own.problem.drive.in_step
+    (first, *_) = probed(own.problem, signal)
+    begin = {
+        id: value if id in measured else values.get(EffectParameterId(str(cause), id.name), value)
+        for id, value in first.items()
+    }
+    kept = of_effects(values, {*own.effects} - {cause})
+    effects = tuple(name if e == cause else e for e in own.effects)
+    return CoarseFit(effects, own.released, Point(own.point.z, {**kept, **begin}), np.inf)
+
+
+def without_cause(own: Fit, cause: CauseId) -> CoarseFit:
+    """Where a fit begins without a cause.
+
+    Args:
+        own: fit with the cause.
+        cause: an effect.
+    """
+    effects = tuple(e for e in own.effects if e != cause)
+    point = Point(own.point.z, of_effects(own.point.effects, effects))
+    return CoarseFit(effects, own.released, point, np.inf)
+
+
+def in_step(runs: Problem, own: Fit, cause: CauseId, at: CoarseFit) -> Problem:
+    """Runs with numbers that keep them in step without a cause.
+
+    Args:
+        runs: some of those of a fit, with its numbers.
+        own: fit with the cause.
+        cause: an effect.
+        at: where a fit begins without it, perhaps with a look-alike.
+
+    Raises:
+        LinAlgError: the simulation diverges there.
+    """
+    gained = _left_to_runs(own, cause, at)
+    if not gained.any():
+        return runs
+    return runs.with_variation(runs.variation + gained, at.point, own.noise)
+
+
+def moved_to_runs(own: Fit, cause: CauseId) -> bool:
+    """Whether numbers of the runs may take on what they have of a cause in common.
+
+    Args:
+        own: fit with the cause.
+        cause: an effect.
+    """
+    return cause in own.effects and bool(_of_step(own))
+
+
+def _left_to_runs(own: Fit, cause: CauseId, at: CoarseFit) -> FloatArray:
+    """What the number of each run (K,) gains: what a cause leaves, less what a look-alike brings.
+
+    Parameters that have the same name do the same to a run, of effects that look alike.
+    """
+    new = of_effects(at.point.effects, {*at.effects} - {*own.effects})
+    alike = {cause, *own.problem.known[EffectName(str(cause))].confusable_with, *effects_of(new)}
+    gained = np.zeros(len(own.problem.variations))
+    for number, beside in _of_step(own).items():
+        if beside.effect in alike:
+            neutral = own.problem.neutral([beside.effect])[beside]
+            before = own.point.effects.get(EffectParameterId(str(cause), beside.name), neutral)
+            after = [value for id, value in new.items() if id.name == beside.name]
+            gained[number] = before - (after[0] if after else neutral)
+    return gained
+
+
+def _of_step(own: Fit) -> dict[int, EffectParameterId]:
+    """Numbers that put single runs out of step, each with the parameter that does so in all."""
+    spread = spread_of(own.problem, own.noise).tolist()
+    return {
+        i: v.beside
+        for i, (v, sd) in enumerate(zip(own.problem.variations, spread, strict=True))
+        if sd > 0.0 and v.beside is not None and v.beside.effect in own.problem.out_of_step
+    }

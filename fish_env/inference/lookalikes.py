@@ -91,7 +91,7 @@ def asked_again(
         shown: causes that are not among them.
         report: told what is being done.
     """
-    current, rivals = _asked(current, _shown(late(current), shown), report)
+    current, rivals = _asked(current, _shown(late(current), shown), POLICY.swap_steps, report)
     best, others = asked_of_rates(current, shown, report)
     return best, (*rivals, *others) if best is current else others
 
@@ -106,7 +106,7 @@ def asked_of_rates(
     if current.fit.problem.is_coarse(current.fit.point.effects):
         return current, ()
     current = _left_to_runs(current, report)
-    return _asked(current, _shown(rates(current), shown), report)
+    return _asked(current, _shown(rates(current), shown), POLICY.rate_steps, report)
 
 
 def _left_to_runs(current: Explanation, report: Report) -> Explanation:
@@ -122,7 +122,7 @@ def _left_to_runs(current: Explanation, report: Report) -> Explanation:
         report(f"fitting without {name_of(cause)}")
         enough = own.objective + POLICY.evidence_doubt + current.narrowed_by((cause,))
         runs = own.problem.with_refinement()
-        fitted = _fitted(runs, own, cause, without_cause(own, cause), enough)
+        fitted = _fitted(runs, own, cause, without_cause(own, cause), POLICY.rate_steps, enough)
         causes = tuple(c for c in current.causes if c != cause)
         if fitted and Explanation(causes, fitted).score < current.score + POLICY.evidence_doubt:
             current = Explanation(causes, fitted)
@@ -130,19 +130,21 @@ def _left_to_runs(current: Explanation, report: Report) -> Explanation:
 
 
 def _asked(
-    current: Explanation, pairs: Sequence[tuple[CauseId, Signal]], report: Report
+    current: Explanation, pairs: Sequence[tuple[CauseId, Signal]], steps: int, report: Report
 ) -> tuple[Explanation, tuple[Explanation, ...]]:
     own, found = current.fit, list[Explanation]()
     runs = own.problem.with_refinement()
-    for cause, other, begin in _closest(current, pairs, report)[: POLICY.most_lookalikes]:
+    coarse = own.problem.is_coarse(own.point.effects)
+    enough = np.inf if coarse else own.objective + POLICY.evidence_doubt + POLICY.linear_doubt
+    for cause, other, begin in _closest(current, pairs, steps, report)[: POLICY.most_lookalikes]:
         causes = tuple(other if c == cause else c for c in current.causes)
         report(f"fitting {listed(causes, ' and ')}")
-        whole = _fitted(runs, own, cause, begin, own.objective + POLICY.out_of_reach)
-        if whole is not None:
+        whole = _fitted(runs, own, cause, begin, steps, enough)
+        if whole is not None and whole.objective < enough:
             found.append(Explanation(causes, whole))
     if not found:
         return current, ()
-    if own.problem.is_coarse(own.point.effects):
+    if coarse:
         best = min(found, key=lambda e: e.score)
         return Explanation(best.causes, finished(best.fit)), ()
     best, *others = sorted((current, *found), key=lambda e: e.score)
@@ -152,17 +154,17 @@ def _asked(
 
 
 def _closest(
-    current: Explanation, pairs: Sequence[tuple[CauseId, Signal]], report: Report
+    current: Explanation, pairs: Sequence[tuple[CauseId, Signal]], steps: int, report: Report
 ) -> list[tuple[CauseId, EffectName, CoarseFit]]:
     """Causes, each with a look-alike that fits a few runs as well and its fit, best first."""
     own = current.fit
     few = own.problem.with_refinement().subset(POLICY.few_runs)
-    usual = at_noise(few, own, own.noise, POLICY.swap_steps) if pairs else None
+    usual = at_noise(few, own, own.noise, steps) if pairs else None
     least, found = usual.objective if usual else np.inf, []
     for cause, signal in pairs:
         report(f"trying {signal.cause.effect} instead of {name_of(cause)}")
         begin = with_lookalike(own, cause, signal)
-        tried = _fitted(few, own, cause, begin, least + POLICY.evidence_doubt)
+        tried = _fitted(few, own, cause, begin, steps, least + POLICY.evidence_doubt)
         if tried is not None:
             begin = replace(begin, point=tried.point, objective=tried.objective)
             found.append((cause, signal.cause.effect, begin))
@@ -171,7 +173,9 @@ def _closest(
     return sorted(close, key=lambda one: one[2].objective)
 
 
-def _fitted(runs: Problem, own: Fit, cause: CauseId, begin: CoarseFit, enough: float) -> Fit | None:
+def _fitted(
+    runs: Problem, own: Fit, cause: CauseId, begin: CoarseFit, steps: int, enough: float
+) -> Fit | None:
     """A fit without a cause under the same noise; None where the simulation diverges.
 
     It is given up where no step will lead below an objective.
@@ -179,7 +183,7 @@ def _fitted(runs: Problem, own: Fit, cause: CauseId, begin: CoarseFit, enough: f
     kept = reached(partial(in_step, runs, own, cause, begin))
     if kept is None:
         return None
-    return at_noise(kept, begin, own.noise, POLICY.swap_steps, enough)
+    return at_noise(kept, begin, own.noise, steps, enough)
 
 
 def undecided(current: Explanation, shown: Screen, report: Report) -> frozenset[CauseId]:

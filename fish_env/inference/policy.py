@@ -57,7 +57,8 @@ class DecisionPolicy(Numbers):
         most_leads: best of these effects and the first pick that are fitted with all other picks.
         trial_steps: steps of a trial of an effect that a disturbance at its limit hides.
         most_close_trials: largest number of effects from trials that are fitted to all runs.
-        swap_steps: most steps of a fit with a look-alike in the place of a cause, or with nothing.
+        swap_steps: steps of a fit with another lag, from one with the lag in whose place it is.
+        rate_steps: most steps of a fit with another clock or beat, or none, in the place of one.
         least_independent_share: share of a signal that those picked before it must leave.
         least_learned_share: share of the prior variance of a coefficient that data must take away
             for a test of its prior.
@@ -152,7 +153,8 @@ class DecisionPolicy(Numbers):
     most_leads: int = number(2, 1, 40, EFFORT)
     trial_steps: int = number(4, 1, 40, f"a lag that is right is found in three; {EFFORT}")
     most_close_trials: int = number(2, 1, 20, EFFORT)
-    swap_steps: int = number(10, 1, 40, EFFORT)
+    swap_steps: int = number(4, 1, 40, EFFORT)
+    rate_steps: int = number(10, 1, 40, f"a fit without a wrong rate settles in nine; {EFFORT}")
     least_independent_share: float = number(0.05, 0.0, 0.5, BY_HAND)
     least_learned_share: float = number(0.05, 0.0, 0.5, BY_HAND)
     smallest_signal: float = number(1e-4, 0.0, 1.0, BY_HAND)

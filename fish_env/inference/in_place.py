@@ -7,6 +7,8 @@ So the numbers take on what a cause leaves behind, and give up what a look-alike
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from fish_env.arrays import FloatArray
@@ -36,27 +38,41 @@ def with_lookalike(own: Fit, cause: CauseId, signal: Signal) -> CoarseFit:
         cause: an effect.
         signal: of the look-alike.
     """
-    name, values, measured = signal.cause.effect, own.point.effects, own.problem.drive.in_step
+    values, measured = own.point.effects, own.problem.drive.in_step
+    effects, kept = replaced(own, cause, signal.cause.effect)
     (first, *_) = probed(own.problem, signal)
     begin = {
         id: value if id in measured else values.get(EffectParameterId(str(cause), id.name), value)
         for id, value in first.items()
     }
-    kept = of_effects(values, {*own.effects} - {cause})
-    effects = tuple(name if e == cause else e for e in own.effects)
     return CoarseFit(effects, own.released, Point(own.point.z, {**kept, **begin}), np.inf)
 
 
-def without_cause(own: Fit, cause: CauseId) -> CoarseFit:
-    """Where a fit begins without a cause.
+def replaced(
+    own: Fit, cause: CauseId, name: EffectName
+) -> tuple[tuple[str, ...], dict[EffectParameterId, float]]:
+    """Effects of a fit with another one in the place of a cause, and the values that it keeps.
 
     Args:
         own: fit with the cause.
         cause: an effect.
+        name: of the other.
     """
-    effects = tuple(e for e in own.effects if e != cause)
+    effects = tuple(name if e == cause else e for e in own.effects)
+    return effects, of_effects(own.point.effects, {*own.effects} - {cause})
+
+
+def without_causes(own: Fit, dropped: Collection[CauseId]) -> CoarseFit:
+    """Where a fit begins without some of its causes.
+
+    Args:
+        own: fit with the causes.
+        dropped: the causes.
+    """
+    effects = tuple(e for e in own.effects if e not in dropped)
+    released = tuple(c for c in own.released if c not in dropped)
     point = Point(own.point.z, of_effects(own.point.effects, effects))
-    return CoarseFit(effects, own.released, point, np.inf)
+    return CoarseFit(effects, released, point, np.inf)
 
 
 def in_step(runs: Problem, own: Fit, cause: CauseId, at: CoarseFit) -> Problem:
@@ -71,7 +87,7 @@ def in_step(runs: Problem, own: Fit, cause: CauseId, at: CoarseFit) -> Problem:
     Raises:
         LinAlgError: the simulation diverges there.
     """
-    gained = _left_to_runs(own, cause, at)
+    gained = _gained_by_runs(own, cause, at)
     if not gained.any():
         return runs
     return runs.with_variation(runs.variation + gained, at.point, own.noise)
@@ -87,7 +103,7 @@ def moved_to_runs(own: Fit, cause: CauseId) -> bool:
     return cause in own.effects and bool(_of_step(own))
 
 
-def _left_to_runs(own: Fit, cause: CauseId, at: CoarseFit) -> FloatArray:
+def _gained_by_runs(own: Fit, cause: CauseId, at: CoarseFit) -> FloatArray:
     """What the number of each run (K,) gains: what a cause leaves, less what a look-alike brings.
 
     Parameters that have the same name do the same to a run, of effects that look alike.

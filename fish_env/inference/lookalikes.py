@@ -25,7 +25,7 @@ from fish_env.inference.hypotheses import (
     listed,
     name_of,
 )
-from fish_env.inference.in_place import in_step, moved_to_runs, with_lookalike, without_cause
+from fish_env.inference.in_place import in_step, moved_to_runs, with_lookalike, without_causes
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Problem
 from fish_env.inference.projection import Signal
@@ -105,24 +105,25 @@ def asked_of_rates(
     """
     if current.fit.problem.is_coarse(current.fit.point.effects):
         return current, ()
-    current = _left_to_runs(current, report)
+    current = _without_what_runs_explain(current, report)
     return _asked(current, _shown(rates(current), shown), POLICY.rate_steps, report)
 
 
-def _left_to_runs(current: Explanation, report: Report) -> Explanation:
+def _without_what_runs_explain(current: Explanation, report: Report) -> Explanation:
     """The explanation without rates in whose place the runs' own numbers explain as much.
 
     Elimination takes few steps, and begins where the runs are out of step without the cause.
     """
-    for cause in _rates(current.fit.problem):
+    for cause in [name for name in _rates(current.fit.problem) if name in current.causes]:
         own = current.fit
-        alone = len(current.causes) == 1 or cause not in current.causes
-        if alone or not moved_to_runs(own, cause) or surely_acts(own, cause):
+        only = len(current.causes) == 1
+        if only or not moved_to_runs(own, cause) or surely_acts(own, cause):
             continue
         report(f"fitting without {name_of(cause)}")
         enough = own.objective + POLICY.evidence_doubt + current.narrowed_by((cause,))
         runs = own.problem.with_refinement()
-        fitted = _fitted(runs, own, cause, without_cause(own, cause), POLICY.rate_steps, enough)
+        begin = without_causes(own, (cause,))
+        fitted = _fitted(runs, own, cause, begin, POLICY.rate_steps, enough)
         causes = tuple(c for c in current.causes if c != cause)
         if fitted and Explanation(causes, fitted).score < current.score + POLICY.evidence_doubt:
             current = Explanation(causes, fitted)

@@ -20,6 +20,7 @@ from fish_env.inference.hypotheses import (
     name_of,
     of_effects,
 )
+from fish_env.inference.in_place import replaced, without_causes
 from fish_env.inference.parallel import side_by_side
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
@@ -94,8 +95,7 @@ def swapped(
     It is given up where it will not get below ``enough``. One that ends switched off had begun too
     far away, and is tried from each size in turn.
     """
-    kept = of_effects(own.point.effects, {*own.effects} - {name})
-    effects = tuple(signal.cause.effect if e == name else e for e in own.effects)
+    effects, kept = replaced(own, name, signal.cause.effect)
     sizes = probed(own.problem, signal, every=True)
     begin = [Point(z, {**kept, **values}) for z in baselines(own) for values in sizes]
     trying = partial(fitter.coarse_fit, effects, own.released, give_up_above=enough)
@@ -176,13 +176,13 @@ def without(
         least: growth of the score from which the fit is of no use, and may stop early.
     """
     own = current.fit
-    effects, released, begin = _dropped(own, dropped)
+    begin = without_causes(own, dropped)
     # The log determinant of all estimates changes too as they move without a cause.
     enough = own.objective + least + current.narrowed_by(dropped) + POLICY.linear_doubt
     smaller = reached(
         lambda: fit(
-            own.problem, effects, begin, own.noise, released, refit_noise=False, iterations=4,
-            give_up_above=enough,
+            own.problem, begin.effects, begin.point, own.noise, begin.released,
+            refit_noise=False, iterations=4, give_up_above=enough,
         )
     )  # fmt: skip
     if smaller is None:
@@ -200,14 +200,6 @@ def coarse_without(
         cause: the cause.
         give_up_above: stop early where the objective will not get below this.
     """
-    effects, released, begin = _dropped(fitter.fit, (cause,))
-    return reached(partial(fitter.coarse_fit, effects, released, [begin], give_up_above))
-
-
-def _dropped(
-    own: Fit, dropped: Collection[CauseId]
-) -> tuple[tuple[str, ...], tuple[Coefficient, ...], Point]:
-    """Effects, released coefficients and start of a fit without some of its causes."""
-    effects = tuple(e for e in own.effects if e not in dropped)
-    released = tuple(c for c in own.released if c not in dropped)
-    return effects, released, Point(own.point.z, of_effects(own.point.effects, effects))
+    begin = without_causes(fitter.fit, (cause,))
+    trying = partial(fitter.coarse_fit, begin.effects, begin.released, [begin.point])
+    return reached(partial(trying, give_up_above))

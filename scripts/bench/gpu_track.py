@@ -21,14 +21,14 @@ from typing import Any
 import torch
 
 from fish_env.envs.registration import ENV_ID
+from fish_env.files import write_bytes
 from fish_env.gpu.vector import RoboticFish3DDeviceEnv
-from robofish_agents.evaluation.suites import TRUST
 from robofish_agents.policies.files import PolicyFile, write_policy
 from robofish_agents.training.actor_critic import ActorCritic, network_of
 from robofish_agents.training.config import TrainConfig, load_train_config
 from robofish_agents.training.tensor_engine import recipe_of
-from robofish_agents.training.tensor_ppo import success_rate, train
-from robofish_agents.training.tensor_shoal import LIMIT, TensorShoal
+from robofish_agents.training.tensor_ppo import LIMIT, success_rate, train
+from robofish_agents.training.tensor_shoal import TensorShoal
 
 FISH = 16384
 """On a GPU; configurations have as many as a CPU can swim."""
@@ -50,17 +50,16 @@ def arguments(argv: list[str] | None = None) -> argparse.Namespace:
     return parser.parse_args(argv)
 
 
-def parts_of(config: TrainConfig, training: bool, counts: Mapping[str, int]) -> list[Any]:
+def fish_of(config: TrainConfig, training: bool, counts: Mapping[str, int]) -> dict[str, Any]:
     """Fish of each condition, so many of each."""
-    options = {name: config.options(name, training) for name in counts}
-    return [
-        RoboticFish3DDeviceEnv(count, **{k: v for k, v in options[name].items() if k != TRUST})
+    return {
+        name: RoboticFish3DDeviceEnv(count, **config.options(name, training))
         for name, count in counts.items()
-    ]
+    }
 
 
-class Course:
-    """Trainings one after another on the same fish, judged on their way.
+class Trainings:
+    """One after another on the same fish, judged on their way.
 
     Args:
         config: what to train.
@@ -77,8 +76,8 @@ class Course:
         )
         names = config.disturbances
         shares = {name: fish * times // len(names) for name, times in Counter(names).items()}
-        self.parts = parts_of(config, True, shares)
-        self.judges = parts_of(config, False, dict.fromkeys(shares, JUDGED))
+        self.parts = list(fish_of(config, True, shares).values())
+        self.judges = fish_of(config, False, dict.fromkeys(shares, JUDGED))
         self.spec = config.history_spec(self.parts[0].batch.options.config.control_period)
 
     def warm_up(self, seconds: float | None) -> None:
@@ -118,10 +117,9 @@ class Course:
 
     def judged(self, shoal: TensorShoal, policy: ActorCritic) -> dict[str, float]:
         """Success in each condition, on fish of no training."""
-        names = dict.fromkeys(self.config.disturbances)
         return {
             name: success_rate(TensorShoal([part], self.spec, shoal), policy, JUDGE_SEED)
-            for name, part in zip(names, self.judges, strict=True)
+            for name, part in self.judges.items()
         }
 
     def write(
@@ -142,13 +140,13 @@ def main(argv: list[str] | None = None) -> None:
     torch.set_float32_matmul_precision("high")
     config = load_train_config(options.config)
     options.folder.mkdir(parents=True, exist_ok=True)
-    course = Course(config, options.fish, options.looks)
+    trainings = Trainings(config, options.fish, options.looks)
     started = time.perf_counter()
-    course.warm_up(options.seconds)
+    trainings.warm_up(options.seconds)
     found = {"compiled_s": time.perf_counter() - started, "trainings": []}
     for seed in options.seeds:
-        found["trainings"].append(course.run(seed, options.folder))
-        (options.folder / "curve.json").write_text(json.dumps(found, indent=1), encoding="utf-8")
+        found["trainings"].append(trainings.run(seed, options.folder))
+        write_bytes(options.folder / "curve.json", json.dumps(found, indent=1).encode())
 
 
 if __name__ == "__main__":

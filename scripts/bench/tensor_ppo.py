@@ -12,9 +12,6 @@ import argparse
 from dataclasses import asdict
 from typing import Any
 
-import gymnasium as gym
-
-import fish_env  # noqa: F401  (registers the environment)
 from robofish_agents.training.actor_critic import HOLD, HOLD_FISH
 from robofish_agents.training.host_env import HostEnv
 from robofish_agents.training.tensor_ppo import success_rate, train
@@ -26,24 +23,13 @@ JUDGED = 512
 """Episodes that each policy is judged on, of fish that it did not train with."""
 
 
-def fish(count: int) -> HostEnv:
-    """So many fish on the CPU, as tensors."""
-    return HostEnv(
-        gym.make_vec(
-            "RoboticFish3D-v0",
-            num_envs=count,
-            vectorization_mode="vector_entry_point",
-            autoreset_mode="SameStep",
-        )
-    )
-
-
 def trained(seed: int) -> dict[str, Any]:
     """One training, and how its policy does."""
-    done = train(fish(HOLD_FISH), HOLD, seed)
+    judges = HostEnv.of_fish(JUDGED)
+    done = train(HostEnv.of_fish(HOLD_FISH), HOLD, seed)
     return {
         "seed": seed,
-        "success_rate": success_rate(fish(JUDGED), done.policy, 1000 + seed),
+        "success_rate": success_rate(judges, done.policy, 1000 + seed),
         "control_steps": done.steps,
         "updates": done.updates,
         "seconds": done.seconds,

@@ -187,6 +187,6 @@ def test_an_environment_of_the_host_gives_the_same_numbers_as_tensors():
 @pytest.mark.long
 def test_the_recipe_learns_to_hold():
     """A minute or two."""
-    fish = HostEnv(vector(HOLD_FISH))
+    fish = HostEnv.of_fish(HOLD_FISH)
     trained = tensor_ppo.train(fish, HOLD, seed=0)
-    assert tensor_ppo.success_rate(HostEnv(vector(256)), trained.policy, seed=1000) >= 0.95
+    assert tensor_ppo.success_rate(HostEnv.of_fish(256), trained.policy, seed=1000) >= 0.95

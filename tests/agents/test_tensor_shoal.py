@@ -1,19 +1,17 @@
 """Fish of several conditions as tensors: what policy and critic see is what NumPy makes of it."""
 
-import gymnasium as gym
 import numpy as np
 import pytest
 import torch
 
-import fish_env  # noqa: F401  (registers the environment)
 from robofish_agents.policies.files import PolicyFile
 from robofish_agents.policies.history import History, HistorySpec
 from robofish_agents.policies.pretrained import PretrainedPolicy
 from robofish_agents.training.actor_critic import ActorCritic, Recipe, network_of
 from robofish_agents.training.host_env import HostEnv
 from robofish_agents.training.privileged import Sight
-from robofish_agents.training.tensor_ppo import train
-from robofish_agents.training.tensor_shoal import LIMIT, Scale, TensorHistory, TensorShoal
+from robofish_agents.training.tensor_ppo import LIMIT, train
+from robofish_agents.training.tensor_shoal import Scale, TensorHistory, TensorShoal
 
 SPEC = HistorySpec(frames=2, low_pass_s=(0.3, 3.0))
 NOISY = {
@@ -24,15 +22,7 @@ NOISY = {
 
 
 def fish(count, longest=400, **options):
-    made = gym.make_vec(
-        "RoboticFish3D-v0",
-        num_envs=count,
-        max_episode_steps=longest,
-        vectorization_mode="vector_entry_point",
-        autoreset_mode="SameStep",
-        **options,
-    )
-    return HostEnv(made)
+    return HostEnv.of_fish(count, max_episode_steps=longest, **options)
 
 
 @pytest.mark.parametrize("frames", [1, 3])

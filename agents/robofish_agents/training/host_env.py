@@ -7,6 +7,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from fish_env.envs.vector import RoboticFish3DVectorEnv
+
 
 class HostEnv:
     """A vector environment on the CPU, with tensors in place of arrays.
@@ -23,6 +25,16 @@ class HostEnv:
         self._observed = torch.zeros(self.num_envs, envs.single_observation_space.shape[0])
         self._final = torch.zeros_like(self._observed)
         self._succeeded = torch.zeros(self.num_envs)
+
+    @classmethod
+    def of_fish(cls, count: int, **options: Any) -> HostEnv:
+        """So many fish.
+
+        Args:
+            count: number of fish.
+            **options: as for ``RoboticFish3DVectorEnv``.
+        """
+        return cls(RoboticFish3DVectorEnv(count, autoreset_mode="SameStep", **options))
 
     def reset(self, *, seed: int | None = None) -> tuple[Tensor, dict[str, Any]]:
         """As of a vector environment."""

@@ -37,11 +37,7 @@ class TrueFish(Protocol):
     Attributes:
         options: what the environment is.
         count: N.
-        state: (states, N).
-        goal: (len(GOAL), N).
-        time: (N,) since the start of the episode (s).
         outputs: (len(OUTPUTS), N).
-        drawn: path -> (N,) randomised parameters.
     """
 
     options: EnvOptions
@@ -50,19 +46,19 @@ class TrueFish(Protocol):
 
     @property
     def state(self) -> Any:
-        """See the class."""
+        """States (states, N)."""
 
     @property
     def goal(self) -> Any:
-        """See the class."""
+        """Goals (len(GOAL), N)."""
 
     @property
     def time(self) -> Any:
-        """See the class."""
+        """Time (N,) since the start of the episode (s)."""
 
     @property
     def drawn(self) -> Mapping[str, Any]:
-        """See the class."""
+        """Path -> (N,) randomised parameters."""
         ...
 
 

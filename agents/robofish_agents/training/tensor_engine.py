@@ -42,6 +42,7 @@ from robofish_agents.training.privileged import Sight
 from robofish_agents.training.settings import LearningRate
 from robofish_agents.training.stack import Stack
 from robofish_agents.training.tensor_ppo import (
+    LIMIT,
     Samples,
     Taken,
     follow,
@@ -49,9 +50,6 @@ from robofish_agents.training.tensor_ppo import (
     improve,
     staggered,
 )
-
-LIMIT = 10.0
-"""Normalised inputs of the critic are clipped to this."""
 
 
 def recipe_of(config: TrainConfig) -> Recipe:

@@ -25,6 +25,8 @@ from robofish_agents.training.replayed import Replayed, differentiable
 
 GROUPS = 16
 """Fish of a batch begin their later episodes in so many groups, one after the other."""
+LIMIT = 10.0
+"""Normalised observations are clipped to this."""
 
 
 class Rollout(NamedTuple):

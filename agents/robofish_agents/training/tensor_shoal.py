@@ -18,10 +18,8 @@ from fish_env.envs.layout import OBSERVATION
 from fish_env.gpu.arrays import tensor
 from robofish_agents.policies.history import HistorySpec
 from robofish_agents.training.privileged import Sight
-from robofish_agents.training.tensor_ppo import staggered
+from robofish_agents.training.tensor_ppo import LIMIT, staggered
 
-LIMIT = 10.0
-"""Normalised numbers are clipped to this."""
 FLOOR = 1e-8
 """Added to variances, so that what never changes can be divided by its deviation."""
 
@@ -162,10 +160,9 @@ class TensorShoal:
         self.single_action_space = self.parts[0].single_action_space
         self.num_envs = sum(part.num_envs for part in self.parts)
         self._sizes = [part.num_envs for part in self.parts]
-        self._past: TensorHistory | None = None
-        raw = torch.cat([part.reset(seed=0)[0] for part in self.parts])
-        self._raw = raw
-        self.observed = raw.new_zeros(self.num_envs, spec.width(len(OBSERVATION)))
+        self._raw = torch.cat([_shared(part.batch.obs) for part in self.parts])
+        self._past = TensorHistory(spec, self._raw)
+        self.observed = self._raw.new_zeros(self.num_envs, spec.width(len(OBSERVATION)))
         self.seen: Scale = like.seen if like else Scale(self.observed)
         self._critic = None if like else CriticView(self.parts)
 
@@ -180,7 +177,6 @@ class TensorShoal:
         """
         parts = len(self.parts)
         first = [part.reset(seed=seed * parts + i)[0] for i, part in enumerate(self.parts)]
-        self._past = TensorHistory(self.spec, self._raw)
         self._look(first, torch.ones_like(self._raw[:, 0], dtype=torch.bool))
         if self._critic is None:
             return self.observed, {}
@@ -207,7 +203,6 @@ class TensorShoal:
         return self.observed, torch.cat(reward), failed, over, left
 
     def _look(self, observed: Sequence[Tensor], fresh: Tensor) -> None:
-        assert self._past is not None
         raw = torch.cat(tuple(observed), out=self._raw)
         wide = self._past.push(raw, fresh)
         if self._critic is not None:

@@ -8,7 +8,7 @@ import pytest
 from scripts.bench.rendering import single
 
 MOST = 12.0
-"""Times as long as one reduction by the drawing library, measured beside it. A picture takes 7 to 9
+"""Times as long as one reduction by the drawing library, measured beside it. A picture takes 7 to 11
 times as long; one drawn by numpy took 13 to 15."""
 
 
@@ -25,11 +25,11 @@ def reduction() -> float:
 
 
 @pytest.mark.slow
-def test_a_picture_takes_few_times_as_long_as_its_last_step_did():
-    """640 x 480, with wake, goal and instruments, against work of the same kind on this machine.
+def test_thirty_pictures_a_second_on_one_core():
+    """640 x 480, with wake, goal and instruments; processor time, the least of several rounds.
 
-    Both are the least of several rounds, so that load hardly matters; a second try is given to a
-    machine that becomes slow in between.
+    A machine that is too slow or too busy for that is judged by work of the same kind. How the two
+    compare depends on the processor: on some, a picture takes 10 times as long as a reduction.
     """
-    ratios = (single((640, 480)) / reduction() for _ in range(3))
-    assert any(ratio < MOST for ratio in ratios)
+    pictures = (single((640, 480)) for _ in range(3))
+    assert any(seconds < max(1.0 / 30.0, MOST * reduction()) for seconds in pictures)

@@ -113,8 +113,9 @@ def test_without_a_beat_nothing_is_said():
     assert law.starts() == {}
 
 
-def test_commands_follow_the_law():
-    data = swaying(4, common=0.97, offset=0.25)
+@pytest.mark.parametrize("law", [{"offset": 0.25}, {"rate": 0.004}], ids=lambda law: "-".join(law))
+def test_commands_follow_the_law(law):
+    data = swaying(4, common=0.97, **law)
     followed = drive_law(data).following(data)
     assert drive_law(followed).sizes == {}
     assert drive_law(followed).common == pytest.approx(1.0, abs=0.005)
@@ -145,6 +146,29 @@ def test_runs_that_differ_beside_a_law_are_put_right():
     assert np.std(ratios) > 0.01
     law = drive_law(inputs.dataset)
     assert law.sizes[EffectParameterId("beat_load", "offset")] == pytest.approx(0.25, rel=0.2)
+
+
+def test_runs_alike_beside_a_falling_beat_are_left_alone():
+    """Their commands differ, so that means over windows do too."""
+    data = swaying(7, rate=0.006)
+    inputs = check_inputs(data)
+    (told,) = [fault for fault in inputs.faults if fault.target == "tail_frequency"]
+    assert "battery_sag" in told.said
+    for run, logged in zip(inputs.dataset.runs, data.runs, strict=True):
+        assert np.array_equal(run.commands.values, logged.commands.values)
+
+
+def test_runs_that_differ_beside_a_falling_beat_get_their_own_ratio():
+    scales = np.array([0.96, 0.98, 1.0, 1.0, 1.02, 1.04])
+    rng = np.random.default_rng(8)
+    runs = tuple(_run(f"r{i}", rng, scale, rate=0.005) for i, scale in enumerate(scales))
+    data = Dataset("swaying", "zheng-2021-a", runs)
+    inputs = check_inputs(data)
+    ratios = [
+        a.commands.values[0, FREQUENCY] / b.commands.values[0, FREQUENCY]
+        for a, b in zip(inputs.dataset.runs, data.runs, strict=True)
+    ]
+    assert ratios == pytest.approx(scales, abs=0.003)
 
 
 def test_a_fit_begins_in_step_only_beside_a_law():

@@ -8,8 +8,8 @@ import pytest
 from scripts.bench.rendering import single
 
 MOST = 12.0
-"""Times as long as one reduction by the drawing library, measured beside it. A picture takes 7 to 11
-times as long; one drawn by numpy took 13 to 15."""
+"""Times as long as one reduction by the drawing library, measured beside it. A picture takes 7 to
+11 times as long; one drawn by numpy took 13 to 15."""
 
 
 def reduction() -> float:

@@ -38,6 +38,8 @@ SMALLEST = tuple(
 """The least that the catalogue takes for plausible. Without any such effect the regression finds
 less than a third of it."""
 ROUNDS = 8
+HELD_S = 0.5
+"""For which a frequency that falls with time is taken as constant."""
 
 
 @dataclass(frozen=True)
@@ -72,21 +74,36 @@ class DriveLaw:
         return {SCALE: self.common * common, **self.sizes}
 
     def following(self, dataset: Dataset) -> Dataset:
-        """The dataset as if it had been commanded to beat as offset and stroke let it.
+        """The dataset as if it had been commanded to beat as time, offset and stroke let it.
 
-        What falls with time stays: commands hold. Without a law the dataset is the same.
+        A frequency that falls with time is commanded anew every :data:`HELD_S`. Without a law the
+        dataset is the same.
         """
         if not self.sizes:
             return dataset
         return replace(dataset, runs=tuple(self._following(run) for run in dataset.runs))
 
     def _following(self, run: Run) -> Run:
-        values = run.commands.values.copy()
-        terms = drive_terms(np.zeros(len(values)), values)
+        held = self._held(run)
+        since = np.append(held.times_s[1:], run.time_s[-1]) + held.times_s
+        since = np.maximum(0.5 * since - run.time_s[0], 0.0)
+        terms = drive_terms(since, held.values)
         sizes = np.array([self.sizes.get(term, 0.0) for term in TERMS])
         left = np.prod(np.maximum(1.0 - sizes * terms, 0.0), axis=1)
+        values = held.values.copy()
         values[:, FREQUENCY] *= left * (self.common or 1.0)
-        return replace(run, commands=CommandSteps(run.commands.times_s, values))
+        return replace(run, commands=CommandSteps(held.times_s, values))
+
+    def _held(self, run: Run) -> CommandSteps:
+        """Commands of a run, in steps over which a frequency that falls with time hardly does."""
+        steps = run.commands
+        if RATE not in self.sizes:
+            return steps
+        begin, end = run.time_s[[0, -1]]
+        times = np.union1d(steps.times_s, np.arange(begin, end, HELD_S))
+        times = times[times >= steps.times_s[0]]
+        row = np.searchsorted(steps.times_s, times, side="right") - 1
+        return CommandSteps(times, steps.values[row])
 
 
 def drive_law(dataset: Dataset) -> DriveLaw:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fish_env.data.schema import Dataset
+from fish_env.data.vocabulary import COMMANDS
 from fish_env.diagnosis.inputs.changes import Change
 from fish_env.diagnosis.inputs.clocks import changes_of_clocks
 from fish_env.diagnosis.inputs.library import readings
@@ -76,7 +77,7 @@ def best_reading(
         now: what it weighs.
         every: readings of its columns; those of its clocks are found from the data.
     """
-    tried = [change for change in every if _questioned(change, now)]
+    tried = [change for change in every if _questioned(change, now) and _possible(change, dataset)]
     tried += changes_of_clocks(dataset, scales, now)
     weighed = [(change, scales.weigh(change.applied(dataset))) for change in tried]
     if not weighed:
@@ -106,3 +107,15 @@ def _questioned(change: Change, now: Weighed) -> bool:
     if change.commands and any(name.endswith(AGAINST) for name in bad):
         return True
     return any(set(now.comparisons[name].channels) & change.channels.keys() for name in bad)
+
+
+def _possible(change: Change, dataset: Dataset) -> bool:
+    """Whether commands stay what servos can be asked: a reading does not make amplitudes negative.
+
+    Where a tail is not told to beat nothing is compared, so that such a reading might seem better.
+    """
+    if not change.commands:
+        return True
+    lower, upper = np.array([(c.lower, c.upper) for c in COMMANDS.values()]).T
+    read = [run.commands.values for run in change.applied(dataset).runs]
+    return all(bool(np.all((values >= lower) & (values <= upper))) for values in read)

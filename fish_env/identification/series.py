@@ -262,6 +262,10 @@ class SeriesProblem(Problem):
         """The same problem with other numbers (R, K) of the runs (see the protocol)."""
         return self.with_runs(renumbered(self, values, point, noise, near))
 
+    def as_commanded(self) -> SeriesProblem:
+        """The same problem with tails that beat as commanded, in every run."""
+        return self.with_runs([replace(run, own_beat=1.0, own_sag=0.0) for run in self.runs])
+
     def variation_slopes(
         self, point: Point, noise: NoiseModel, filtered: Sequence[Filtered], steps: FloatArray
     ) -> FloatArray:
@@ -324,13 +328,10 @@ class SeriesProblem(Problem):
         near: Sequence[Filtered] = (),
         keep_slopes: bool = False,
     ) -> list[Filtered]:
-        """Extended Kalman filter of every run at one point.
+        """Extended Kalman filter of every run at one point (see the protocol).
 
-        Args:
-            point: values of the parameters.
-            noise: noise model.
-            near: not needed, a filter begins where its run does.
-            keep_slopes: keep what :meth:`RunFilter.replay` needs; in any case where runs differ.
+        It begins where its run does, and not ``near`` another one. Where runs differ it keeps in
+        any case what :meth:`RunFilter.replay` needs.
         """
         corners, keep = self.refines_steps(point.effects), keep_slopes or bool(noise.spread.any())
         return self.filter_for(point.effects).run(*self.lane(point), noise, keep, corners)

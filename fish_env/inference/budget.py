@@ -139,7 +139,7 @@ def _residuals(
 ) -> FloatArray:
     """Whitened residuals (sets, D) of the model with some components in place."""
     rows: list[FloatArray] = [np.zeros(0)] * len(sets)
-    plain = usual_runs(problem, accepted.point, noise)
+    plain = usual_runs(problem.as_commanded(), accepted.point, noise)
     varied = spread_of(accepted.problem, noise).any()
     for chosen, of_set in ((problem, True), (plain, False)):
         own = [i for i, s in enumerate(sets) if not varied or (Other.RUN_VARIATION in s) == of_set]

@@ -266,6 +266,10 @@ class Problem(Protocol):
         """
         return self
 
+    def as_commanded(self) -> Problem:
+        """The same problem without what was measured of each run's own drive beforehand."""
+        return self
+
     def variation_slopes(
         self, point: Point, noise: Any, filtered: Sequence[Any], steps: FloatArray
     ) -> FloatArray:

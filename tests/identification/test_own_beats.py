@@ -14,6 +14,8 @@ from fish_env.identification.runs import FREQUENCY
 from fish_env.identification.series import SeriesProblem
 from fish_env.identification.tail_drive import RATE, SCALE, TailDrive, tail_drive
 from fish_env.identification.variation import BEAT, SAG
+from fish_env.inference.budget import error_budget
+from fish_env.inference.estimate.fit import fit
 from fish_env.inference.hypotheses import EffectParameterId
 from tests.identification.synthetic import Setup, simulate
 
@@ -147,3 +149,17 @@ def test_beginnings_that_mislead_do_not_decide(dataset):
         runs.append(replace(run, commands=CommandSteps(run.commands.times_s, values)))
     beats = own_beats(SeriesProblem(replace(dataset, runs=tuple(runs))))
     assert beats.drive.scale == pytest.approx(1.0, abs=0.015)
+
+
+def test_the_error_budget_gives_tails_that_beat_differently_to_the_runs(dataset):
+    """The nominal simulation follows commands, whatever was measured of the tails beforehand."""
+    ratios = {f"r{i}": ratio for i, ratio in enumerate([1.0, 1.03, 0.97, 1.02, 0.98])}
+    problem = SeriesProblem(told(dataset, np.array([*ratios.values()])))
+    problem = with_own_beats(problem, OwnBeats(TailDrive(), ratios))
+    noise = problem.default_noise()
+    accepted = fit(problem, (), problem.start, noise, refit_noise=False, iterations=2)
+    rng = np.random.default_rng(0)
+    budget = error_budget(problem, accepted, (), problem.run_ids, True, True, rng)
+    shares = {share.name: share.share for share in budget.shares}
+    assert budget.misfit > 10.0
+    assert shares["run_variation"] > 0.9

@@ -20,7 +20,7 @@ from fish_env.identification.filter_algebra import (
     whitened_gain,
     widened,
 )
-from fish_env.identification.state_blocks import N_ERROR, N_MOVING
+from fish_env.identification.state_blocks import N_ERROR, N_MOVING, PHASE_COLUMN
 
 # --- completed by compose ---
 from fish_env.model.composed import (
@@ -29,6 +29,7 @@ from fish_env.model.composed import (
     LATE_TAIL,
     N_STATES,
     PERTURB,
+    TURN,
     WORK_ROWS,
     WRENCH,
     X0,
@@ -55,7 +56,12 @@ def slopes_of_interval(
     work, width, steps, h, begin, times, values, at, pace, skew, delay, late, history, tables,
     error, gap, path, f,
 ):  # fmt: skip
-    """Advance the estimate by one sample interval; f (12, 19) becomes its slopes."""
+    """Advance the estimate by one sample interval; f (12, 19) becomes its slopes.
+
+    Those of the phase are secants, to both sides. Where a limit or play makes the tail's rate jump,
+    a tangent jumps whenever a corner passes a sample, and gains and likelihood jump with it. Source:
+    Norgaard, Poulsen and Ravn (2000), Automatica 36, 1627.
+    """
     for j in range(N_STATES):
         for k in range(1, width):
             work[(X0 + j) * width + k] = work[(X0 + j) * width]
@@ -68,6 +74,8 @@ def slopes_of_interval(
     for j in range(N_ERROR):
         for k in range(width):
             error[j, k] = PERTURB if k == j + 1 else 0.0
+    error[PHASE_COLUMN, PHASE_COLUMN + 1] = TURN
+    error[PHASE_COLUMN, N_ERROR + 1] = -TURN
     move(work, width, error, late, history)
     for i in range(steps):
         start = begin + i * h
@@ -78,6 +86,8 @@ def slopes_of_interval(
     for j in range(N_MOVING):
         for k in range(N_ERROR):
             f[j, k] = gap[j, k + 1] * (1.0 / PERTURB)
+        turned = gap[j, PHASE_COLUMN + 1] - gap[j, N_ERROR + 1]
+        f[j, PHASE_COLUMN] = turned * (0.5 / TURN)
 
 
 @kernel
@@ -153,7 +163,7 @@ def ekf_run(
         load_lane(work, width, k, state0, par, 0, values[0])
     late = LATE_TAIL & (history_rows > 0)
     history = np.zeros((history_rows, width))
-    start_effects(work, N_ERROR + 1, width, clock[0], swimming, pace, late, history, tables)
+    start_effects(work, N_ERROR + 2, width, clock[0], swimming, pace, late, history, tables)
     channels = codes.shape[0]
     p = widened(covariance0)
     scratch, turned, s, w, seen, k_gain = room(channels)

@@ -23,7 +23,8 @@ ROTATION, RATES = first_column("rotation"), first_column("rate")
 VELOCITIES = first_column("velocity")
 BODY = 13  # rows of the state that channels of the body follow from: pose and velocities
 MOUNT, MARKER, TILT, BENT, IRON = 0, 9, 12, 18, 20  # rows of a lens (see sensing.geometry)
-PERTURB = 1e-5
+PERTURB = 1e-5  # of each error state for its slopes, but of the phase, see slopes_of_interval
+TURN = 0.05  # of the phase to either side (rad): about what it is uncertain by
 
 
 @kernel
@@ -246,8 +247,8 @@ def carry_back(work, width, age, base, row):
 def observation_rows(work, width, codes, gain, ages, h, steps, path, lens, measured, rows):
     """d(channel)/d(error state) of lane 0, (C, 19); zero for a missing sample.
 
-    What drives the fish shows its phase alone. That stays as it is over an interval, so the lane
-    that began with another phase shows the slope, that of what follows the phase included.
+    What drives the fish shows its phase alone. That stays as it is over an interval, so the lanes
+    that began with another phase show the slope, that of what follows the phase included.
     """
     aged, last = (path.shape[0] > 0) & (steps > 0), -1
     base = X if aged else X0
@@ -260,8 +261,8 @@ def observation_rows(work, width, codes, gain, ages, h, steps, path, lens, measu
             last = device
         size = gain[i] if measured[i] == measured[i] else 0.0
         if kind == DRIVE:
-            gap = work[ANGLE * width + column + 1] - work[ANGLE * width]
-            rows[i, column] = size * gap * (1.0 / PERTURB)
+            gap = work[ANGLE * width + column + 1] - work[ANGLE * width + N_ERROR + 1]
+            rows[i, column] = size * gap * (0.5 / TURN)
         elif kind == EULER:
             angle_row(work, width, lens, size, index, base, rows[i])
         elif index < 2:

@@ -58,9 +58,9 @@ def slopes_of_interval(
 ):  # fmt: skip
     """Advance the estimate by one sample interval; f (12, 19) becomes its slopes.
 
-    Those of the phase are secants, to both sides. Where a limit or play makes the tail's rate jump,
-    a tangent jumps whenever a corner passes a sample, and gains and likelihood jump with it. Source:
-    Norgaard, Poulsen and Ravn (2000), Automatica 36, 1627.
+    Those of the phase are secants to both sides. Where a limit or play makes the tail's rate jump,
+    a tangent jumps whenever a corner passes a sample, and gains and likelihood jump with it.
+    Source: Norgaard, Poulsen and Ravn (2000), Automatica 36, 1627.
     """
     for j in range(N_STATES):
         for k in range(1, width):

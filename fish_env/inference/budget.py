@@ -2,9 +2,10 @@
 
 The misfit of a model is the energy of its predictions' errors, in units of the sensors' noise and
 beyond it, where the model runs alone over some seconds from states that the accepted model has
-filtered. A component's share is the mean of what it takes away when it comes first and of what it
-gives back when it goes last: the first and last terms of Shapley's value, which they equal where
-components do not interact. The shares are scaled to add up to what all components together close.
+filtered. Channels count the same, however often each is sampled. A component's share is the mean of
+what it takes away when it comes first and of what it gives back when it goes last: the first and
+last terms of Shapley's value, which they equal where components do not interact. The shares are
+scaled to add up to what all components together close.
 Where the explanation is adequate, what it leaves is noise by the adequacy test, and nothing is
 left. Elsewhere errors count from the sensors' noise: what is left then holds the random disturbance
 and what was not known of the states that predictions begin from, beside what the model lacks.
@@ -194,6 +195,8 @@ class _Energy:
         size = runs * channels
         self.table = np.array([np.bincount(cell, row, size).reshape(shape) for row in squares])
         self.noise = np.bincount(cell, present, size).reshape(shape)
+        samples = np.maximum(self.noise.sum(axis=0), 1.0)
+        self.table, self.noise = self.table / samples, self.noise / samples
 
     @property
     def total(self) -> FloatArray:

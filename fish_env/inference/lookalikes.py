@@ -24,10 +24,11 @@ from fish_env.inference.hypotheses import (
     EffectName,
     listed,
     name_of,
+    of_effects,
 )
 from fish_env.inference.in_place import in_step, moved_to_runs, with_lookalike, without_causes
 from fish_env.inference.policy import POLICY
-from fish_env.inference.problem import Problem
+from fish_env.inference.problem import Point, Problem
 from fish_env.inference.projection import Signal
 from fish_env.inference.rivals import as_likely, rivals_of
 from fish_env.inference.screening import Screen
@@ -124,10 +125,29 @@ def _without_what_runs_explain(current: Explanation, report: Report) -> Explanat
         runs = own.problem.with_refinement()
         begin = without_causes(own, (cause,))
         fitted = _fitted(runs, own, cause, begin, POLICY.rate_steps, enough)
-        causes = tuple(c for c in current.causes if c != cause)
-        if fitted and Explanation(causes, fitted).score < current.score + POLICY.evidence_doubt:
-            current = Explanation(causes, fitted)
+        if fitted is None:
+            continue
+        without = Explanation(tuple(c for c in current.causes if c != cause), fitted)
+        if without.score < current.score + POLICY.evidence_doubt:
+            report(f"fitting with {name_of(cause)} again")
+            again = _put_back(runs, current, cause, fitted)
+            better = again is not None and again.score < without.score - POLICY.evidence_doubt
+            current = again if again is not None and better else without
     return current
+
+
+def _put_back(
+    runs: Problem, before: Explanation, cause: CauseId, fitted: Fit
+) -> Explanation | None:
+    """The explanation with a cause again, from where the fit without it has ended.
+
+    That fit may have gained by what has nothing to do with the cause.
+    """
+    own = before.fit
+    values = {**fitted.point.effects, **of_effects(own.point.effects, {str(cause)})}
+    begin = CoarseFit(own.effects, own.released, Point(fitted.point.z, values), np.inf)
+    again = _fitted(runs, fitted, cause, begin, POLICY.rate_steps, fitted.objective)
+    return None if again is None else Explanation(before.causes, again)
 
 
 def _asked(

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 import numpy as np
+from scipy.special import chdtrc
 
 from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.coarse_fit import CoarseFit
@@ -22,6 +23,7 @@ from fish_env.inference.hypotheses import (
     effects_of,
     of_effects,
 )
+from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
 from fish_env.inference.projection import Signal
 from fish_env.inference.starts import probed
@@ -101,6 +103,23 @@ def moved_to_runs(own: Fit, cause: CauseId) -> bool:
         cause: an effect.
     """
     return cause in own.effects and bool(_of_step(own))
+
+
+def surprising_runs(fitted: Fit, cause: CauseId) -> bool:
+    """Whether runs would have to differ by more than ordinary ones in what took a cause's place.
+
+    Args:
+        fitted: fit without the cause.
+        cause: an effect.
+    """
+    alike = {cause, *fitted.problem.known[EffectName(str(cause))].confusable_with}
+    spread = spread_of(fitted.problem, fitted.noise)
+    for number, beside in _of_step(fitted).items():
+        if beside.effect in alike:
+            own = fitted.problem.variation[:, number] / spread[number]
+            if chdtrc(len(own), own @ own) < POLICY.surprising_runs_level:
+                return True
+    return False
 
 
 def _gained_by_runs(own: Fit, cause: CauseId, at: CoarseFit) -> FloatArray:

@@ -26,7 +26,13 @@ from fish_env.inference.hypotheses import (
     name_of,
     of_effects,
 )
-from fish_env.inference.in_place import in_step, moved_to_runs, with_lookalike, without_causes
+from fish_env.inference.in_place import (
+    in_step,
+    moved_to_runs,
+    surprising_runs,
+    with_lookalike,
+    without_causes,
+)
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
 from fish_env.inference.projection import Signal
@@ -113,7 +119,8 @@ def asked_of_rates(
 def _without_what_runs_explain(current: Explanation, report: Report) -> Explanation:
     """The explanation without rates in whose place the runs' own numbers explain as much.
 
-    Elimination takes few steps, and begins where the runs are out of step without the cause.
+    Elimination takes few steps, and begins where the runs are out of step without the cause. Runs
+    that would have to differ by more than ordinary ones do not take a cause's place.
     """
     for cause in [name for name in _rates(current.fit.problem) if name in current.causes]:
         own = current.fit
@@ -125,7 +132,7 @@ def _without_what_runs_explain(current: Explanation, report: Report) -> Explanat
         runs = own.problem.with_refinement()
         begin = without_causes(own, (cause,))
         fitted = _fitted(runs, own, cause, begin, POLICY.rate_steps, enough)
-        if fitted is None:
+        if fitted is None or surprising_runs(fitted, cause):
             continue
         without = Explanation(tuple(c for c in current.causes if c != cause), fitted)
         if without.score < current.score + POLICY.evidence_doubt:

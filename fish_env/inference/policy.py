@@ -103,6 +103,8 @@ class DecisionPolicy(Numbers):
         bootstrap_draws: number of draws of an interval over runs.
         run_errors_level: share of parameters whose interval runs widen by chance.
         beyond_usual: spread over runs, over the usual one, from which it is a finding.
+        surprising_runs_level: p-value of what ordinary runs differ in, below which it does not take
+            the place of a cause.
         visible_misfit: misfit over noise below which the error budget has no shares.
         smallest_gap: gap from baseline to noise below which no share of it is reported.
         largest_squared_error: largest squared error of a prediction, in noise units; a diverging
@@ -200,6 +202,9 @@ class DecisionPolicy(Numbers):
     )
     run_errors_level: float = number(0.05, 1e-4, 0.5, FISHER)
     beyond_usual: float = number(3.0, 1.0, 10.0, BY_HAND)
+    surprising_runs_level: float = number(
+        0.001, 1e-12, 0.5, f"predictions of runs are shrunk, so it is rarer by chance; {BY_HAND}"
+    )
     visible_misfit: float = number(0.01, 0.0, 1.0, BY_HAND)
     smallest_gap: float = number(0.01, 0.0, 1.0, BY_HAND)
     largest_squared_error: float = number(

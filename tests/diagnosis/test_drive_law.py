@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from fish_env.data import CommandSteps, Dataset, Run
 from fish_env.diagnosis.inputs.check import check_inputs
 from fish_env.diagnosis.inputs.drive_law import DriveLaw, drive_law
 from fish_env.diagnosis.policy import CHECKS
+from fish_env.identification.tail_drive import RATE as RATE_OF_SAG
 from fish_env.identification.tail_drive import SCALE, tail_drive
 from fish_env.inference.hypotheses import EffectParameterId
 
@@ -120,6 +123,17 @@ def test_commands_follow_the_law(law):
     assert drive_law(followed).sizes == {}
     assert drive_law(followed).common == pytest.approx(1.0, abs=0.005)
     assert DriveLaw(0.97).following(data) is data, "what all share is no law"
+
+
+def test_a_frequency_that_falls_under_one_command_is_followed():
+    """What holds for a whole run is commanded anew, in steps."""
+    once = CommandSteps([0.0], [[0.1, 0.3, 1.5, 0.0, 0.0]])
+    data = swaying(4)
+    data = replace(data, runs=tuple(replace(run, commands=once) for run in data.runs))
+    for run in DriveLaw(1.0, {RATE_OF_SAG: 0.01}).following(data).runs:
+        times = np.array([0.25, 10.0, 29.0])
+        told = run.commands.at(times)[:, FREQUENCY]
+        assert told == pytest.approx(1.5 * (1.0 - 0.01 * times), abs=0.005)
 
 
 def test_the_input_step_tells_the_law_and_leaves_it_to_effects():

@@ -84,26 +84,18 @@ class DriveLaw:
         return replace(dataset, runs=tuple(self._following(run) for run in dataset.runs))
 
     def _following(self, run: Run) -> Run:
-        held = self._held(run)
-        since = np.append(held.times_s[1:], run.time_s[-1]) + held.times_s
-        since = np.maximum(0.5 * since - run.time_s[0], 0.0)
-        terms = drive_terms(since, held.values)
+        begin, end = run.time_s[[0, -1]]
+        times = run.commands.times_s
+        if RATE in self.sizes:
+            samples = np.searchsorted(run.time_s, np.arange(begin, end, HELD_S))
+            times = np.union1d(times, run.time_s[samples])
+        values = run.commands.at(times)
+        middle = 0.5 * (times + np.append(times[1:], end))
+        terms = drive_terms(np.maximum(middle - begin, 0.0), values)
         sizes = np.array([self.sizes.get(term, 0.0) for term in TERMS])
         left = np.prod(np.maximum(1.0 - sizes * terms, 0.0), axis=1)
-        values = held.values.copy()
         values[:, FREQUENCY] *= left * (self.common or 1.0)
-        return replace(run, commands=CommandSteps(held.times_s, values))
-
-    def _held(self, run: Run) -> CommandSteps:
-        """Commands of a run, in steps over which a frequency that falls with time hardly does."""
-        steps = run.commands
-        if RATE not in self.sizes:
-            return steps
-        begin, end = run.time_s[[0, -1]]
-        times = np.union1d(steps.times_s, np.arange(begin, end, HELD_S))
-        times = times[times >= steps.times_s[0]]
-        row = np.searchsorted(steps.times_s, times, side="right") - 1
-        return CommandSteps(times, steps.values[row])
+        return replace(run, commands=CommandSteps(times, values))
 
 
 def drive_law(dataset: Dataset) -> DriveLaw:

@@ -112,7 +112,7 @@ def surprising_runs(fitted: Fit, cause: CauseId) -> bool:
         fitted: fit without the cause.
         cause: an effect.
     """
-    alike = {cause, *fitted.problem.known[EffectName(str(cause))].confusable_with}
+    alike = _alike(fitted.problem, cause)
     spread = spread_of(fitted.problem, fitted.noise)
     for number, beside in _of_step(fitted).items():
         if beside.effect in alike:
@@ -128,7 +128,7 @@ def _gained_by_runs(own: Fit, cause: CauseId, at: CoarseFit) -> FloatArray:
     Parameters that have the same name do the same to a run, of effects that look alike.
     """
     new = of_effects(at.point.effects, {*at.effects} - {*own.effects})
-    alike = {cause, *own.problem.known[EffectName(str(cause))].confusable_with, *effects_of(new)}
+    alike = _alike(own.problem, cause) | {*effects_of(new)}
     gained = np.zeros(len(own.problem.variations))
     for number, beside in _of_step(own).items():
         if beside.effect in alike:
@@ -137,6 +137,11 @@ def _gained_by_runs(own: Fit, cause: CauseId, at: CoarseFit) -> FloatArray:
             after = [value for id, value in new.items() if id.name == beside.name]
             gained[number] = before - (after[0] if after else neutral)
     return gained
+
+
+def _alike(problem: Problem, cause: CauseId) -> set[str]:
+    """An effect, and those that look like it."""
+    return {str(cause), *problem.known[EffectName(str(cause))].confusable_with}
 
 
 def _of_step(own: Fit) -> dict[int, EffectParameterId]:

@@ -77,9 +77,10 @@ def best_reading(
         now: what it weighs.
         every: readings of its columns; those of its clocks are found from the data.
     """
-    tried = [change for change in every if _questioned(change, now) and _possible(change, dataset)]
+    tried = [change for change in every if _questioned(change, now)]
     tried += changes_of_clocks(dataset, scales, now)
-    weighed = [(change, scales.weigh(change.applied(dataset))) for change in tried]
+    read = ((change, change.applied(dataset)) for change in tried)
+    weighed = [(c, scales.weigh(data)) for c, data in read if not c.commands or _possible(data)]
     if not weighed:
         return None
     gains = np.array([now.gain(other) for _, other in weighed])
@@ -109,13 +110,11 @@ def _questioned(change: Change, now: Weighed) -> bool:
     return any(set(now.comparisons[name].channels) & change.channels.keys() for name in bad)
 
 
-def _possible(change: Change, dataset: Dataset) -> bool:
-    """Whether commands stay what servos can be asked: a reading does not make amplitudes negative.
+def _possible(dataset: Dataset) -> bool:
+    """Whether commands are what servos can be asked: a reading does not make amplitudes negative.
 
     Where a tail is not told to beat nothing is compared, so that such a reading might seem better.
     """
-    if not change.commands:
-        return True
     lower, upper = np.array([(c.lower, c.upper) for c in COMMANDS.values()]).T
-    read = [run.commands.values for run in change.applied(dataset).runs]
+    read = [run.commands.values for run in dataset.runs]
     return all(bool(np.all((values >= lower) & (values <= upper))) for values in read)

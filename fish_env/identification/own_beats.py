@@ -72,7 +72,8 @@ def own_beats(problem: SeriesProblem, differ: bool = False) -> OwnBeats:
         problem: all runs, those that are kept for judging too.
         differ: whether runs are known to differ in their beat.
     """
-    free = problem.with_runs([_with_free_phase(run) for run in problem.runs])
+    # Long steps get the phase right, and all that is compared is in the same.
+    free = problem.with_runs([_with_free_phase(run) for run in problem.runs]).with_long_steps()
     few = len(free.runs) < IDENTIFICATION.fewest_runs_for_beats
     if few or "frequency_scale" in free.model.effects:
         return OwnBeats()

@@ -19,7 +19,7 @@ from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.hypotheses import CauseId, Coefficient
 from fish_env.inference.left_out import left_out_scores
-from fish_env.inference.lookalikes import asked_again
+from fish_env.inference.lookalikes import asked_of_lags, asked_of_rates
 from fish_env.inference.many_causes import challenged, pursue
 from fish_env.inference.parallel import both, side_by_side
 from fish_env.inference.policy import POLICY
@@ -182,9 +182,10 @@ def settled(found: Attribution, thoroughly: bool, report: Callable[[str], None])
     alike: tuple[Explanation, ...] = ()
     # What else is missing moves estimates by more than a few steps more would.
     if current.causes and thoroughly and not disturbance_at_limit(current.fit):
-        current = _published(current, report)
         if current.fit.problem.drive.uneven:
-            current, alike = asked_again(current, found.shown, report)
+            current, alike = _published_of_alike(current, found.shown, report)
+        else:
+            current = _published(current, report)
     rivals = (*found.rivals, *unnecessary, *alike)
     if thoroughly and rivals:
         rivals = tuple(side_by_side([partial(without_idle, e) for e in rivals]))
@@ -193,14 +194,36 @@ def settled(found: Attribution, thoroughly: bool, report: Callable[[str], None])
     return replace(found, accepted=current, rivals=rivals, failed=failed)
 
 
-def _published(current: Explanation, report: Callable[[str], None]) -> Explanation:
-    """The explanation with converged estimates, and without causes that these do not need."""
+def _published(
+    current: Explanation, report: Callable[[str], None], judged: bool = False
+) -> Explanation:
+    """The explanation with converged estimates, and without causes that these do not need.
+
+    Args:
+        current: causes with their fit.
+        report: told what is being done.
+        judged: whether fits without each cause were just compared, in long steps.
+    """
     report("iterating the estimates to convergence")
     final = reached(partial(to_publish, current.fit))
     if final is None:
         return current
     report("removing unnecessary causes")
-    return backward_elimination(Explanation(current.causes, final))[0]
+    return backward_elimination(Explanation(current.causes, final), judged)[0]
+
+
+def _published_of_alike(
+    current: Explanation, shown: Screen, report: Callable[[str], None]
+) -> tuple[Explanation, tuple[Explanation, ...]]:
+    """The same after causes were asked which of their kind they are, with those that do as well.
+
+    Where each run has a drive of its own fits take longest. So rates, which long steps get right,
+    are compared in these, and lags, which they do not, in the steps of published estimates.
+    """
+    current, rates = asked_of_rates(current, shown, report)
+    current = _published(current, report, judged=True)
+    best, lags = asked_of_lags(current, shown, report)
+    return best, (*rates, *lags) if best is current else lags
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,9 @@ from fish_env.inference.substitution import coarse_without, without
 from fish_env.inference.tails import chi2_log_tail
 
 
-def backward_elimination(current: Explanation) -> tuple[Explanation, tuple[Explanation, ...]]:
+def backward_elimination(
+    current: Explanation, judged: bool = False
+) -> tuple[Explanation, tuple[Explanation, ...]]:
     """The explanation without causes that later ones made unnecessary, and its rivals.
 
     Also without any cause whose interval, beside the others, contains its neutral value: the
@@ -34,22 +36,28 @@ def backward_elimination(current: Explanation) -> tuple[Explanation, tuple[Expla
 
     Two look-alikes make each other unnecessary. Rivals go without the other of them. What is needed
     beside more causes is needed beside fewer.
+
+    Args:
+        current: all causes.
+        judged: whether the evidence for each was enough just before the estimates moved a little:
+            then only causes whose interval contains the neutral value are in question.
     """
     rivals: tuple[Explanation, ...] = ()
     needed: set[CauseId] = set()
-    while smaller := _smaller(current, needed):
+    while smaller := _smaller(current, needed, judged):
         needed = set.intersection(*({*e.causes} for e in smaller))
         current, *others = smaller
         rivals = rivals_of(current, others)
     return current, rivals
 
 
-def _smaller(current: Explanation, needed: Collection[CauseId]) -> list[Explanation]:
+def _smaller(current: Explanation, needed: Collection[CauseId], judged: bool) -> list[Explanation]:
     """Explanations without one of the causes that do as well, best first.
 
     Args:
         current: all causes.
         needed: those that are known to be.
+        judged: whether only causes that may not act are in question.
     """
     alone = len(current.causes) == 1
     found = []
@@ -58,7 +66,7 @@ def _smaller(current: Explanation, needed: Collection[CauseId]) -> list[Explanat
         if not alone and (cause in needed or surely_acts(current.fit, cause)):
             continue
         doubtful = may_not_act(current.fit, cause)
-        if alone and not doubtful:
+        if (alone or judged) and not doubtful:
             continue
         least = POLICY.evidence_doubt + (allowed_loss(current.fit, cause) if doubtful else 0.0)
         smaller = None if _is_needed(fitter, cause, least) else without(current, (cause,), least)

@@ -82,13 +82,14 @@ def pairs_alike(
     return [(c, n) for c in causes for n in others if n in known[c].confusable_with]
 
 
-def asked_again(
+def asked_of_lags(
     current: Explanation, shown: Screen, report: Report
 ) -> tuple[Explanation, tuple[Explanation, ...]]:
-    """The explanation with the look-alikes that fit best in its steps, and those as good.
+    """The explanation with the lags that fit best in the steps of published estimates.
 
-    What looks like one of its causes takes its place in a fit of a few steps to a few runs: where
-    runs differ in all they have, a coarse fit, which holds that, tells too little.
+    With the explanations that fit as well. What looks like one of its causes takes its place in a
+    fit of a few steps to a few runs: where runs differ in all they have, a coarse fit, which holds
+    that, tells too little.
 
     A lag that was found in long steps and diverges in those of published estimates leaves its place
     to any that does not.
@@ -98,22 +99,26 @@ def asked_again(
         shown: causes that are not among them.
         report: told what is being done.
     """
-    current, rivals = _asked(current, _shown(late(current), shown), POLICY.swap_steps, report)
-    best, others = asked_of_rates(current, shown, report)
-    return best, (*rivals, *others) if best is current else others
+    runs = current.fit.problem
+    if runs.is_coarse(current.fit.point.effects):
+        runs = runs.with_refinement()
+    pairs = _shown(late(current), shown)
+    best, rivals = _asked(runs, current, pairs, POLICY.swap_steps, report)
+    if best is not current:
+        best = Explanation(best.causes, finished(best.fit))
+    return best, rivals
 
 
 def asked_of_rates(
     current: Explanation, shown: Screen, report: Report
 ) -> tuple[Explanation, tuple[Explanation, ...]]:
-    """As :func:`asked_again`, of what makes a clock or a drive slow alone.
+    """As :func:`asked_of_lags`, of what makes a clock or a drive slow, in the steps of the fit.
 
-    None of that is a cause where the numbers of the runs explain as much.
+    Long steps get no rate wrong. None is a cause where the numbers of the runs explain as much.
     """
-    if current.fit.problem.is_coarse(current.fit.point.effects):
-        return current, ()
     current = _without_what_runs_explain(current, report)
-    return _asked(current, _shown(rates(current), shown), POLICY.rate_steps, report)
+    pairs = _shown(rates(current), shown)
+    return _asked(current.fit.problem, current, pairs, POLICY.rate_steps, report)
 
 
 def _without_what_runs_explain(current: Explanation, report: Report) -> Explanation:
@@ -129,7 +134,7 @@ def _without_what_runs_explain(current: Explanation, report: Report) -> Explanat
             continue
         report(f"fitting without {name_of(cause)}")
         enough = own.objective + POLICY.evidence_doubt + current.narrowed_by((cause,))
-        runs = own.problem.with_refinement()
+        runs = own.problem
         begin = without_causes(own, (cause,))
         fitted = _fitted(runs, own, cause, begin, POLICY.rate_steps, enough)
         if fitted is None or surprising_runs(fitted, cause):
@@ -158,13 +163,26 @@ def _put_back(
 
 
 def _asked(
-    current: Explanation, pairs: Sequence[tuple[CauseId, Signal]], steps: int, report: Report
+    runs: Problem,
+    current: Explanation,
+    pairs: Sequence[tuple[CauseId, Signal]],
+    steps: int,
+    report: Report,
 ) -> tuple[Explanation, tuple[Explanation, ...]]:
+    """The best of an explanation and those with look-alikes in it, and those as good.
+
+    Args:
+        runs: those of the explanation, in the steps to compare in.
+        current: causes with their fit; where it was made in other steps it does not compete.
+        pairs: causes, each with the signal of what looks like it.
+        steps: most Gauss-Newton steps of each fit.
+        report: told what is being done.
+    """
     own, found = current.fit, list[Explanation]()
-    runs = own.problem.with_refinement()
-    coarse = own.problem.is_coarse(own.point.effects)
+    coarse = runs is not own.problem
     enough = np.inf if coarse else own.objective + POLICY.evidence_doubt + POLICY.linear_doubt
-    for cause, other, begin in _closest(current, pairs, steps, report)[: POLICY.most_lookalikes]:
+    closest = _closest(runs, current, pairs, steps, report)
+    for cause, other, begin in closest[: POLICY.most_lookalikes]:
         causes = tuple(other if c == cause else c for c in current.causes)
         report(f"fitting {listed(causes, ' and ')}")
         whole = _fitted(runs, own, cause, begin, steps, enough)
@@ -173,20 +191,20 @@ def _asked(
     if not found:
         return current, ()
     if coarse:
-        best = min(found, key=lambda e: e.score)
-        return Explanation(best.causes, finished(best.fit)), ()
+        return min(found, key=lambda e: e.score), ()
     best, *others = sorted((current, *found), key=lambda e: e.score)
-    if best is not current:
-        best = Explanation(best.causes, finished(best.fit))
     return best, rivals_of(best, others)
 
 
 def _closest(
-    current: Explanation, pairs: Sequence[tuple[CauseId, Signal]], steps: int, report: Report
+    runs: Problem,
+    current: Explanation,
+    pairs: Sequence[tuple[CauseId, Signal]],
+    steps: int,
+    report: Report,
 ) -> list[tuple[CauseId, EffectName, CoarseFit]]:
     """Causes, each with a look-alike that fits a few runs as well and its fit, best first."""
-    own = current.fit
-    few = own.problem.with_refinement().subset(POLICY.few_runs)
+    own, few = current.fit, runs.subset(POLICY.few_runs)
     usual = at_noise(few, own, own.noise, steps) if pairs else None
     least, found = usual.objective if usual else np.inf, []
     for cause, signal in pairs:

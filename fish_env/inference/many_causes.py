@@ -187,8 +187,11 @@ def challenged(
     close = _close(current, shown)
     pairs_of = (zip(current.causes, e.causes, strict=False) for e in rivals)
     earlier = [(a, b) for pairs in pairs_of for a, b in pairs if a != b]
-    first = [*_of_drive(current), *late(current), *replaced]
-    tried = [*first, *[*earlier, *each_in_turn(close)][: POLICY.most_substitutes]]
+    kinds = [*_of_drive(current), *late(current)]
+    tried = [*replaced, *[*earlier, *each_in_turn(close)][: POLICY.most_substitutes]]
+    # Where each run has a drive of its own, these are asked of estimates to be published.
+    uneven = current.fit.problem.drive.uneven
+    tried = [pair for pair in tried if pair not in kinds] if uneven else [*kinds, *tried]
     pairs = [(c, signals[n]) for c, n in dict.fromkeys(tried) if n in signals and c in known]
     best, *others = substituted(current, pairs, POLICY.most_challenges, report)
     apart = [in_parts(best, cause, report) for cause in best.causes]

@@ -174,12 +174,12 @@ def partly(
         found = without(found, doubtful) if doubtful else found
     if found is None or not found.causes:
         return attribution, verdict
-    # What is published was compared in the steps of a search, and is judged in usual ones.
-    finer = reached(partial(refined, found.fit))
-    found = replace(found, fit=finer) if finer else found
     found = decided(found, attribution.shown, report)
     if not found.causes:
         return attribution, verdict
+    # What is published was compared in the steps of a search.
+    finer = reached(partial(refined, found.fit))
+    found = replace(found, fit=finer) if finer else found
     rivals = tuple(e for e in attribution.rivals if len(e.causes) == len(found.causes))
     return replace(attribution, accepted=found, rivals=rivals), Verdict("partial", found.causes)
 

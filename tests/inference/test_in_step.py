@@ -8,7 +8,7 @@ import pytest
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.estimate.run_variation import RunVariation
 from fish_env.inference.explanation import Explanation
-from fish_env.inference.lookalikes import asked_again, decided
+from fish_env.inference.lookalikes import asked_of_rates, decided
 from fish_env.inference.probes import causes_of
 from fish_env.inference.problem import Point
 from fish_env.inference.screening import screen
@@ -91,14 +91,14 @@ def test_a_beat_takes_the_place_of_a_clock_in_step():
     stated = Beating(clock=0.1, reading=0.3)
     current, shown = explained(stated, CLOCK, DRAG, clock=0.1)
     current.fit.problem.drive = Drive({size_of(BEAT): 0.14}, uneven=True)
-    best, alike = asked_again(current, shown, [].append)
+    best, alike = asked_of_rates(current, shown, [].append)
     effects, misfit = next(begun for begun in stated.begun if size_of(BEAT) in begun[0])
     assert effects[size_of(BEAT)] == 0.14
     assert misfit < 2.0
     assert (best.causes, alike) == ((CLOCK, DRAG), ())
 
 
-@pytest.mark.parametrize("asked", [asked_again, decided])
+@pytest.mark.parametrize("asked", [asked_of_rates, decided])
 def test_a_rate_that_numbers_of_the_runs_explain_is_no_cause(asked):
     current, shown = explained(Beating(reading=3.0), CLOCK, DRAG)
     told = []
@@ -111,7 +111,7 @@ def test_a_rate_that_numbers_of_the_runs_explain_is_no_cause(asked):
 def test_a_single_cause_is_not_left_to_the_runs():
     current, shown = explained(Beating(reading=3.0), CLOCK)
     told = []
-    asked_again(current, shown, told.append)
+    asked_of_rates(current, shown, told.append)
     assert f"fitting without {CLOCK}" not in told
 
 
@@ -123,7 +123,7 @@ def test_a_cause_is_not_dropped_for_what_a_fit_gains_elsewhere():
     current = Explanation((CLOCK, DRAG), own)
     shown = screen(own, causes_of(stated), np.random.default_rng(0))
     told = []
-    best, _ = asked_again(current, shown, told.append)
+    best, _ = asked_of_rates(current, shown, told.append)
     assert told[:2] == [f"fitting without {CLOCK}", f"fitting with {CLOCK} again"]
     assert best.causes == (CLOCK, DRAG)
     assert best.fit.point.effects[size_of(DRAG)] == pytest.approx(0.5, abs=0.05)
@@ -132,5 +132,5 @@ def test_a_cause_is_not_dropped_for_what_a_fit_gains_elsewhere():
 def test_a_cause_is_not_left_to_runs_that_would_differ_by_more_than_ordinary_ones():
     """Of two and a half spreads in each of four runs the chance is 1e-4: it is one beat of all."""
     current, shown = explained(Beating(reading=0.3, beats=np.full(RUNS, 0.25)), CLOCK, DRAG)
-    best, _ = asked_again(current, shown, [].append)
+    best, _ = asked_of_rates(current, shown, [].append)
     assert best.causes == (BEAT, DRAG)

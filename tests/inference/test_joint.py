@@ -167,6 +167,34 @@ def test_a_whole_step_that_hardly_gains_does_not_end_the_steps():
     assert abs(vector[0]) < 0.5
 
 
+class Pulled(Differing):
+    """The likelihood has a term that no residual shows, as that of a filter's gains."""
+
+    middle, strength = 0.5, 100.0
+
+    def filtered(self, point, noise, near=()):
+        self.evaluated.append(float(point.z[0]))
+        own = self.strength * (point.z[0] - self.middle) ** 2
+        found = super().filtered(point, noise, near)
+        return [Evaluated(f.log_likelihood - own, f.residuals) for f in found]
+
+
+def test_the_minimum_is_known_by_two_points_where_slopes_miss_part_of_it():
+    """Slopes promise more there, and no damped step keeps it."""
+    problem = Pulled(truth=(2.0, 0.1, 0.1))
+    problem.y *= 0.01
+    problem.evaluated = []
+    at = 0.0
+    for _ in range(8):
+        _, vector, _, _, _ = descended(problem, iterations=8, start=at)
+        at = float(vector[0])
+    assert at < 1.9
+    problem.evaluated.clear()
+    _, vector, _, _, _ = descended(problem, iterations=8, start=at)
+    assert vector[0] == at
+    assert len(problem.evaluated) == 3
+
+
 def test_no_number_is_negative_that_cannot_be():
     problem = Differing(positive=True)
     assert (problem.true[:, 1] < -0.5).any()

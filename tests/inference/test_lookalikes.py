@@ -5,7 +5,14 @@ import pytest
 
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.explanation import Explanation
-from fish_env.inference.lookalikes import asked_again, decided, late, rates, undecided
+from fish_env.inference.lookalikes import (
+    asked_of_lags,
+    asked_of_rates,
+    decided,
+    late,
+    rates,
+    undecided,
+)
 from fish_env.inference.probes import causes_of
 from fish_env.inference.screening import screen
 from fish_env.inference.vehicle import Drive
@@ -57,13 +64,13 @@ def test_each_lag_is_compared_with_those_known_to_look_like_it():
 
 
 def test_the_lag_that_fits_best_takes_the_place_of_another():
-    best, alike = asked_again(*explained(problem(0.9), LIMIT), [].append)
+    best, alike = asked_of_lags(*explained(problem(0.9), LIMIT), [].append)
     assert best.causes == (LAG,)
     assert alike == ()
 
 
 def test_lags_that_fit_alike_are_rivals():
-    best, alike = asked_again(*explained(problem(1.0 - 1e-6), LAG), [].append)
+    best, alike = asked_of_lags(*explained(problem(1.0 - 1e-6), LAG), [].append)
     assert {best.causes, *(e.causes for e in alike)} == {(LAG,), (LIMIT,)}
 
 
@@ -79,7 +86,7 @@ def test_all_that_fit_alike_are_rivals():
     known = [effect(n, confusable_with=tuple({*names} - {n})) for n in names]
     stated = Stated(residuals, known)
     stated.hidden_by_drive, stated.drive = names, Drive(uneven=True)
-    best, alike = asked_again(*explained(stated, LAG), [].append)
+    best, alike = asked_of_lags(*explained(stated, LAG), [].append)
     assert {best.causes, *(e.causes for e in alike)} == {(name,) for name in names}
 
 
@@ -101,7 +108,7 @@ def test_a_lag_that_diverges_in_published_steps_leaves_its_place():
     long = problem(0.9)
     long.__class__ = LongSteps
     long.published = usual
-    best, alike = asked_again(*explained(long, LIMIT), [].append)
+    best, alike = asked_of_lags(*explained(long, LIMIT), [].append)
     assert best.causes == (LAG,)
     assert best.fit.problem is usual
     assert alike == ()
@@ -120,7 +127,7 @@ def test_rates_are_compared_too():
     current, _ = explained(of_rates(0.9), LIMIT)
     assert rates(current) == [(LIMIT, LAG)]
     assert late(current) == []
-    best, alike = asked_again(*explained(of_rates(0.9), LIMIT), [].append)
+    best, alike = asked_of_rates(*explained(of_rates(0.9), LIMIT), [].append)
     assert best.causes == (LAG,)
     assert alike == ()
 
@@ -137,7 +144,7 @@ def test_a_rate_takes_the_place_of_another_as_measured_or_at_its_size(measured, 
     current, shown = explained(stated, LAG)
     stated.drive = Drive(measured, uneven=True)
     begun.clear()
-    asked_again(current, shown, [].append)
+    asked_of_rates(current, shown, [].append)
     effects = next(effects for effects in begun if size_of(LIMIT) in effects)
     assert effects[size_of(LIMIT)] == pytest.approx(first, abs=0.05)
 

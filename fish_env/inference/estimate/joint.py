@@ -101,12 +101,13 @@ def descend_jointly(
     if not np.isfinite(at.value):
         raise np.linalg.LinAlgError("the simulation diverges at the start of the fit")
     at = _agreed(at, free, noise)
-    left, exact, first = iterations, True, 0
+    left, exact, first, kept = iterations, True, 0, 1.0
     model: _Model | None = None
     while left:
         model = _Model(slopes, at, None if exact else model)
         predicted = at.value - model.foreseen(*model.step(0.0))
-        if at.value - left * predicted > give_up_above:
+        # What promised more than it kept will do so again.
+        if at.value - left * kept * predicted > give_up_above:
             break
         better, used = None, first
         if predicted >= tolerance**2:
@@ -116,6 +117,8 @@ def descend_jointly(
             at = _agreed(better, free, noise)
         if exact and gained < max(ENOUGH, FORESEEN * predicted):
             break
+        if predicted > 0.0:
+            kept = min(max(gained / predicted, FORESEEN), 1.0)
         nearly_linear = gained > 0.0 and gained >= AS_PROMISED * predicted
         left -= int(exact or nearly_linear)
         first = max(used - 1, 0)
@@ -235,6 +238,7 @@ def _better(model: _Model, noise: Any, at: Joint, first: int) -> tuple[Joint | N
     """
     last = len(TRIALS) if model.exact else UNDAMPED
     best, used = at, first
+    lost: list[tuple[float, float]] = []
     for number in range(first, last):
         vector, own = model.step(*TRIALS[number])
         foreseen = at.value - model.foreseen(vector, own)
@@ -250,9 +254,28 @@ def _better(model: _Model, noise: Any, at: Joint, first: int) -> tuple[Joint | N
             best, used = tried, number
         elif best is not at:
             break
+        lost.append((TRIALS[number][1], tried.value - at.value))
+        if best is at and number + 1 == UNDAMPED and _most_gained(lost) < ENOUGH:
+            break  # it is the minimum, but for what slopes leave out: how gains change
         if best is not at and not (model.exact and at.value - best.value < FORESEEN * foreseen):
             break
     return (None if best is at else best), used
+
+
+def _most_gained(lost: Sequence[tuple[float, float]]) -> float:
+    """The most that a line gains, by the parabola through its begin and two points.
+
+    Args:
+        lost: share of the way along it, and what the objective rises by, of each point.
+    """
+    if len(lost) < 2 or not np.isfinite(lost).all():
+        return np.inf
+    (far, more), (near, less) = lost
+    curvature = (more / far - less / near) / (far - near)
+    slope = more / far - curvature * far
+    if curvature <= 0.0:
+        return np.inf
+    return slope**2 / (4.0 * curvature) if slope < 0.0 else 0.0
 
 
 def _with_own_steps(
@@ -260,7 +283,8 @@ def _with_own_steps(
 ) -> Joint:
     """Everything at a step, each run as far along its own part of it as its likelihood rises.
 
-    A run with a sharp corner stays, and does not hold back the others.
+    A run with a sharp corner stays, and does not hold back the others. Where most runs lose, it is
+    the step that is wrong.
 
     Args:
         model: about where the step begins.
@@ -273,7 +297,7 @@ def _with_own_steps(
     moved = at.problem.with_variation(model.numbers(own), point, noise, at.filtered)
     tried = _evaluated(moved, free, vector, noise)
     worse = np.flatnonzero(~(tried.of_runs < at.of_runs + ENOUGH)).tolist()
-    if not worse or not tried.filtered:
+    if not worse or not tried.filtered or 2 * len(worse) > at.problem.run_count:
         return tried
     chosen, filtered, values = own.copy(), list(tried.filtered), tried.of_runs.copy()
     for share in OWN_SHARES:

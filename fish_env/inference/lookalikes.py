@@ -99,10 +99,11 @@ def asked_of_lags(
         shown: causes that are not among them.
         report: told what is being done.
     """
-    runs = current.fit.problem
+    runs, pairs = current.fit.problem, _shown(late(current), shown)
     if runs.is_coarse(current.fit.point.effects):
         runs = runs.with_refinement()
-    pairs = _shown(late(current), shown)
+    else:
+        pairs = _within_reach(current.fit, pairs)
     best, rivals = _asked(runs, current, pairs, POLICY.swap_steps, report)
     if best is not current:
         best = Explanation(best.causes, finished(best.fit))
@@ -160,6 +161,26 @@ def _put_back(
     begin = CoarseFit(own.effects, own.released, Point(fitted.point.z, values), np.inf)
     again = _fitted(runs, fitted, cause, begin, POLICY.rate_steps, fitted.objective)
     return None if again is None else Explanation(before.causes, again)
+
+
+def _within_reach(
+    own: Fit, pairs: Sequence[tuple[CauseId, Signal]]
+) -> list[tuple[CauseId, Signal]]:
+    """Pairs whose look-alike makes up for most of what the cause explains, in a coarse fit.
+
+    That holds what runs differ in, and is given the leeway of one beside a misfit.
+
+    Args:
+        own: fit with the causes.
+        pairs: causes, each with the signal of what looks like it.
+    """
+    fitter, found = CoarseFitter(own), list[tuple[CauseId, Signal]]()
+    for cause, signal in pairs:
+        lack = max(POLICY.coarse_fit_leeway, what_may_lack(fitter, cause))
+        coarse = swapped(fitter, own, cause, signal, fitter.base + lack)
+        if coarse is not None and coarse.objective < fitter.base + lack:
+            found.append((cause, signal))
+    return found
 
 
 def _asked(

@@ -21,7 +21,7 @@ from fish_env.inference.adequacy import (
 from fish_env.inference.attribution import Attribution, attribute, extended
 from fish_env.inference.budget import Budget, error_budget
 from fish_env.inference.effort import FULL, Effort
-from fish_env.inference.estimate.again import finished, refined
+from fish_env.inference.estimate.again import finished, refined, to_search
 from fish_env.inference.estimate.fit import FEWER_STEPS, Fit, fit
 from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.gain import gap_closed
@@ -70,12 +70,15 @@ def refit_baseline(problem: Problem) -> Fit:
     """The refitted baseline.
 
     It is iterated to convergence unless its disturbance is at the limit: the misfit that causes
-    this is what comes next. A drive known to be out of step hides what the runs differ in; where
-    single runs differ in their drive, what else they differ in counts beside any misfit.
+    this is what comes next. A drive known to be out of step hides what the runs differ in, and its
+    baseline is one to search from; where single runs differ in their drive, what else they differ
+    in counts beside any misfit.
 
     Raises:
         LinAlgError: the simulation diverges with the nominal coefficients.
     """
+    if problem.drive.in_step:
+        problem = to_search(problem)
     own = fit(problem, rounds=2, iterations=FEWER_STEPS)
     if problem.drive.in_step and disturbance_at_limit(own):
         return own

@@ -14,12 +14,10 @@ from fish_env.inference.adequacy import disturbance_at_limit, implausible_estima
 from fish_env.inference.drive import beside_drive, drifting, measured, under_relaxed_noise
 from fish_env.inference.effort import FULL, Effort
 from fish_env.inference.elimination import backward_elimination, without_idle
-from fish_env.inference.estimate.again import to_publish
 from fish_env.inference.estimate.fit import Fit
-from fish_env.inference.explanation import Explanation, reached
+from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import CauseId, Coefficient
 from fish_env.inference.left_out import left_out_scores
-from fish_env.inference.lookalikes import asked_of_lags, asked_of_rates
 from fish_env.inference.many_causes import challenged, pursue
 from fish_env.inference.parallel import both, side_by_side
 from fish_env.inference.policy import POLICY
@@ -27,6 +25,7 @@ from fish_env.inference.preconditions import Precondition, preconditions
 from fish_env.inference.probes import Cause
 from fish_env.inference.problem import Problem
 from fish_env.inference.projection import Signal
+from fish_env.inference.publication import published
 from fish_env.inference.rivals import agreed, explained_away, rivals_of, tied
 from fish_env.inference.screening import Screen, screen
 from fish_env.inference.search import refits, restart_from_winner
@@ -105,8 +104,10 @@ def attribute(
         effort: how much to spend.
         report: told what is being done.
     """
-    usual = (causes, rng, effort, report)
-    return extended(_begun(problem, baseline, *usual), *usual)
+    # No unpacking: its tuple would keep the first screen, which takes much memory.
+    return extended(
+        _begun(problem, baseline, causes, rng, effort, report), causes, rng, effort, report
+    )
 
 
 def _begun(
@@ -128,7 +129,8 @@ def _begun(
         lambda: nothing.with_relaxed_noise if relax else None,
     )
     light = first.without_changes()
-    return Attribution(nothing, light, first, nothing, (), (), 0.0, preconditions=known)
+    shown = light if problem.drive.in_step else first  # the drive comes first, and asks for none
+    return Attribution(nothing, light, shown, nothing, (), (), 0.0, preconditions=known)
 
 
 def extended(
@@ -182,48 +184,13 @@ def settled(found: Attribution, thoroughly: bool, report: Callable[[str], None])
     alike: tuple[Explanation, ...] = ()
     # What else is missing moves estimates by more than a few steps more would.
     if current.causes and thoroughly and not disturbance_at_limit(current.fit):
-        if current.fit.problem.drive.uneven:
-            current, alike = _published_of_alike(current, found.shown, report)
-        else:
-            current = _published(current, report)
+        current, alike = published(current, found.shown, report)
     rivals = (*found.rivals, *unnecessary, *alike)
     if thoroughly and rivals:
         rivals = tuple(side_by_side([partial(without_idle, e) for e in rivals]))
     # A rival that contains the accepted causes is no rival once a cause is dropped.
     rivals = tuple(e for e in rivals if e.causes and not set(current.causes) <= set(e.causes))
     return replace(found, accepted=current, rivals=rivals, failed=failed)
-
-
-def _published(
-    current: Explanation, report: Callable[[str], None], judged: bool = False
-) -> Explanation:
-    """The explanation with converged estimates, and without causes that these do not need.
-
-    Args:
-        current: causes with their fit.
-        report: told what is being done.
-        judged: whether fits without each cause were just compared, in long steps.
-    """
-    report("iterating the estimates to convergence")
-    final = reached(partial(to_publish, current.fit))
-    if final is None:
-        return current
-    report("removing unnecessary causes")
-    return backward_elimination(Explanation(current.causes, final), judged)[0]
-
-
-def _published_of_alike(
-    current: Explanation, shown: Screen, report: Callable[[str], None]
-) -> tuple[Explanation, tuple[Explanation, ...]]:
-    """The same after causes were asked which of their kind they are, with those that do as well.
-
-    Where each run has a drive of its own fits take longest. So rates, which long steps get right,
-    are compared in these, and lags, which they do not, in the steps of published estimates.
-    """
-    current, rates = asked_of_rates(current, shown, report)
-    current = _published(current, report, judged=True)
-    best, lags = asked_of_lags(current, shown, report)
-    return best, (*rates, *lags) if best is current else lags
 
 
 @dataclass(frozen=True, eq=False)
@@ -250,9 +217,9 @@ class Search:
         Whatever else is wrong shows only once the drive is in step.
         """
         nothing = begun.accepted
-        accepted = None if nothing.causes else measured(nothing, self.report)
-        if accepted is None:
+        if nothing.causes or not nothing.fit.problem.drive.in_step:
             return begun
+        accepted = measured(nothing, self.report) or nothing
         after = screen(accepted.fit, self.causes, self.rng)
         return replace(
             begun, accepted=accepted, shown=after,

@@ -200,6 +200,7 @@ def fit(
             begun = problem.settled(free.unpack(vector), noise)
             slopes = Slopes(free, noise)
             if spread_of(begun, noise).any():
+                filtered = ()  # of other noise, and large
                 problem, vector, value, filtered, marginal = descend_jointly(
                     begun, slopes, vector, *limits
                 )
@@ -217,9 +218,7 @@ def fit(
             break
         report(f"fitting the noise, round {round_ + 1}")
         last = noise
-        followed = partial(_leverage, slopes, problem, vector, filtered)
-        point = free.unpack(vector)
-        noise = problem.fitted_noise(point, noise, round_ > 0, filtered, followed)
+        noise = _noise_of(slopes, problem, vector, filtered, round_ > 0)
         if last.is_close(noise, POLICY.same_noise):
             break
     if refit_noise:
@@ -278,6 +277,27 @@ def gauss_newton(
     limits = (free.bounds.beside(vector), iterations, tolerance, give_up_above)
     exactly, quickly = modelled(slopes.exact), modelled(slopes.quick)
     return descend(vector, evaluate, exactly, *limits, quickly=quickly)
+
+
+def _noise_of(
+    slopes: Slopes,
+    problem: Problem,
+    vector: FloatArray,
+    filtered: Sequence[Evaluation],
+    final: bool,
+) -> Any:
+    """The noise model that suits an evaluation.
+
+    Args:
+        slopes: under the noise model so far.
+        problem: the problem.
+        vector: (n,) where it was evaluated.
+        filtered: the evaluation.
+        final: whether the parameters are near their estimates.
+    """
+    followed = partial(_leverage, slopes, problem, vector, filtered)
+    point = slopes.free.unpack(vector)
+    return problem.fitted_noise(point, slopes.noise, final, filtered, followed)
 
 
 def _leverage(

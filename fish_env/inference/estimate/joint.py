@@ -115,6 +115,7 @@ def descend_jointly(
         gained = 0.0 if better is None else at.value - better.value
         if better is not None:
             at = _agreed(better, free, noise)
+        del better  # an evaluation takes much memory
         if exact and gained < max(ENOUGH, FORESEEN * predicted):
             break
         if predicted > 0.0:

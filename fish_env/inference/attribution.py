@@ -55,8 +55,8 @@ class Attribution:
 
     Attributes:
         baseline: refitted baseline.
-        first: screen of the baseline, without what the causes change.
-        shown: screen of the accepted explanation. Those between take much memory and tell no more.
+        first: screen of the baseline.
+        shown: screen of the accepted explanation.
         accepted: explanation of the last step (the baseline itself when nothing was added).
         rivals: explanations that fit as well as the accepted one.
         ranking: causes fitted in the first step, best first.
@@ -104,10 +104,8 @@ def attribute(
         effort: how much to spend.
         report: told what is being done.
     """
-    # No unpacking: its tuple would keep the first screen, which takes much memory.
-    return extended(
-        _begun(problem, baseline, causes, rng, effort, report), causes, rng, effort, report
-    )
+    usual = (causes, rng, effort, report)
+    return extended(_begun(problem, baseline, *usual), *usual)
 
 
 def _begun(
@@ -122,15 +120,14 @@ def _begun(
     nothing = Explanation((), baseline)
     relax = effort.retries and disturbance_at_limit(baseline) and not problem.drive.known
     report("screening causes")
-    first = screen(baseline, causes, rng)
+    first = screen(baseline, causes, rng, keep_changes=True)
     report("computing detectable sizes")
     known, _ = both(  # where the disturbance is at its limit, relaxed noise is tried in any case
         partial(preconditions, problem, first, causes, baseline if effort.retries else None),
         lambda: nothing.with_relaxed_noise if relax else None,
     )
     light = first.without_changes()
-    shown = light if problem.drive.in_step else first  # the drive comes first, and asks for none
-    return Attribution(nothing, light, shown, nothing, (), (), 0.0, preconditions=known)
+    return Attribution(nothing, light, light, nothing, (), (), 0.0, preconditions=known)
 
 
 def extended(
@@ -154,7 +151,6 @@ def extended(
     """
     search = Search(causes, rng, effort, report, relaxed_log_p)
     found, together = search.hidden(search.measured(begun)), effort.retries
-    del begun  # its screen takes much memory
     while len(found.accepted.causes) < POLICY.most_causes:
         if found.accepted.causes and together:
             found, together = search.together(found), False
@@ -217,9 +213,9 @@ class Search:
         Whatever else is wrong shows only once the drive is in step.
         """
         nothing = begun.accepted
-        if nothing.causes or not nothing.fit.problem.drive.in_step:
+        accepted = None if nothing.causes else measured(nothing, self.report)
+        if accepted is None:
             return begun
-        accepted = measured(nothing, self.report) or nothing
         after = screen(accepted.fit, self.causes, self.rng)
         return replace(
             begun, accepted=accepted, shown=after,

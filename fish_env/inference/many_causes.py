@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -136,8 +135,7 @@ def beside(current: Explanation, shown: Screen) -> Screen:
     left_out |= {s.cause.id for s in shown.signals if _limit(problem, s) in current.causes}
     if problem.drive.effects and problem.drive.effects <= {*current.causes}:
         left_out |= {*problem.out_of_step}
-    kept = tuple(s for s in shown.signals if s.cause.id not in left_out)
-    return replace(shown, signals=kept)
+    return shown.only(lambda signal: signal.cause.id not in left_out)
 
 
 def _limit(problem: Problem, signal: Signal) -> EffectName | None:

@@ -15,13 +15,12 @@ from functools import partial
 
 import numpy as np
 
-from fish_env.arrays import FloatArray, SingleArray
+from fish_env.arrays import FloatArray
 from fish_env.inference.adequacy import beyond_plausible, implausible_estimates
 from fish_env.inference.elimination import allowed_loss, insignificant, off_values
 from fish_env.inference.estimate.again import to_search
 from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
 from fish_env.inference.estimate.fit import FEWER_STEPS, Fit, fit
-from fish_env.inference.estimate.products import inner
 from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.hypotheses import CauseId, Coefficient, EffectName, listed
 from fish_env.inference.policy import POLICY
@@ -49,36 +48,6 @@ class Pick:
     size: FloatArray
 
 
-@dataclass(frozen=True, eq=False)
-class Rows:
-    """What a signal changes in the residuals, and how it pulls coefficients from their priors.
-
-    Attributes:
-        left: (D, m) change of the residuals after a refit.
-        pull: (n, m) of the coefficients, in units of their prior.
-    """
-
-    left: FloatArray | SingleArray
-    pull: FloatArray
-
-    def times(self, other: Rows) -> FloatArray:
-        """Inner products (m, k) of all columns with those of another signal."""
-        return np.asarray(inner(self.left, other.left) + self.pull.T @ other.pull)
-
-    def orthogonal(self, directions: Sequence[Rows], root: FloatArray) -> Rows:
-        """Orthonormal columns of what orthonormal directions leave of this signal.
-
-        Args:
-            directions: orthonormal, and to each other.
-            root: (m, m) inverse square root of what is left.
-        """
-        left, pull = self.left, self.pull
-        for one in directions:
-            shared = one.times(self)
-            left, pull = left - one.left @ shared, pull - one.pull @ shared
-        return Rows(left @ root, pull @ root)
-
-
 def picked(
     projector: Projector, shown: Screen, most: int, least: float = 0.0, relaxed_log_p: float = 0.0
 ) -> list[Pick]:
@@ -91,33 +60,53 @@ def picked(
         least: statistic below which a simulation error explains an effect.
         relaxed_log_p: added to the log p-value that makes an effect significant.
     """
-    candidates = [s for s in shown.signals if s.cause.is_effect and s.followed is not None]
-    weight = np.sqrt(projector.prior)[:, None]
-    rows = [Rows(s.left, weight * np.asarray(s.followed)) for s in candidates]
-    score = [s.score.copy() for s in candidates]
-    info = [s.projected.copy() for s in candidates]
-    chosen: list[tuple[int, float]] = []
-    directions: list[Rows] = []
+    candidates, whole, score = _system(projector, shown)
+    info, left = whole, score
+    chosen: list[tuple[Signal, slice, float]] = []
     while len(chosen) < most:
-        taken = {candidates[i].cause.id for i, _ in chosen}
+        taken = {s.cause.id for s, _, _ in chosen}
         tests = [
-            (_log_p(score[i], info[i], s, least), i)
-            for i, s in enumerate(candidates)
-            if s.cause.id not in taken and _independent(info[i], s.projected)
+            (_log_p(left[part], info[part, part], s, least), i)
+            for i, (s, part) in enumerate(candidates)
+            if s.cause.id not in taken and _independent(info[part, part], s.projected)
         ]
         log_p, best = min(tests, default=(np.inf, -1))
         if log_p >= shown.threshold + relaxed_log_p:
             break
-        chosen.append((best, log_p))
-        # What the pick leaves of all others: one step of a block Cholesky factorisation.
-        root = np.linalg.inv(np.linalg.cholesky(info[best])).T
-        basis, pull = rows[best].orthogonal(directions, root), root.T @ score[best]
-        directions.append(basis)
-        for i, row in enumerate(rows):
-            shared = basis.times(row)
-            info[i] = info[i] - shared.T @ shared
-            score[i] = score[i] - shared.T @ pull
-    return _sized([(candidates[i], rows[i], log_p) for i, log_p in chosen])
+        signal, part = candidates[best]
+        chosen.append((signal, part, log_p))
+        # What the pick leaves of all others: one step of a block elimination.
+        along = np.linalg.solve(info[part, part], info[part])
+        left = left - along.T @ left[part]
+        info = info - along.T @ info[part]
+    return _sized(chosen, whole, score)
+
+
+def _system(
+    projector: Projector, shown: Screen
+) -> tuple[list[tuple[Signal, slice]], FloatArray, FloatArray]:
+    """Effects, each with its columns, and information (N, N) and score (N,) of all columns.
+
+    Args:
+        projector: of the fit that was screened.
+        shown: all causes against it.
+    """
+    own = [
+        (s, np.asarray(s.followed), mine)
+        for s, mine in zip(shown.signals, shown.columns(), strict=True)
+        if s.cause.is_effect and s.followed is not None
+    ]
+    none = np.zeros((len(projector.prior), 0))
+    at = np.concatenate([np.zeros(0, int), *(mine for _, _, mine in own)])
+    score = np.concatenate([np.zeros(0), *(s.score for s, _, _ in own)])
+    pull = np.sqrt(projector.prior)[:, None] * np.hstack([none, *(f for _, f, _ in own)])
+    whole = shown.products[np.ix_(at, at)] + pull.T @ pull
+    candidates, first = [], 0
+    for signal, _, mine in own:
+        part = slice(first, first := first + len(mine))
+        whole[part, part] = signal.projected
+        candidates.append((signal, part))
+    return candidates, whole, score
 
 
 def _log_p(score: FloatArray, info: FloatArray, signal: Signal, least: float) -> float:
@@ -125,13 +114,21 @@ def _log_p(score: FloatArray, info: FloatArray, signal: Signal, least: float) ->
     return float(chi2_log_tail(statistic, signal.freedom)) if statistic >= least else np.inf
 
 
-def _sized(chosen: Sequence[tuple[Signal, Rows, float]]) -> list[Pick]:
-    """Picks with the sizes that all of them together have."""
+def _sized(
+    chosen: Sequence[tuple[Signal, slice, float]], whole: FloatArray, score: FloatArray
+) -> list[Pick]:
+    """Picks with the sizes that all of them together have.
+
+    Args:
+        chosen: signal, its columns, and log p-value of each pick.
+        whole: (N, N) information about all columns.
+        score: (N,) of all columns.
+    """
     if not chosen:
         return []
-    score = np.concatenate([signal.score for signal, _, _ in chosen])
-    whole = np.block([[one.times(other) for _, other, _ in chosen] for _, one, _ in chosen])
-    sizes = np.linalg.solve(whole + 1e-9 * np.diag(np.diag(whole)), score)
+    at = np.concatenate([np.arange(part.start, part.stop) for _, part, _ in chosen])
+    info = whole[np.ix_(at, at)]
+    sizes = np.linalg.solve(info + 1e-9 * np.diag(np.diag(info)), score[at])
     ends = np.cumsum([signal.freedom for signal, _, _ in chosen])[:-1]
     parts = np.split(sizes, ends)
     return [Pick(s, log_p, size) for (s, _, log_p), size in zip(chosen, parts, strict=True)]

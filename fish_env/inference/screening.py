@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fish_env.arrays import FloatArray
+from fish_env.arrays import FloatArray, IntArray
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.free import diverged
 from fish_env.inference.estimate.products import gram, inner
@@ -40,16 +40,32 @@ class Screen:
         threshold: log p-value that the smallest one falls below by chance in ``level`` of data
             sets without an effect.
         level: family-wise error rate.
+        products: (m, m) inner products of what the settings of all effects change, after a refit;
+            settings in the order of the signals.
     """
 
     signals: tuple[Signal, ...]
     threshold: float
     level: float
+    products: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
 
     def without_changes(self) -> Screen:
         """The same tests without what each cause changes, which takes nearly all memory."""
         signals = tuple(replace(signal, left=signal.left[:0].copy()) for signal in self.signals)
         return replace(self, signals=signals)
+
+    def columns(self) -> list[IntArray]:
+        """Where each signal is among the settings of all effects; nowhere, for a coefficient."""
+        ends = np.cumsum([_settings(signal) for signal in self.signals]).tolist()
+        return [np.arange(a, b) for a, b in zip([0, *ends], ends, strict=False)]
+
+    def only(self, kept: Callable[[Signal], bool]) -> Screen:
+        """The tests of some signals."""
+        chosen = [kept(signal) for signal in self.signals]
+        signals = tuple(s for s, keep in zip(self.signals, chosen, strict=True) if keep)
+        columns = [c for c, keep in zip(self.columns(), chosen, strict=True) if keep]
+        at = np.concatenate([np.zeros(0, int), *columns])
+        return replace(self, signals=signals, products=self.products[np.ix_(at, at)])
 
     def best(self) -> list[Signal]:
         """The best alternative of each cause, most significant first."""
@@ -60,8 +76,17 @@ class Screen:
         return {signal.cause.id: signal for signal in self.best() if signal.cause.is_effect}
 
 
+def _settings(signal: Signal) -> int:
+    """Settings of an effect; none of a coefficient."""
+    return signal.freedom if signal.probe >= 0 else 0
+
+
 def screen(
-    fit: Fit, causes: Sequence[Cause], rng: np.random.Generator, level: float = POLICY.screen_level
+    fit: Fit,
+    causes: Sequence[Cause],
+    rng: np.random.Generator,
+    level: float = POLICY.screen_level,
+    keep_changes: bool = False,
 ) -> Screen:
     """Test every cause against a fit.
 
@@ -70,6 +95,8 @@ def screen(
         causes: what to test; causes already in the fit are left out.
         rng: for the null distribution of the smallest p-value.
         level: family-wise error rate.
+        keep_changes: whether the signals keep what each cause changes, which takes much memory;
+            their products are kept in any case.
     """
     fit = fit.extrapolated
     projector = Projector(fit)
@@ -79,8 +106,10 @@ def screen(
         *_effect_signals(fit, projector, tested),
         *_coefficient_signals(projector, tested, fit),
     ]
-    threshold = null_threshold(signals, rng, level, fit.problem.noise_freedom(fit))
-    return Screen(tuple(signals), threshold, level)
+    products = gram([s.left for s in signals if _settings(s)])
+    threshold = null_threshold(signals, rng, level, fit.problem.noise_freedom(fit), products)
+    found = Screen(tuple(signals), threshold, level, products)
+    return found if keep_changes else found.without_changes()
 
 
 def zoomed(fit: Fit, signal: Signal) -> Signal:
@@ -242,6 +271,7 @@ def null_threshold(
     rng: np.random.Generator,
     level: float,
     freedom: float = np.inf,
+    products: FloatArray | None = None,
 ) -> float:
     """Log p-value below which the smallest of all falls by chance with probability ``level``.
 
@@ -253,13 +283,14 @@ def null_threshold(
         rng: for the draws.
         level: family-wise error rate.
         freedom: independent residuals that the size of the noise is estimated from.
+        products: (m, m) of what the settings of all effects change, where they are known.
     """
-    effects = [s for s in signals if s.probe >= 0]
+    effects = [s for s in signals if _settings(s)]
     smallest = np.zeros(POLICY.null_draws)
     size = rng.chisquare(freedom, POLICY.null_draws) / freedom if np.isfinite(freedom) else 1.0
     largest: dict[int, FloatArray] = {}  # statistic of as many degrees of freedom
     if effects:
-        products = gram([s.left for s in effects])
+        products = gram([s.left for s in effects]) if products is None else products
         scale = np.sqrt(np.diag(products))
         correlation = products / np.outer(scale, scale)
         values, vectors = np.linalg.eigh(correlation)

@@ -66,7 +66,7 @@ def screened(dataset: Dataset, seed: int) -> tuple[Fit, Screen]:
     """The refitted baseline and the screen of all causes, on the runs a diagnosis would fit."""
     baseline = fit(SeriesProblem(dataset, None, fitted_and_final(dataset, seed)[0]), rounds=2)
     causes = causes_of(baseline.problem)
-    return baseline, screen(baseline, causes, np.random.default_rng(seed))
+    return baseline, screen(baseline, causes, np.random.default_rng(seed), keep_changes=True)
 
 
 def without_effect(design: int, noise: str) -> dict[str, Any]:

@@ -33,7 +33,7 @@ def problem(nothing_up_to=NOTHING_UP_TO, reach=1.0):
 
 def screened(stated):
     base = fit(stated, [])
-    return base, screen(base, causes_of(stated), np.random.default_rng(0))
+    return base, screen(base, causes_of(stated), np.random.default_rng(0), keep_changes=True)
 
 
 def test_no_usual_probe_shows_the_surface():

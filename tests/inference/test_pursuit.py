@@ -42,7 +42,9 @@ def problem(seed: int = 3) -> BoatProblem:
 @cache
 def screened() -> tuple[Fit, Screen]:
     baseline = fit(problem())
-    return baseline, screen(baseline, causes_of(problem()), np.random.default_rng(0))
+    return baseline, screen(
+        baseline, causes_of(problem()), np.random.default_rng(0), keep_changes=True
+    )
 
 
 def test_all_hidden_effects_are_picked_in_the_linear_model():

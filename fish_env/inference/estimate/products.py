@@ -52,6 +52,8 @@ def gram(parts: Sequence[FloatArray | SingleArray]) -> FloatArray:
     Args:
         parts: (D, k) each.
     """
+    if not parts:
+        return np.zeros((0, 0))
     firsts = range(0, len(parts[0]), TOGETHER)
     halves = [firsts[: len(firsts) // 2], firsts[len(firsts) // 2 :]]
     return sum(side_by_side([partial(_gram_of_rows, parts, half) for half in halves]), np.zeros(1))

@@ -69,6 +69,14 @@ def test_the_lag_that_fits_best_takes_the_place_of_another():
     assert alike == ()
 
 
+@pytest.mark.parametrize(("share", "fitted"), [(0.9, True), (0.5, False)], ids=["near", "far"])
+def test_a_lag_that_explains_much_less_is_not_fitted(share, fitted):
+    told = []
+    best, alike = asked_of_lags(*explained(problem(share), LAG), told.append)
+    assert (best.causes, alike) == ((LAG,), ())
+    assert (f"trying {LIMIT} instead of {LAG}" in told) == fitted
+
+
 def test_lags_that_fit_alike_are_rivals():
     best, alike = asked_of_lags(*explained(problem(1.0 - 1e-6), LAG), [].append)
     assert {best.causes, *(e.causes for e in alike)} == {(LAG,), (LIMIT,)}

@@ -73,6 +73,20 @@ def test_each_pick_explains_what_the_whole_normal_equations_say():
     assert two.log_p == pytest.approx(float(expected), rel=1e-3)
 
 
+def test_a_screen_knows_the_products_of_its_signals_without_these():
+    baseline, shown = screened()
+    kept = shown.only(lambda signal: signal.cause.id in NAMES)
+    rows = np.hstack([s.left for s in kept.signals])
+    assert {s.cause.id for s in kept.signals} == NAMES
+    assert kept.products == pytest.approx(rows.T @ rows, rel=1e-4, abs=1e-4)
+    light = shown.without_changes()
+    assert sum(s.left.size for s in light.signals) == 0
+    projector = Projector(baseline)
+    for few, whole in zip(picked(projector, light, 8), picked(projector, shown, 8), strict=True):
+        assert few.signal.cause == whole.signal.cause
+        assert few.log_p == whole.log_p
+
+
 def test_effects_are_found_together_and_nothing_else():
     baseline, shown = screened()
     found = pursued(Explanation((), baseline), shown, silent)

@@ -135,23 +135,20 @@ def _without_what_runs_explain(current: Explanation, report: Report) -> Explanat
             continue
         report(f"fitting without {name_of(cause)}")
         enough = own.objective + POLICY.evidence_doubt + current.narrowed_by((cause,))
-        runs = own.problem
         begin = without_causes(own, (cause,))
-        fitted = _fitted(runs, own, cause, begin, POLICY.rate_steps, enough)
+        fitted = _fitted(own.problem, own, cause, begin, POLICY.rate_steps, enough)
         if fitted is None or surprising_runs(fitted, cause):
             continue
         without = Explanation(tuple(c for c in current.causes if c != cause), fitted)
         if without.score < current.score + POLICY.evidence_doubt:
             report(f"fitting with {name_of(cause)} again")
-            again = _put_back(runs, current, cause, fitted)
+            again = _put_back(current, cause, fitted)
             better = again is not None and again.score < without.score - POLICY.evidence_doubt
             current = again if again is not None and better else without
     return current
 
 
-def _put_back(
-    runs: Problem, before: Explanation, cause: CauseId, fitted: Fit
-) -> Explanation | None:
+def _put_back(before: Explanation, cause: CauseId, fitted: Fit) -> Explanation | None:
     """The explanation with a cause again, from where the fit without it has ended.
 
     That fit may have gained by what has nothing to do with the cause.
@@ -159,7 +156,7 @@ def _put_back(
     own = before.fit
     values = {**fitted.point.effects, **of_effects(own.point.effects, {str(cause)})}
     begin = CoarseFit(own.effects, own.released, Point(fitted.point.z, values), np.inf)
-    again = _fitted(runs, fitted, cause, begin, POLICY.rate_steps, fitted.objective)
+    again = _fitted(own.problem, fitted, cause, begin, POLICY.rate_steps, fitted.objective)
     return None if again is None else Explanation(before.causes, again)
 
 
@@ -174,13 +171,25 @@ def _within_reach(
         own: fit with the causes.
         pairs: causes, each with the signal of what looks like it.
     """
-    fitter, found = CoarseFitter(own), list[tuple[CauseId, Signal]]()
-    for cause, signal in pairs:
-        lack = max(POLICY.coarse_fit_leeway, what_may_lack(fitter, cause))
-        coarse = swapped(fitter, own, cause, signal, fitter.base + lack)
-        if coarse is not None and coarse.objective < fitter.base + lack:
-            found.append((cause, signal))
-    return found
+    fitter = CoarseFitter(own)
+    lack = _lacks(fitter, pairs)
+    return [
+        (cause, signal)
+        for cause, signal in pairs
+        if _replaces(fitter, cause, signal, max(POLICY.coarse_fit_leeway, lack[cause]))
+    ]
+
+
+def _lacks(fitter: CoarseFitter, pairs: Sequence[tuple[CauseId, Signal]]) -> dict[CauseId, float]:
+    """Of each cause, what a fit with a look-alike in its place may lack."""
+    return {cause: what_may_lack(fitter, cause) for cause in dict.fromkeys(c for c, _ in pairs)}
+
+
+def _replaces(fitter: CoarseFitter, cause: CauseId, signal: Signal, lack: float) -> bool:
+    """Whether a look-alike in a cause's place explains as much but for what it may lack."""
+    enough = fitter.base + lack
+    coarse = swapped(fitter, fitter.fit, cause, signal, enough)
+    return coarse is not None and coarse.objective < enough
 
 
 def _asked(
@@ -261,14 +270,11 @@ def undecided(current: Explanation, shown: Screen, report: Report) -> frozenset[
         shown: causes that are not among them.
         report: told what is dropped and why.
     """
-    own, found = current.fit, set[CauseId]()
-    fitter = CoarseFitter(own)
-    for cause, signal in _shown(late(current), shown):
-        if cause in found:
-            continue
-        enough = fitter.base + what_may_lack(fitter, cause)
-        coarse = swapped(fitter, own, cause, signal, enough)
-        if coarse is not None and coarse.objective < enough:
+    found, fitter = set[CauseId](), CoarseFitter(current.fit)
+    pairs = _shown(late(current), shown)
+    lack = _lacks(fitter, pairs)
+    for cause, signal in pairs:
+        if cause not in found and _replaces(fitter, cause, signal, lack[cause]):
             other = signal.cause.effect
             report(f"rejecting {name_of(cause)}: {other} explains nearly as much in its place")
             found.add(cause)

@@ -91,22 +91,15 @@ def _system(
         projector: of the fit that was screened.
         shown: all causes against it.
     """
-    own = [
-        (s, np.asarray(s.followed), mine)
-        for s, mine in zip(shown.signals, shown.columns(), strict=True)
-        if s.cause.is_effect and s.followed is not None
-    ]
+    own = shown.only(lambda s: s.cause.is_effect and s.followed is not None)
+    candidates = list(zip(own.signals, own.columns(), strict=True))
     none = np.zeros((len(projector.prior), 0))
-    at = np.concatenate([np.zeros(0, int), *(mine for _, _, mine in own)])
-    score = np.concatenate([np.zeros(0), *(s.score for s, _, _ in own)])
-    pull = np.sqrt(projector.prior)[:, None] * np.hstack([none, *(f for _, f, _ in own)])
-    whole = shown.products[np.ix_(at, at)] + pull.T @ pull
-    candidates, first = [], 0
-    for signal, _, mine in own:
-        part = slice(first, first := first + len(mine))
+    followed = np.hstack([none, *(np.asarray(s.followed) for s in own.signals)])
+    pull = np.sqrt(projector.prior)[:, None] * followed
+    whole = own.products + pull.T @ pull
+    for signal, part in candidates:
         whole[part, part] = signal.projected
-        candidates.append((signal, part))
-    return candidates, whole, score
+    return candidates, whole, np.concatenate([np.zeros(0), *(s.score for s in own.signals)])
 
 
 def _log_p(score: FloatArray, info: FloatArray, signal: Signal, least: float) -> float:

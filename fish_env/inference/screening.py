@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from fish_env.arrays import FloatArray, IntArray
+from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.free import diverged
 from fish_env.inference.estimate.products import gram, inner
@@ -54,17 +54,16 @@ class Screen:
         signals = tuple(replace(signal, left=signal.left[:0].copy()) for signal in self.signals)
         return replace(self, signals=signals)
 
-    def columns(self) -> list[IntArray]:
+    def columns(self) -> list[slice]:
         """Where each signal is among the settings of all effects; nowhere, for a coefficient."""
         ends = np.cumsum([_settings(signal) for signal in self.signals]).tolist()
-        return [np.arange(a, b) for a, b in zip([0, *ends], ends, strict=False)]
+        return [slice(a, b) for a, b in zip([0, *ends], ends, strict=False)]
 
     def only(self, kept: Callable[[Signal], bool]) -> Screen:
         """The tests of some signals."""
-        chosen = [kept(signal) for signal in self.signals]
+        chosen = np.array([kept(signal) for signal in self.signals], bool)
+        at = np.repeat(chosen, [_settings(signal) for signal in self.signals])
         signals = tuple(s for s, keep in zip(self.signals, chosen, strict=True) if keep)
-        columns = [c for c, keep in zip(self.columns(), chosen, strict=True) if keep]
-        at = np.concatenate([np.zeros(0, int), *columns])
         return replace(self, signals=signals, products=self.products[np.ix_(at, at)])
 
     def best(self) -> list[Signal]:

@@ -14,6 +14,7 @@ from fish_env.arrays import FloatArray, IntArray
 from fish_env.effects.extended import ExtendedModel
 from fish_env.identification.channels import codes_of
 from fish_env.identification.filter_kernels import filter_kernels, replay_kernels
+from fish_env.identification.first_state import POSITIONS, told_at_start, undo_geometry
 from fish_env.identification.jitter import channel_rates
 from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.noise_scoring import Replayed
@@ -23,21 +24,19 @@ from fish_env.identification.variation import (
     START,
     varied_bias,
     varied_delay,
+    varied_gain,
+    varied_geometry,
     varied_records,
 )
 from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.model.history import history_rows
 from fish_env.model.state import BASE_STATES
 from fish_env.rigidbody.kinematics import turned
-from fish_env.sensing.channels import channels_from_states
 from fish_env.sensing.devices import Device
-from fish_env.sensing.geometry import lens_of, through_geometry
+from fish_env.sensing.geometry import lens_of
 from fish_env.threads import default_threads
 
-POSITIONS = {"x": 0, "y": 1, "z": 2}
 TAIL_PHASE = 13  # row of the state
-CORRECTIONS = 4
-"""Each leaves a tenth or less of the error of a start."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +136,13 @@ class Measurement:
         bias = np.ascontiguousarray(varied_bias(self.bias, own, channels))
         delay, ages = varied_delay(self.delay, own), run.ages(own)
         ages = ages if self.ages is None else self.ages + ages
-        return replace(self, delay=delay, bias=bias, ages=ages)
+        moved = replace(self, delay=delay, bias=bias, ages=ages)
+        errors = run.sensor_errors
+        if not errors.any():
+            return moved
+        gain = varied_gain(self.gain, errors, channels)
+        geometry = varied_geometry(self.geometry, errors, len(self.pace))
+        return replace(moved, gain=gain, geometry=geometry)
 
 
 Job = tuple[RunData, "Filtered", int, FloatArray, FloatArray, Measurement, FloatArray, int, int]
@@ -193,19 +198,9 @@ class RunFilter:
             elif name == "yaw":
                 states[3:7] = turned(states[3:7], -bias)
         if data.as_measured and measurement.geometry:
-            self._undo_geometry(states, measurement.geometry)
+            told = [name for name in told_at_start(data.swimming) if name in self.channels]
+            undo_geometry(states, measurement.geometry, told)
         return states
-
-    def _undo_geometry(self, states: FloatArray, geometry: Mapping[str, FloatArray]) -> None:
-        """Turn place and heading that sensors of a geometry show into true ones, in place."""
-        told = channels_from_states(states.copy())
-        for _ in range(CORRECTIONS):
-            seen = through_geometry(channels_from_states(states), geometry)
-            for name, row in POSITIONS.items():
-                if name in self.channels:
-                    states[row] += told[name] - seen[name]
-            if "yaw" in self.channels:
-                states[3:7] = turned(states[3:7], told["yaw"] - seen["yaw"])
 
     def _of_run(
         self,
@@ -216,7 +211,7 @@ class RunFilter:
     ) -> tuple[FloatArray, Measurement]:
         """Records and sensors of all lanes as a run's own numbers, and more of them, make them."""
         own = data.variation[:, None] if more is None else data.variation[:, None] + more
-        if not own.any() and not data.moved.any():
+        if not own.any() and not data.sensor_errors.any() and not data.moved.any():
             return records, sensors
         varied = np.ascontiguousarray(varied_records(records, own, self.wave_row))
         return varied, sensors.of_run(data, own, self.channels)

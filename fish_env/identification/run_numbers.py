@@ -17,7 +17,7 @@ from fish_env.identification.filtering import Filtered, Measurement
 from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.runs import RunData
 from fish_env.identification.sensor_errors import known_slopes
-from fish_env.identification.variation import VARIATIONS
+from fish_env.identification.variation import IN_SAMPLES, VARIATIONS
 from fish_env.inference.problem import Point
 
 MOST_TURNS, AGREED = 6, 0.05
@@ -100,7 +100,7 @@ def renumbered(
         if not np.array_equal(_numbers([run])[0], values[i]):
             changed.append(i)
             runs[i] = run.with_numbers(own[i], errors[i])
-    if not errors[changed].any():
+    if not errors[changed][:, IN_SAMPLES].any():
         return runs
     moved, seen = [runs[i] for i in changed], [problem.runs[i] for i in changed]
     for _ in range(MOST_TURNS):
@@ -124,7 +124,7 @@ def _undone(run: RunData, seen: RunData, filtered: Filtered, channels: Sequence[
         channels: names of its channels.
     """
     slopes = known_slopes(seen, filtered, channels)
-    return replace(run, distortion=np.asarray(slopes @ run.sensor_errors))
+    return replace(run, distortion=_in_samples(slopes, run.sensor_errors))
 
 
 def _moved(run: RunData, seen: RunData, filtered: Filtered, channels: Sequence[str]) -> RunData:
@@ -137,8 +137,13 @@ def _moved(run: RunData, seen: RunData, filtered: Filtered, channels: Sequence[s
         channels: names of its channels.
     """
     slopes = known_slopes(seen, filtered, channels)
-    change = slopes @ (run.sensor_errors - seen.sensor_errors)
+    change = _in_samples(slopes, run.sensor_errors - seen.sensor_errors)
     return replace(run, distortion=change if seen.distortion is None else seen.distortion + change)
+
+
+def _in_samples(slopes: FloatArray, errors: FloatArray) -> FloatArray:
+    """What errors (K,) with slopes (T, C, K) do to samples (T, C) beside what the filter knows."""
+    return np.asarray(slopes[:, :, IN_SAMPLES] @ errors[IN_SAMPLES])
 
 
 def _numbers(runs: Sequence[RunData]) -> FloatArray:

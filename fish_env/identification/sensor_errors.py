@@ -4,7 +4,8 @@ A marker sits beside the origin, an inertial unit is screwed on a little askew, 
 the heading, a camera looks down at an angle and into water. Each is linear in one number, with
 regressors that follow from the filtered motion. So no fish has to swim again to see what it does:
 the filter's own slopes carry a change of the measurements through to its innovations. Errors that
-are known are taken off the samples, and the regressors are then those of the corrected motion.
+are known are part of what the filter's sensors show, but for a few that a state cannot tell: these
+are taken off the samples, and the regressors are then those of the corrected motion.
 """
 
 from __future__ import annotations
@@ -22,13 +23,15 @@ from scipy.signal import butter, sosfilt
 from fish_env.arrays import FloatArray
 from fish_env.identification.channels import BY_NAME
 from fish_env.identification.filtering import Filtered, Slopes
+from fish_env.identification.first_state import told_at_start
 from fish_env.identification.runs import RunData
 from fish_env.identification.state_blocks import N_ERROR, N_MOVING, columns
-from fish_env.identification.variation import SENSOR_ERRORS
+from fish_env.identification.variation import IN_SAMPLES, SENSOR_ERRORS
 from fish_env.identification.variation_slopes import leave_diverged
 from fish_env.model.frames import euler_from_quaternion
 from fish_env.rigidbody.kinematics import euler_rates, rotations
 from fish_env.sensing.devices import devices_of, has_inertial_unit
+from fish_env.sensing.geometry import CALIBRATED_DEPTH
 
 CUTOFF_HZ, FINE_S = 5.0, 0.004
 """Usual low-pass of an inertial unit, and steps in which it is computed (s)."""
@@ -79,7 +82,7 @@ def _put_mounting(found: FloatArray, at: dict[str, int], motion: _Motion) -> Non
     """What markers and an inertial unit show that sit aside or askew, or have another gain."""
     turns, kinematics = rotations(motion.euler), euler_rates(motion.euler)
     for k, axis in enumerate(_PLACE):
-        for j, name in enumerate(_PLACE):
+        for j, name in enumerate(("x", "y")):
             _put(found, at, name, f"marker_{axis}", turns[:, j, k])
     for k, angle in enumerate(_ATTITUDE):
         for j, name in enumerate(_ATTITUDE):
@@ -103,10 +106,11 @@ def _put_camera(found: FloatArray, at: dict[str, int], motion: _Motion) -> None:
         for j, speed in enumerate("uvw"):
             _put(found, at, speed, name, turns[:, k, j])
     depth = motion.place[:, 2]
-    _put(found, at, "x", "camera_pitch", depth)
-    _put(found, at, "y", "camera_roll", -depth)
+    _put(found, at, "x", "camera_pitch", -depth)
+    _put(found, at, "y", "camera_roll", depth)
+    higher = CALIBRATED_DEPTH - np.maximum(depth, 0.0)
     for j, name in enumerate(("x", "y")):
-        _put(found, at, name, "camera_scale_per_depth", -motion.place[:, j] * depth)
+        _put(found, at, name, "camera_scale_per_depth", motion.place[:, j] * higher)
 
 
 def _absent(channels: Sequence[str]) -> list[str]:
@@ -125,7 +129,7 @@ class _Motion:
 
     Attributes:
         clock: (T,) times (s).
-        place: (T, 3) from where the run begins (m).
+        place: (T, 3) (m).
         euler: (T, 3) angles.
         rates: (T, 3) of the body.
         slopes: rate of change (T, 3) of each of these.
@@ -216,10 +220,9 @@ def _predicted(clock: FloatArray, filtered: Filtered) -> _Motion:
         np.einsum("tij,tj->ti", kinematics, rates),
         _slope_at_end(clock, states, filtered.states),
     )
-    place = states[:, :3] - states[0, :3]
-    if not all(np.isfinite(part).all() for part in (place, euler, rates, *change)):
+    if not all(np.isfinite(part).all() for part in (states[:, :3], euler, rates, *change)):
         raise np.linalg.LinAlgError("the simulation diverges, and shows no sensor errors")
-    return _Motion(clock, place, euler, rates, change)
+    return _Motion(clock, states[:, :3], euler, rates, change)
 
 
 def _slope_at_end(clock: FloatArray, predicted: FloatArray, filtered: FloatArray) -> FloatArray:
@@ -273,16 +276,36 @@ def slopes_of_runs(
         channels: names of their channels.
         correlation_s: of the disturbance that they were filtered with (s).
     """
-    parts = [
-        innovation_slopes(
-            run.clock, run.measured, one, correlation_s,
-            known_slopes(run, one, channels),
-        )
-        for run, one in zip(runs, filtered, strict=True)
-    ]  # fmt: skip
+    parts = []
+    for run, one in zip(runs, filtered, strict=True):
+        changes = known_slopes(run, one, channels)
+        begun = _shown_start(run, changes[0], channels)
+        parts.append(innovation_slopes(run.clock, run.measured, one, correlation_s, changes, begun))
     for part in parts:
         leave_diverged(part)
     return np.concatenate(parts)
+
+
+def _shown_start(run: RunData, changes: FloatArray, channels: Sequence[str]) -> FloatArray:
+    """Change of the state that a run begins in by what geometry does to its first sample (19, K).
+
+    Args:
+        run: the run.
+        changes: (C, K) of the first sample.
+        channels: names of the channels.
+    """
+    begun = np.zeros((N_ERROR, changes.shape[1]))
+    if not run.as_measured:
+        return begun
+    told = {name: changes[list(channels).index(name)] for name in channels}
+    told = {name: told[name] for name in told_at_start(run.swimming) if name in told}
+    none = np.zeros(changes.shape[1])
+    begun[columns("position")] = [told.get(name, none) for name in _PLACE]
+    euler = euler_from_quaternion(run.state0[3:7])[None]
+    turned = np.array([told.get(name, none) for name in _ATTITUDE])
+    begun[columns("rotation")] = np.linalg.solve(euler_rates(euler)[0], turned)
+    begun[:, IN_SAMPLES] = 0.0
+    return begun
 
 
 def _put(
@@ -298,6 +321,7 @@ def innovation_slopes(
     filtered: Filtered,
     correlation_s: float,
     changes: FloatArray,
+    begun: FloatArray | None = None,
 ) -> FloatArray:
     """Change of whitened innovations by changes of the measurements, shape (T C, K).
 
@@ -309,6 +333,7 @@ def innovation_slopes(
         filtered: the run filtered, with its slopes.
         correlation_s: of the disturbance that it was filtered with (s).
         changes: (T, C, K) of the measurements.
+        begun: (19, K) by how much the state that the run begins in changes; None for nothing.
 
     Raises:
         ValueError: the filter kept no slopes.
@@ -316,7 +341,7 @@ def innovation_slopes(
     slopes = _slopes(filtered)
     changes = np.where(np.isfinite(measured)[:, :, None], changes, 0.0)
     keep = np.exp(-np.diff(clock, prepend=clock[0]) / correlation_s)
-    stray = np.zeros((N_ERROR, changes.shape[2]))
+    stray = np.zeros((N_ERROR, changes.shape[2])) if begun is None else begun
     found = np.empty_like(changes)
     for t in range(len(clock)):
         if t:

@@ -8,7 +8,7 @@ by hand. A battery slows the tail by what is left of its charge.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -80,6 +80,26 @@ CURRENT = tuple(
     next(i for i, error in enumerate(SENSOR_ERRORS) if error.name == f"current_{axis}")
     for axis in ("north", "east")
 )
+GEOMETRY = {
+    "marker_x": "marker_x",
+    "marker_y": "marker_y",
+    "marker_z": "marker_z",
+    "mounting_roll": "mount_roll",
+    "mounting_pitch": "mount_pitch",
+    "mounting_yaw": "mount_yaw",
+    "compass_sin_2_yaw": "iron_sine",
+    "compass_cos_2_yaw": "iron_cosine",
+    "camera_roll": "tilt_roll",
+    "camera_pitch": "tilt_pitch",
+    "camera_scale_per_depth": "refraction",
+}
+"""Sensor errors that are geometry, and its fields (see ``sensing.geometry``): a run's own come on
+top of what all runs share."""
+GYRO_GAINS = {f"gyro_gain_{axis}": axis for axis in "pqr"}
+IN_SAMPLES = np.array(
+    [error.name not in GEOMETRY and error.name not in GYRO_GAINS for error in SENSOR_ERRORS]
+)
+"""(K,) whether an error is taken off the samples: what sensors make of a state cannot tell it."""
 EVERY = (*VARIATIONS, *SENSOR_ERRORS)
 USUAL = np.array([variation.usual for variation in EVERY])
 UPRIGHT = ("z", "roll", "pitch", "w", "p", "q")
@@ -128,6 +148,33 @@ def varied_bias(bias: FloatArray, own: FloatArray, channels: Sequence[str]) -> F
         if channel in channels:
             moved[list(channels).index(channel)] += own[_INDEX[name]]
     return moved
+
+
+def varied_gain(gain: FloatArray, errors: FloatArray, channels: Sequence[str]) -> FloatArray:
+    """Factors of the channels (C, N) with a run's own gains of its gyro (K,)."""
+    moved = gain.copy()
+    for error, value in zip(SENSOR_ERRORS, errors.tolist(), strict=True):
+        if GYRO_GAINS.get(error.name) in channels:
+            moved[list(channels).index(GYRO_GAINS[error.name])] *= 1.0 + value
+    return moved
+
+
+def varied_geometry(
+    geometry: Mapping[str, FloatArray], errors: FloatArray, count: int
+) -> dict[str, FloatArray]:
+    """How sensors sit and look, each field (N,), with a run's own errors (K,) added.
+
+    Args:
+        geometry: what all runs share.
+        errors: the run's own.
+        count: N.
+    """
+    varied = dict(geometry)
+    for error, value in zip(SENSOR_ERRORS, errors.tolist(), strict=True):
+        field = GEOMETRY.get(error.name)
+        if field is not None and value != 0.0:
+            varied[field] = np.full(count, value) + varied.get(field, 0.0)
+    return varied
 
 
 def device_ages(own: FloatArray) -> FloatArray:

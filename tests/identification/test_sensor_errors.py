@@ -15,7 +15,7 @@ from fish_env.identification.sensor_errors import (
     sensor_slopes,
 )
 from fish_env.identification.series import SeriesProblem
-from fish_env.identification.variation import SENSOR_ERRORS
+from fish_env.identification.variation import IN_SAMPLES, SENSOR_ERRORS
 from fish_env.inference.estimate.again import run_variation
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.estimate.settle import predicted_variation
@@ -34,7 +34,7 @@ def filtered():
     return problem, point, setup.noise, problem.filtered(point, setup.noise, keep_slopes=True)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", np.array(NAMES)[IN_SAMPLES])
 def test_the_filter_takes_a_change_of_its_data_as_the_slopes_say(filtered, name):
     problem, point, noise, results = filtered
     (run,), (result,) = problem.runs, results
@@ -48,6 +48,24 @@ def test_the_filter_takes_a_change_of_its_data_as_the_slopes_say(filtered, name)
     z = point.z[:, None]
     before, after = (p.innovations(z, {}, noise, results)[0] for p in (problem, spoilt))
     expected = size * slopes[:, k]
+    assert np.linalg.norm(expected) > 0.0
+    assert np.linalg.norm(after - before - expected) < 0.05 * np.linalg.norm(expected)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_run_with_an_error_of_its_own_shows_it_as_the_slopes_say(filtered, name):
+    """Where it begins too: a marker aside does not put the fish elsewhere."""
+    problem, point, noise, results = filtered
+    steps = np.array([0.3 * v.usual for v in problem.variations])
+    k = [v.name for v in problem.variations].index(name)
+    slopes = problem.variation_slopes(point, noise, results, steps)[:, k]
+    size = 0.1 * problem.variations[k].usual
+    numbers = np.zeros_like(problem.variation)
+    numbers[:, k] = size
+    moved = problem.with_variation(numbers, point, noise, results)
+    z = point.z[:, None]
+    before, after = (p.innovations(z, {}, noise, results)[0] for p in (problem, moved))
+    expected = size * slopes
     assert np.linalg.norm(expected) > 0.0
     assert np.linalg.norm(after - before - expected) < 0.05 * np.linalg.norm(expected)
 
@@ -70,7 +88,7 @@ def test_what_errors_do_is_worked_out_once_for_a_motion(filtered):
 def test_samples_put_right_do_not_depend_on_the_way_there(filtered):
     problem, point, noise, _ = filtered
     numbers = np.zeros_like(problem.variation)
-    own = {"mounting_yaw": 0.05, "inertial_smoothing": 1.0, "gyro_gain_r": 0.05}
+    own = {"compass_sin_yaw": 0.2, "inertial_smoothing": 2.0, "current_north": 0.01}
     for i, variation in enumerate(problem.variations):
         numbers[:, i] = own.get(variation.name, 0.0)
     at_once = problem.with_variation(numbers, point, noise)
@@ -95,7 +113,7 @@ def test_samples_put_right_by_a_motion_nearby_come_to_the_same(filtered):
     """Each time from the motion that the last ones show: one filter a time, not up to four."""
     problem, point, noise, _ = filtered
     numbers = np.zeros_like(problem.variation)
-    own = {"mounting_yaw": 0.05, "inertial_smoothing": 1.0, "gyro_gain_r": 0.05}
+    own = {"compass_sin_yaw": 0.2, "inertial_smoothing": 2.0, "current_north": 0.01}
     for i, variation in enumerate(problem.variations):
         numbers[:, i] = own.get(variation.name, 0.0)
     exact = problem.with_variation(numbers, point, noise)
@@ -105,7 +123,7 @@ def test_samples_put_right_by_a_motion_nearby_come_to_the_same(filtered):
         moved = moved.with_variation(numbers, point, noise, near)
         off = (moved.runs[0].corrected - exact.runs[0].corrected) / problem.sensor_sd
         apart.append(float(np.sqrt(np.nanmean(off**2))))
-    assert apart[-1] < 0.3 * apart[0] < 0.1
+    assert apart[-1] < 0.1 < apart[0]
 
 
 def test_slopes_need_a_filter_that_kept_them(filtered):

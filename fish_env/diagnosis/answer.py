@@ -70,7 +70,7 @@ def shared_entries(diagnosis: Diagnosed) -> Plain:
     verdict, attribution = diagnosis.verdict, diagnosis.attribution
     alternatives = [
         [cause_entry(rival.fit, cause) for cause in rival.causes]
-        for rival in attribution.rivals
+        for rival in (attribution.accepted, *attribution.rivals)
         if rival.causes in verdict.alternatives
     ]
     screen = attribution.first

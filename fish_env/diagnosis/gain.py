@@ -22,7 +22,6 @@ from fish_env.identification.series import SeriesProblem, series_of
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.settle import evaluated
 from fish_env.inference.gain import ClosedGap
-from fish_env.inference.policy import POLICY
 
 OneStep = tuple[Sequence[Filtered], Sequence[Filtered]]
 ANGLES = ("roll", "yaw")
@@ -113,7 +112,7 @@ def _open_loop(problem: SeriesProblem, fit: Fit) -> tuple[list[FloatArray], Seri
     pieces = [
         window
         for run, result in zip(problem.runs, filtered, strict=True)
-        for window in open_loop.windows(run, result, POLICY.prediction_window_s, problem.channels)
+        for window in open_loop.windows(run, result, problem.channels)
     ]
     cut = problem.with_runs(pieces)
     return open_loop.errors(cut, fit.point, fit.noise), cut

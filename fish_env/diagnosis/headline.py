@@ -78,7 +78,8 @@ def _verdict(answer: Answer) -> str:
         "parameters": f"The structure of the model holds, but its numbers are wrong: {named}.",
         "cause": f"The simulation lacks {named}.",
         "ambiguous": f"The simulation lacks {_either(answer['causes'], answer['alternatives'])}.",
-        "partial": f"The simulation lacks {named}, and something that no known effect explains.",
+        "partial": f"The simulation lacks {_known(answer)}, and something that no known effect "
+        "explains.",
         "outside_library": "Something is missing that no known effect explains.",
     }[answer["verdict"]]
     return f"Doubtful: {said[0].lower()}{said[1:]}" if _doubtful(answer) else said
@@ -88,6 +89,14 @@ def _named(causes: Sequence[Answer]) -> str:
     """Causes with their values, or of many the names: a table below has the values."""
     few = len(causes) <= MOST_NAMED
     return _joined([_cause(c) if few else short_name(c["name"]) for c in causes], "and")
+
+
+def _known(answer: Answer) -> str:
+    """Causes beside something unknown, with those of which one acts."""
+    alternatives = answer["alternatives"]
+    if not alternatives:
+        return _named(answer["causes"])
+    return f"{_either(alternatives[0], alternatives[1:])} (these data do not tell which)"
 
 
 def _either(causes: Sequence[Answer], alternatives: Sequence[Sequence[Answer]]) -> str:

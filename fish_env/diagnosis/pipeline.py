@@ -33,6 +33,7 @@ from fish_env.identification.copies import without_copies
 from fish_env.identification.model_outliers import without_model_outliers
 from fish_env.identification.own_beats import own_beats, with_own_beats
 from fish_env.identification.recorded import recorded
+from fish_env.identification.run_noise import with_noisy_runs_told
 from fish_env.identification.sensors import with_noise_shown, without_outliers
 from fish_env.identification.series import SeriesProblem, series_of
 from fish_env.identification.tail_drive import tail_drive
@@ -160,7 +161,7 @@ def _diagnose_runs(
     progress("checking the runs")
     check_runs(dataset)
     dataset, outliers = without_outliers(without_copies(dataset))
-    dataset = with_noise_shown(dataset)
+    dataset = with_noisy_runs_told(with_noise_shown(dataset))
     progress("checking signs, units and clocks")
     inputs = check_inputs(dataset, fish, seed)
     dataset = inputs.dataset

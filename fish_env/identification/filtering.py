@@ -253,7 +253,7 @@ class RunFilter:
                 measurement.delay[0], measurement.gain[:, 0], measurement.bias[:, 0],
                 measurement.device_ages[:, 0], measurement.lens, data.clock,
                 data.steps(corners), *data.driven,
-                data.corrected, self.codes, noise.sensor_sd**2, noise.jitter_sd * rates,
+                data.corrected, self.codes, sensor_variance(noise, data), noise.jitter_sd * rates,
                 data.covariance0, noise.wrench_variance, noise.correlation_s, noise.phase_sd**2,
                 noise.phase_reach, self._history_rows(record, data), data.known_wrench,
                 self.model.tables, k, w, e, share, x, d, slopes.motion, slopes.channels, slopes.raw,
@@ -285,7 +285,7 @@ class RunFilter:
             value = entry(
                 data.clock, data.corrected, slopes.motion, slopes.channels, slopes.raw,
                 result.gains, result.shares, result.wrench, made_with.correlation_s,
-                noise.sensor_sd**2, noise.jitter_sd * rates, data.covariance0,
+                sensor_variance(noise, data), noise.jitter_sd * rates, data.covariance0,
                 noise.wrench_variance, noise.correlation_s, noise.phase_sd**2,
                 innovations[own], whitening[own],
             )  # fmt: skip
@@ -352,6 +352,11 @@ class RunFilter:
 
         list(_threads().map(one, jobs))
         return out
+
+
+def sensor_variance(noise: NoiseModel, run: RunData) -> FloatArray:
+    """Variance of a run's white sensor noise (C,), SI."""
+    return np.asarray((noise.sensor_sd * run.noise_scale) ** 2)
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,6 +16,7 @@ from fish_env.identification.filtering import Filtered, RunFilter
 from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.noise_scoring import Replayed, climb
 from fish_env.identification.policy import IDENTIFICATION
+from fish_env.identification.runs import RunData
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point
 from fish_env.params.schema import FishParams
@@ -169,6 +170,13 @@ class FilteredRuns(Protocol):
         keep_slopes: bool = False,
     ) -> list[Filtered]:
         """Filter every run at one point (see :meth:`SeriesProblem.filtered`)."""
+
+
+def runs_for_noise(runs: Sequence[RunData]) -> int:
+    """Of how many runs the noise is fitted to: a few, and more where these hold few samples."""
+    samples = float(np.mean([len(run.clock) for run in runs]))
+    enough = int(np.ceil(IDENTIFICATION.fewest_noise_samples / samples))
+    return max(IDENTIFICATION.fewest_noise_runs, enough)
 
 
 def fitted_noise(

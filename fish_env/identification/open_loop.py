@@ -13,6 +13,7 @@ from fish_env.identification.filtering import Filtered
 from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.runs import RunData
 from fish_env.inference.hypotheses import EffectParameterId
+from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point
 from fish_env.model.state import BASE_STATES
 
@@ -65,6 +66,19 @@ def without_feedback(
     )
 
 
+def in_units_of_noise(
+    runs: Sequence[RunData], sensor_sd: FloatArray, corners: bool
+) -> list[Filtered]:
+    """Of each run, gains of zero and errors that count in units of its sensors' noise.
+
+    Args:
+        runs: the runs.
+        sensor_sd: (C,) usual noise of the channels.
+        corners: whether the tail's rate may jump.
+    """
+    return [without_feedback(r, corners=corners, sd=sensor_sd * r.noise_scale) for r in runs]
+
+
 def errors(problem: Predicting, point: Point, noise: NoiseModel) -> list[FloatArray]:
     """Measured minus predicted of each run from its initial state, (T, C), NaN where missing."""
     effects = {id: np.array([value]) for id, value in point.effects.items()}
@@ -78,9 +92,7 @@ def errors(problem: Predicting, point: Point, noise: NoiseModel) -> list[FloatAr
     ]
 
 
-def windows(
-    run: RunData, filtered: Filtered, length_s: float, channels: Sequence[str]
-) -> list[RunData]:
+def windows(run: RunData, filtered: Filtered, channels: Sequence[str]) -> list[RunData]:
     """A run cut into windows that start from its filtered states.
 
     Effects with states of their own start where beating as commanded has left them. Time goes on
@@ -91,10 +103,10 @@ def windows(
     Args:
         run: the run.
         filtered: its states.
-        length_s: of the windows (s).
         channels: names of its channels.
     """
-    edges = np.arange(0.0, run.duration - 0.5 * length_s, length_s)
+    length = POLICY.prediction_window_s
+    edges = np.arange(0.0, run.duration - 0.5 * length, length)
     starts = np.searchsorted(run.clock, edges)
     ends = np.r_[starts[1:], len(run.clock) - 1]
     return [

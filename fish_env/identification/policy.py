@@ -49,6 +49,13 @@ class IdentificationPolicy(Numbers):
             are motion.
         copied_noise: root mean square by which the noise of two runs differs, over that of one,
             below which one is a copy of the other.
+        fewest_noise_runs: runs that the noise is fitted to, at least.
+        fewest_noise_samples: samples of these, at least, where there are as many.
+        least_noise_difference: relative standard deviation over runs of a sensor's noise below
+            which all runs count as equally noisy.
+        quiet_runs: quantile over runs whose noise is the usual one.
+        largest_noise_scale: largest noise of a run over the usual one.
+        told_noise_scale: noise of a run over the usual one from which it is told.
         fewest_declared_channels: channels with declared noise of which most can show more.
         told_outliers: share of the samples of a channel from which outliers are told in words.
         disturbance_weight: largest plausible disturbing force, over the weight of the fish.
@@ -115,6 +122,14 @@ class IdentificationPolicy(Numbers):
         1.4,
         f"sqrt(2) with noise of its own, 0 in a copy, and half is far from both; {BY_HAND}",
     )
+    fewest_noise_runs: int = number(4, 1, 1000, EFFORT)
+    fewest_noise_samples: int = number(3000, 1, 10**6, EFFORT)
+    least_noise_difference: float = number(
+        0.2, 0.0, 1.0, "a weight that is off by a fifth loses 2 % of what a run tells"
+    )
+    quiet_runs: float = number(0.25, 0.0, 1.0, BY_HAND)
+    largest_noise_scale: float = number(5.0, 1.0, 100.0, BY_HAND)
+    told_noise_scale: float = number(1.5, 1.0, 10.0, BY_HAND)
     fewest_declared_channels: int = number(3, 1, 20, BY_HAND)
     told_outliers: float = number(1e-4, 0.0, 0.1, BY_HAND)
     disturbance_weight: float = number(

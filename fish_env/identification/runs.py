@@ -76,6 +76,7 @@ class RunData:
         devices: (C,) device of each channel, where rows may be moved.
         late: (devices,) how late each device is in all runs (s), beside what is a run's own.
         moved: (devices,) rows by which the samples of each device were moved to earlier ones.
+        noise_scale: (C,) noise of its sensors over the usual one, or one number for all.
         usual_substeps: (T,) of published estimates, where ``substeps`` are fewer; else None.
     """
 
@@ -102,6 +103,7 @@ class RunData:
     devices: IntArray | None = None
     late: FloatArray = field(default_factory=lambda: np.zeros(len(Device)))
     moved: IntArray = field(default_factory=lambda: np.zeros(len(Device), np.int64))
+    noise_scale: FloatArray = field(default_factory=lambda: np.ones(1))
     usual_substeps: IntArray | None = None
     phase_found: bool = False
 
@@ -297,7 +299,11 @@ class RunData:
 
 
 def prepare_run(
-    run: Run, channels: Sequence[str], noise_sd: FloatArray, dt: float = 0.01
+    run: Run,
+    channels: Sequence[str],
+    noise_sd: FloatArray,
+    dt: float = 0.01,
+    noise_scale: FloatArray | None = None,
 ) -> RunData:
     """Read a run for the filter.
 
@@ -306,6 +312,7 @@ def prepare_run(
         channels: channels to use.
         noise_sd: (C,) white noise of each channel, for the spread of the initial state.
         dt: longest RK4 step (s), but for a moment after each jump of the commands.
+        noise_scale: (C,) by how much more noise this run has; default: as much.
 
     Raises:
         DatasetError: the run has none of the channels.
@@ -318,7 +325,8 @@ def prepare_run(
     switches = run.commands.times_s - run.time_s[0]
     fresh = just_after(switches[jumped(run.commands.values)], clock)
     substeps = _steps(clock, np.where(fresh, dt / FINER, dt))
-    state0, covariance0 = first_state(run, channels, measured, clock, noise_sd)
+    scale = np.ones(1) if noise_scale is None else noise_scale
+    state0, covariance0 = first_state(run, channels, measured, clock, noise_sd * scale)
     if run.start == "rest":
         measured[clock < IDENTIFICATION.untold_start_s] = np.nan
     # Where the tail is at the first sample is known only once it has moved.
@@ -335,6 +343,7 @@ def prepare_run(
         covariance0,
         run.tail_phase is not None,
         run.start != "rest",
+        noise_scale=scale,
     )
 
 

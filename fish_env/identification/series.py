@@ -23,14 +23,16 @@ from fish_env.identification.kernel_kinds import LEAN, quickest, with_stages
 from fish_env.identification.noise import (
     disturbance_range,
     fitted_noise,
+    runs_for_noise,
     small_disturbance,
     white_noise_sd,
     widest_disturbance,
 )
 from fish_env.identification.noise_model import RELAXED_PHASE_SD, UNEVEN_PHASE_SD, NoiseModel
-from fish_env.identification.open_loop import windows, without_feedback
+from fish_env.identification.open_loop import in_units_of_noise, windows
 from fish_env.identification.parameters import ALIKE, baseline_of, changes_of, neutral_values
 from fish_env.identification.phases import settle_phases
+from fish_env.identification.run_noise import noise_scales
 from fish_env.identification.run_numbers import in_late_rows, renumbered
 from fish_env.identification.runs import FINER, RunData, prepare_run
 from fish_env.identification.sensor_errors import slopes_of_runs
@@ -41,7 +43,6 @@ from fish_env.identification.variation_slopes import swum_slopes
 from fish_env.identification.wave_phases import settle_wave_phases
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.hypotheses import EffectParameterId, effect_names, effects_of
-from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import phase_grid
 from fish_env.inference.problem import Point, Problem
 from fish_env.inference.vehicle import EffectFreedom, freedoms
@@ -89,8 +90,9 @@ class SeriesProblem(Problem):
         self.channels = usable_channels(dataset.channels)
         given = dataset.noise.get
         self.sensor_sd = np.array([given(n) or white_noise_sd(dataset, n) for n in self.channels])
+        scales = noise_scales(dataset, self.channels)
         self.runs = tuple(
-            prepare_run(dataset.run(i), self.channels, self.sensor_sd, dt)
+            prepare_run(dataset.run(i), self.channels, self.sensor_sd, dt, scales[i])
             for i in (dataset.ids if run_ids is None else run_ids)
         )
         self.baseline = baseline_of(dataset, self.fish, paths)
@@ -161,12 +163,9 @@ class SeriesProblem(Problem):
         self, filtered: Sequence[Filtered], noise: NoiseModel
     ) -> tuple[SeriesProblem, Sequence[Filtered], IntArray]:
         """Windows from filtered states over which the fish swims alone (see the protocol)."""
-        pairs = zip(self.runs, filtered, strict=True)
-        length, names = POLICY.prediction_window_s, self.channels
-        cut = [windows(run, f, length, names) for run, f in pairs]
+        cut = [windows(run, f, self.channels) for run, f in zip(self.runs, filtered, strict=True)]
         problem = self.with_runs([window for own in cut for window in own])
-        corners = bool(filtered and filtered[0].corners)
-        still = [without_feedback(w, corners=corners, sd=noise.sensor_sd) for w in problem.runs]
+        still = in_units_of_noise(problem.runs, noise.sensor_sd, filtered[0].corners)
         return problem, still, np.repeat(np.arange(len(cut)), [len(own) for own in cut])
 
     @property
@@ -192,9 +191,10 @@ class SeriesProblem(Problem):
         filtered: Sequence[Filtered] = (),
         leverage: Callable[[], FloatArray] | None = None,
     ) -> NoiseModel:
-        """Noise model of largest likelihood at a point, from at most four runs."""
+        """Noise model of largest likelihood at a point, from as many runs as that takes."""
         largest = self.largest_sensor_sd if final else None
-        return fitted_noise(self.some(self.spread(4)), point, noise, largest)
+        few = self.spread(runs_for_noise(self.runs))
+        return fitted_noise(self.some(few), point, noise, largest)
 
     def disturbance_at_limit(self, noise: NoiseModel) -> tuple[str, ...]:
         """How the disturbance leaves what is plausible: a misfit with another name."""

@@ -39,7 +39,7 @@ from fish_env.inference.projection import Signal
 from fish_env.inference.rivals import as_likely, rivals_of
 from fish_env.inference.screening import Screen
 from fish_env.inference.search import at_noise
-from fish_env.inference.substitution import swapped, what_may_lack, without
+from fish_env.inference.substitution import swapped, what_may_lack
 
 Report = Callable[[str], None]
 Pair = tuple[EffectName, EffectName]
@@ -281,26 +281,21 @@ def undecided(current: Explanation, shown: Screen, report: Report) -> frozenset[
     return frozenset(found)
 
 
-def decided(found: Explanation, shown: Screen, report: Report) -> Explanation:
-    """The explanation without what another effect does as well, beside something unknown.
+def decided(
+    found: Explanation, shown: Screen, report: Report
+) -> tuple[Explanation, tuple[Explanation, ...]]:
+    """The best of an explanation and those with another rate in it, and those as good.
 
-    A verdict that leaves something unknown names no alternatives. That runs disagree on which is
-    better says little there: what is unknown may act in some of them.
+    Beside something unknown. That runs disagree on which is better says little there: what is
+    unknown may act in some of them.
 
     Args:
         found: causes that act.
         shown: causes that are not among them.
         report: told what is being done.
     """
-    found, rivals = asked_of_rates(found, shown, report)
-    rivals = tuple(other for other in rivals if as_likely(found, other))
-    doubtful = {*found.causes} - frozenset[CauseId]().union(*(e.causes for e in rivals))
-    if not rivals:
-        return found
-    report(
-        f"rejecting {listed(sorted(doubtful, key=name_of))}: others explain as much in its place"
-    )
-    return without(found, doubtful) or found
+    best, rivals = asked_of_rates(found, shown, report)
+    return best, tuple(other for other in rivals if as_likely(best, other))
 
 
 def _shown(pairs: Sequence[Pair], shown: Screen) -> list[tuple[CauseId, Signal]]:

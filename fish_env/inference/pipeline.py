@@ -21,7 +21,7 @@ from fish_env.inference.adequacy import (
 from fish_env.inference.attribution import Attribution, attribute, extended
 from fish_env.inference.budget import Budget, error_budget
 from fish_env.inference.effort import FULL, Effort
-from fish_env.inference.estimate.again import finished, refined, to_search
+from fish_env.inference.estimate.again import finished, refined, to_publish, to_search
 from fish_env.inference.estimate.fit import FEWER_STEPS, Fit, fit
 from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.gain import gap_closed
@@ -163,6 +163,9 @@ def partly(
 ) -> tuple[Attribution, Verdict]:
     """The verdict ``partial`` where known causes act beside something unknown.
 
+    It names those that act for certain. Where one of several clocks or beats acts besides, all of
+    these explanations are its alternatives, the accepted one among them.
+
     Args:
         attribution: what was found.
         left: adequacy of the accepted explanation, which is not adequate.
@@ -177,14 +180,17 @@ def partly(
         found = without(found, doubtful) if doubtful else found
     if found is None or not found.causes:
         return attribution, verdict
-    found = decided(found, attribution.shown, report)
-    if not found.causes:
+    found, rivals = decided(found, attribution.shown, report)
+    shared = {*found.causes}.intersection(*(other.causes for other in rivals))
+    if not shared:
         return attribution, verdict
-    # What is published was compared in the steps of a search.
-    finer = reached(partial(refined, found.fit))
-    found = replace(found, fit=finer) if finer else found
-    rivals = tuple(e for e in attribution.rivals if len(e.causes) == len(found.causes))
-    return replace(attribution, accepted=found, rivals=rivals), Verdict("partial", found.causes)
+    # What is published was compared in the steps of a search, or has just been changed.
+    publish = refined if found.fit is attribution.accepted.fit else to_publish
+    final = reached(partial(publish, found.fit))
+    found = replace(found, fit=final) if final else found
+    sure = tuple(cause for cause in found.causes if cause in shared)
+    alike = tuple(e.causes for e in (found, *rivals)) if rivals else ()
+    return replace(attribution, accepted=found, rivals=rivals), Verdict("partial", sure, alike)
 
 
 def budget_of(

@@ -30,8 +30,9 @@ class Verdict:
 
     Attributes:
         name: one of VERDICTS.
-        causes: accepted causes.
-        alternatives: other sets of causes that explain the data alike.
+        causes: accepted causes; of ``partial`` those that act for certain.
+        alternatives: other sets of causes that explain the data alike; of ``partial`` all such
+            sets, that of the extended model first.
     """
 
     name: str

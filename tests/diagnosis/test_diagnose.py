@@ -127,7 +127,7 @@ def test_every_verdict_has_words(verdict):
     mentioned = {
         "no_misfit": "detectable", "not_excited": "could not", "parameters": "current",
         "cause": "lacks current (north 0.04 m/s)", "ambiguous": "or instead tether",
-        "outside_library": "no known effect", "partial": "current", "inputs": "Once corrected",
+        "outside_library": "no known effect", "partial": "tether", "inputs": "Once corrected",
     }  # fmt: skip
     assert mentioned[verdict] in said.verdict
     assert "90 %" in said.closed
@@ -147,6 +147,14 @@ def test_what_alternatives_share_is_told_once_and_many_causes_without_values():
     every = [CAUSE, wave, drag, lag]
     told = headline({"verdict": "cause", "causes": every, "alternatives": []}).verdict
     assert told == "The simulation lacks current, wave, drag and lag."
+    beside = {
+        **ambiguous([wave]),
+        "verdict": "partial",
+        "alternatives": [[wave, lag], [wave, delay]],
+    }
+    told = headline(beside).verdict
+    assert told.startswith("The simulation lacks wave (north 0.04 m/s), and either lag (")
+    assert "(these data do not tell which), and something that no known effect explains" in told
     contained = headline(ambiguous([wave, lag], [wave])).verdict
     assert contained.endswith(", or instead wave (north 0.04 m/s).")
 

@@ -66,7 +66,7 @@ def test_windows_cover_a_run_once_and_start_from_filtered_states():
     states = np.arange(len(run.clock))[:, None] * np.ones(20)
     filtered = open_loop.without_feedback(run)
     filtered = type(filtered)(**{**filtered.__dict__, "states": states})
-    pieces = open_loop.windows(run, filtered, 3.0, ("z",))
+    pieces = open_loop.windows(run, filtered, ("z",))
     assert [piece.clock[0] for piece in pieces] == pytest.approx([0.0, 3.0, 6.0])
     assert [piece.state0[0] for piece in pieces] == [0.0, 30.0, 60.0]
     for piece in pieces:
@@ -78,7 +78,7 @@ def test_windows_cover_a_run_once_and_start_from_filtered_states():
 def test_windows_know_the_command_that_holds_when_they_begin():
     run = run_of()
     filtered = open_loop.without_feedback(run, states=20)
-    begun = [piece.command_values[0, 0] for piece in open_loop.windows(run, filtered, 3.0, ("z",))]
+    begun = [piece.command_values[0, 0] for piece in open_loop.windows(run, filtered, ("z",))]
     assert begun == [0.0, 0.0, 5.0]
 
 
@@ -90,7 +90,7 @@ def test_a_window_begins_where_a_current_has_carried_the_fish():
     drift = north * run.clock[:, None]
     run = replace(run, sensor_errors=errors, distortion=drift)
     filtered = open_loop.without_feedback(run, states=20)
-    for piece in open_loop.windows(run, filtered, 3.0, ("x",)):
+    for piece in open_loop.windows(run, filtered, ("x",)):
         since = piece.clock - piece.clock[0]
         np.testing.assert_allclose(piece.distortion[:, 0], north * since, atol=1e-12)
         assert piece.state0[0] == pytest.approx(north * piece.clock[0])
@@ -114,7 +114,7 @@ def test_a_window_does_not_begin_with_a_soft_tail_unbent():
     noise = NoiseModel(np.full(len(problem.channels), 1e-3), 1e-4, 1e-6, 1.0)
 
     pieces = open_loop.windows(
-        problem.runs[0], problem.filtered(truth, noise)[0], 3.0, problem.channels
+        problem.runs[0], problem.filtered(truth, noise)[0], problem.channels
     )[1:]
     unbent = [replace(piece, swimming=False) for piece in pieces]
     left, before = (
@@ -186,7 +186,7 @@ def test_a_window_begins_where_a_quick_lag_beside_corners_has_settled():
     }
     point = Point(np.zeros(len(PATHS)), quick)
     (filtered,) = problem.filtered(point, setup.noise)
-    cut = problem.with_runs(open_loop.windows(problem.runs[0], filtered, 3.0, problem.channels))
+    cut = problem.with_runs(open_loop.windows(problem.runs[0], filtered, problem.channels))
     gyro = problem.channels.index("r")
     assert len(cut.runs) > 1
     for run, error in zip(cut.runs, open_loop.errors(cut, point, setup.noise), strict=True):

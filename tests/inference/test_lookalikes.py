@@ -158,14 +158,14 @@ def test_a_rate_takes_the_place_of_another_as_measured_or_at_its_size(measured, 
 
 
 @pytest.mark.parametrize(
-    ("share", "named"), [(1.0 - 1e-6, ()), (0.9, (LAG,))], ids=["alike", "told apart"]
+    ("share", "rivals"), [(1.0 - 1e-6, [(LIMIT,)]), (0.9, [])], ids=["alike", "told apart"]
 )
-def test_beside_the_unknown_a_rate_is_named_if_no_other_does_as_well(share, named):
-    told = []
-    assert decided(*explained(of_rates(share), LAG), told.append).causes == named
-    rejected = [words for words in told if words.startswith("rejecting")]
-    assert rejected == ([] if named else [f"rejecting {LAG}: others explain as much in its place"])
+def test_beside_the_unknown_a_rate_has_those_that_do_as_well_beside_it(share, rivals):
+    best, alike = decided(*explained(of_rates(share), LAG), [].append)
+    assert best.causes == (LAG,)
+    assert [other.causes for other in alike] == rivals
 
 
 def test_beside_the_unknown_a_rate_leaves_its_place_to_a_better_one():
-    assert decided(*explained(of_rates(0.9), LIMIT), [].append).causes == (LAG,)
+    best, alike = decided(*explained(of_rates(0.9), LIMIT), [].append)
+    assert (best.causes, alike) == ((LAG,), ())

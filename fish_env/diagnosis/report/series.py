@@ -166,9 +166,7 @@ def predicted_windows(
 
     The same predictions as :func:`fish_env.diagnosis.gain.measure_gain` judges.
     """
-    cut = problem.with_runs(
-        open_loop.windows(run, filtered, POLICY.prediction_window_s, problem.channels)
-    )
+    cut = problem.with_runs(open_loop.windows(run, filtered, problem.channels))
     errors = open_loop.errors(cut, fit.point, fit.noise)
     missed = np.full(run.measured.shape, np.nan)
     for window, error in zip(cut.runs, errors, strict=True):

@@ -198,6 +198,18 @@ def test_noise_of_another_kind_may_be_lived_with_but_not_be_called_an_effect():
     assert not score(truth, named("tether")).told
 
 
+def test_beside_the_unknown_too_alternatives_stand_for_their_best():
+    sets = [[{"name": "tail_gain"}, {"name": other}] for other in ("tether", "servo_lag")]
+    answer = named("tail_gain", verdict="partial", alternatives=sets)
+    row = score(truth_of("realistic", small=SMALL), answer)
+    assert row.main_named
+    assert set(row.claimed) == {"tail_gain", "servo_lag"}
+    assert row.false_names == ()
+    wrong = score(truth_of("realistic", small=SMALL), answer | {"alternatives": sets[:1]})
+    assert wrong.false_names == ("tether",)
+    assert not wrong.main_named
+
+
 def test_a_name_that_no_answer_can_give_is_outside():
     truth = truth_of("suspects")
     assert score(truth, quiet("outside_library"), {"servo_lag", "offset_gain"}).nameable

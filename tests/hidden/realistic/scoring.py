@@ -137,10 +137,12 @@ def claims(
     named: tuple[str, ...],
     alternatives: Sequence[tuple[str, ...]],
 ) -> tuple[str, ...]:
-    """Names that an answer stands for: of an ambiguous one those of its best explanation."""
-    if verdict == "ambiguous":
-        sets = [names for names in (named, *alternatives) if names]
-        best = sorted(sets, key=lambda names: sum(not truth.is_true(name) for name in names))
+    """Names that an answer stands for: of one with alternatives those of its best explanation."""
+    sets: Sequence[tuple[str, ...]] = [named, *alternatives] if verdict == "ambiguous" else ()
+    if verdict == "partial":
+        sets = alternatives  # each holds all that is named
+    if sets:
+        best = sorted(filter(None, sets), key=lambda s: sum(not truth.is_true(n) for n in s))
         return best[0] if best else ()
     return named if verdict in NAMING else ()
 
@@ -153,7 +155,7 @@ def among(
 ) -> bool:
     """Whether one of the hidden effects is named, or is in an ambiguous set."""
     sets: Sequence[tuple[str, ...]] = [named] if verdict in NAMING else []
-    if verdict == "ambiguous":
+    if verdict in ("ambiguous", "partial"):
         sets = [named, *alternatives]
     said = {name for names in sets for name in names}
     return any(said & set(names_of(one)) for one in hidden)

@@ -119,6 +119,8 @@ def asked_of_rates(
     """
     current = _without_what_runs_explain(current, report)
     pairs = _shown(rates(current), shown)
+    if pairs:
+        current = _on_equal_terms(current)
     return _asked(current.fit.problem, current, pairs, POLICY.rate_steps, report)
 
 
@@ -146,6 +148,18 @@ def _without_what_runs_explain(current: Explanation, report: Report) -> Explanat
             better = again is not None and again.score < without.score - POLICY.evidence_doubt
             current = again if again is not None and better else without
     return current
+
+
+def _on_equal_terms(current: Explanation) -> Explanation:
+    """The explanation after as many steps as look-alikes of its causes are given.
+
+    A fit ends where steps gain little beside what is missing: others would win by steps alone.
+    """
+    own = current.fit
+    again = at_noise(own.problem, own, own.noise, POLICY.rate_steps)
+    if again is None or not again.objective < own.objective:
+        return current
+    return Explanation(current.causes, again)
 
 
 def _put_back(before: Explanation, cause: CauseId, fitted: Fit) -> Explanation | None:

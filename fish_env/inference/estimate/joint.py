@@ -113,8 +113,7 @@ def descend_jointly(
         if predicted >= tolerance**2:
             better, used = _better(model, noise, at, first)
         gained = 0.0 if better is None else at.value - better.value
-        if better is not None:
-            at = _agreed(better, free, noise)
+        at = better or at
         del better  # an evaluation takes much memory
         if exact and gained < max(ENOUGH, FORESEEN * predicted):
             break
@@ -146,9 +145,8 @@ def _evaluated(problem: Problem, free: Free, vector: FloatArray, noise: Any) -> 
 def _agreed(at: Joint, free: Free, noise: Any) -> Joint:
     """The same numbers, with what follows from the motion nearer to that motion.
 
-    Steps are then compared with what they begin from: the value may have risen. Where it rises by
-    more than the noise of all residuals, the motion and what follows from it drive each other away,
-    and stay as they are.
+    The value may rise by that. Where it rises by more than the noise of all residuals, the motion
+    and what follows from it drive each other away, and stay as they are.
     """
     problem = at.problem
     if not problem.variation.any():
@@ -230,6 +228,9 @@ class _Model:
 def _better(model: _Model, noise: Any, at: Joint, first: int) -> tuple[Joint | None, int]:
     """The boldest step that leads to a lower value, None where none does, and its number.
 
+    It counts with what follows from the motion after it: what a sensor makes of the motion before
+    may seem to explain more.
+
     Args:
         model: about where steps begin; where its slopes are not exact, no damped one is tried.
         noise: noise model.
@@ -251,6 +252,8 @@ def _better(model: _Model, noise: Any, at: Joint, first: int) -> tuple[Joint | N
             tried = _with_own_steps(model, noise, at, vector, own)
         except np.linalg.LinAlgError:
             continue
+        if tried.value < best.value:
+            tried = _agreed(tried, model.free, noise)
         if tried.value < best.value:
             best, used = tried, number
         elif best is not at:

@@ -14,6 +14,7 @@ from fish_env.inference.lookalikes import (
     undecided,
 )
 from fish_env.inference.probes import causes_of
+from fish_env.inference.problem import Point
 from fish_env.inference.screening import screen
 from fish_env.inference.vehicle import Drive
 from tests.inference.stated import Stated, effect, size_of
@@ -138,6 +139,18 @@ def test_rates_are_compared_too():
     best, alike = asked_of_rates(*explained(of_rates(0.9), LIMIT), [].append)
     assert best.causes == (LAG,)
     assert alike == ()
+
+
+def test_no_rate_wins_by_more_steps():
+    """The fit of one ended far from its minimum, where one as good would explain more."""
+    stated = of_rates(1.0 - 1e-6)
+    far = Point(np.zeros(1), {size_of(LAG): 0.2})
+    early = fit(stated, [LAG], far, iterations=0, refit_noise=False)
+    other = fit(stated, [LIMIT])
+    assert other.objective < early.objective
+    _, shown = explained(stated, LAG)
+    best, alike = asked_of_rates(Explanation((LAG,), early), shown, [].append)
+    assert {best.causes, *(e.causes for e in alike)} == {(LAG,), (LIMIT,)}
 
 
 @pytest.mark.parametrize(

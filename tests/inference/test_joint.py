@@ -167,6 +167,29 @@ def test_a_whole_step_that_hardly_gains_does_not_end_the_steps():
     assert abs(vector[0]) < 0.5
 
 
+class Flattered(Bounded):
+    """Samples that follow a motion only when asked again: before, any other seems to fit better."""
+
+    flattery = 0.0
+
+    def with_variation(self, values, point, noise, near=()):
+        found = super().with_variation(values, point, noise, near)
+        found.flattery = 0.0 if np.array_equal(values, self.variation) else 30.0
+        return found
+
+    def filtered(self, point, noise, near=()):
+        found = super().filtered(point, noise, near)
+        return [Evaluated(f.log_likelihood + self.flattery, f.residuals) for f in found]
+
+
+def test_a_step_counts_after_samples_follow_the_motion():
+    problem = Flattered(truth=(0.0, 0.0, 0.0))
+    problem.y *= 0.01
+    problem.own += 0.01
+    _, vector, _, _, _ = descended(problem, iterations=1, start=1.38)
+    assert abs(vector[0]) < 0.5
+
+
 class Pulled(Differing):
     """The likelihood has a term that no residual shows, as that of a filter's gains."""
 

@@ -5,7 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from fish_env.inference.estimate.run_variation import Marginal, RunVariation, shown_spread
+from fish_env.inference.estimate.run_variation import (
+    FARTHEST,
+    Marginal,
+    RunVariation,
+    shown_spread,
+)
 from fish_env.inference.estimate.settle import predicted_variation
 from fish_env.inference.estimate.spread import Likelihood, fit_spread
 from fish_env.inference.problem import Point
@@ -176,6 +181,16 @@ def shown(seed, spread):
     variance = 1.0 / (1.0 + 1.0 / 0.5**2)
     seen = spread * rng.standard_normal((RUNS, 4)) + 0.5 * rng.standard_normal((RUNS, 4))
     return shown_spread((1.0 - variance) * seen, np.full((RUNS, 4), variance))
+
+
+def test_no_prediction_is_farther_than_a_normal_number_may_be():
+    """Slopes of a simulation that is about to diverge would lead anywhere."""
+    slopes = np.array([[1e-3, 0.0], [0.0, 1.0]])
+    marginal = Marginal(slopes, np.zeros((1, 2)), np.zeros(2, int))
+    found = marginal.predicted(np.array([-1e12, -4.0]))
+    np.testing.assert_allclose(found, [[FARTHEST, 2.0]], rtol=1e-9)
+    least = np.zeros(2)
+    assert marginal.predicted(np.array([1e12, 1e12]), 0.0, least) == pytest.approx(np.zeros((1, 2)))
 
 
 def test_spreads_are_told_where_the_data_show_them():

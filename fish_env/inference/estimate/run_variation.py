@@ -23,6 +23,10 @@ from fish_env.inference.estimate.box_qp import minimise_in_box
 from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.policy import POLICY
 
+FARTHEST = 30.0
+"""Largest number of a run, in units of its spread. None of a normal law is that far off: where a
+simulation is about to diverge its slopes would lead anywhere."""
+
 
 @dataclass(frozen=True)
 class RunVariation:
@@ -151,7 +155,7 @@ class Marginal:
             residuals: (D,) whitened, at the numbers where the slopes were taken.
             damping: by how much more information than there is each number is held where it is
                 (Marquardt, 1963, J. SIAM 11, 431).
-            least: (K,) smallest value that each may have; default: any.
+            least: (K,) smallest value that each may have; default: any within the farthest.
         """
         found = []
         for own, at in zip(self._slices, self.at, strict=True):
@@ -160,9 +164,10 @@ class Marginal:
             held = information + damping * np.diag(np.diag(information))
             pull = mine.T @ residuals[own] + at
             step = -np.linalg.solve(held, pull)
-            if least is not None and np.any(at + step < least):
-                low = np.minimum(least - at, 0.0)
-                step = minimise_in_box(held, pull, low, np.full(len(at), np.inf)).step
+            low = np.full(len(at), -FARTHEST) if least is None else np.maximum(least, -FARTHEST)
+            if np.any(at + step < low) or np.any(at + step > FARTHEST):
+                box = np.minimum(low - at, 0.0), np.maximum(FARTHEST - at, 0.0)
+                step = minimise_in_box(held, pull, *box).step
             found.append(at + step)
         return np.array(found)
 

@@ -263,6 +263,26 @@ def test_what_diverges_at_the_start_is_refused():
         descended(problem)
 
 
+class Fragile(Differing):
+    """A run diverges where its first number is large."""
+
+    def filtered(self, point, noise, near=()):
+        found = super().filtered(point, noise, near)
+        lost = np.abs(self.own[self.which, 0]) > 5.0
+        return [
+            Evaluated(-np.inf, np.full_like(f.residuals, np.nan)) if gone else f
+            for f, gone in zip(found, lost, strict=True)
+        ]
+
+
+def test_a_run_that_diverges_begins_with_usual_numbers():
+    """They suited another model."""
+    problem, plain = Fragile(), Fragile()
+    problem.own[2] = 6.0, -6.0
+    found = descended(problem)
+    assert found[2] == pytest.approx(descended(plain)[2], rel=1e-6)
+
+
 class Unstable(Differing):
     """A filter that diverges under less noise than it begins with."""
 

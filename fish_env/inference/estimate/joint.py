@@ -99,6 +99,8 @@ def descend_jointly(
     free, noise = slopes.free, slopes.noise
     at = _evaluated(problem, free, vector, noise)
     if not np.isfinite(at.value):
+        at = _without_lost_numbers(at, free, noise)
+    if not np.isfinite(at.value):
         raise np.linalg.LinAlgError("the simulation diverges at the start of the fit")
     at = _agreed(at, free, noise)
     left, exact, first, kept = iterations, True, 0, 1.0
@@ -140,6 +142,19 @@ def _evaluated(problem: Problem, free: Free, vector: FloatArray, noise: Any) -> 
     of_runs = own_objectives(problem, filtered, noise)
     value = _with_prior(free, vector, of_runs)
     return Joint(problem, vector, filtered, value, of_runs)
+
+
+def _without_lost_numbers(at: Joint, free: Free, noise: Any) -> Joint:
+    """The same with usual runs in place of those that diverge.
+
+    Numbers that suit another model may be where this one has no motion.
+    """
+    lost = ~np.isfinite(at.of_runs)
+    numbers = np.where(lost[:, None], 0.0, at.problem.variation)
+    if np.array_equal(numbers, at.problem.variation):
+        return at
+    usual = at.problem.with_variation(numbers, free.unpack(at.vector), noise)
+    return _evaluated(usual, free, at.vector, noise)
 
 
 def _agreed(at: Joint, free: Free, noise: Any) -> Joint:

@@ -175,7 +175,7 @@ class FilteredRuns(Protocol):
 def runs_for_noise(runs: Sequence[RunData]) -> int:
     """Of how many runs the noise is fitted to: a few, and more where these hold few samples."""
     samples = float(np.mean([len(run.clock) for run in runs]))
-    enough = int(np.ceil(IDENTIFICATION.fewest_noise_samples / samples))
+    enough = int(np.ceil(IDENTIFICATION.enough_noise_samples / samples))
     return max(IDENTIFICATION.fewest_noise_runs, enough)
 
 

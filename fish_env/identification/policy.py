@@ -50,7 +50,7 @@ class IdentificationPolicy(Numbers):
         copied_noise: root mean square by which the noise of two runs differs, over that of one,
             below which one is a copy of the other.
         fewest_noise_runs: runs that the noise is fitted to, at least.
-        fewest_noise_samples: samples of these, at least, where there are as many.
+        enough_noise_samples: samples of these, at least, where there are as many.
         least_noise_difference: relative standard deviation over runs of a sensor's noise below
             which all runs count as equally noisy.
         quiet_runs: quantile over runs whose noise is the usual one.
@@ -123,7 +123,7 @@ class IdentificationPolicy(Numbers):
         f"sqrt(2) with noise of its own, 0 in a copy, and half is far from both; {BY_HAND}",
     )
     fewest_noise_runs: int = number(4, 1, 1000, EFFORT)
-    fewest_noise_samples: int = number(3000, 1, 10**6, EFFORT)
+    enough_noise_samples: int = number(3000, 1, 10**6, EFFORT)
     least_noise_difference: float = number(
         0.2, 0.0, 1.0, "a weight that is off by a fifth loses 2 % of what a run tells"
     )

@@ -18,7 +18,7 @@ from fish_env.identification.first_state import POSITIONS, told_at_start, undo_g
 from fish_env.identification.jitter import channel_rates
 from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.noise_scoring import Replayed
-from fish_env.identification.runs import RunData
+from fish_env.identification.runs import FREQUENCY, RunData
 from fish_env.identification.state_blocks import N_ERROR, N_MOVING
 from fish_env.identification.variation import (
     START,
@@ -188,7 +188,7 @@ class RunFilter:
         states = np.zeros((len(self.kernels.state_names), count))
         states[: len(BASE_STATES)] = data.state0[:, None]
         if data.as_measured:
-            states[TAIL_PHASE] += data.variation[START]
+            states[TAIL_PHASE] += data.variation[START] + phase_begun(data, measurement.delay)
             if more is not None:
                 states[TAIL_PHASE] += more[START]
         for i, name in enumerate(self.channels if data.as_measured else ()):
@@ -352,6 +352,21 @@ class RunFilter:
 
         list(_threads().map(one, jobs))
         return out
+
+
+def phase_begun(run: RunData, delay: FloatArray) -> FloatArray:
+    """Phase (N,) that the tail of a run from rest has at the first sample (rad).
+
+    It begins to beat with the commands. Where their clock is ahead, it has begun before.
+
+    Args:
+        run: the run.
+        delay: (N,) age of the samples, on the commands' clock (s).
+    """
+    if run.swimming:
+        return np.zeros(len(delay))
+    frequency = run.driven[1][np.searchsorted(run.driven[0], 0.0, side="right") - 1, FREQUENCY]
+    return np.asarray(2.0 * np.pi * frequency * np.maximum(-delay, 0.0))
 
 
 def sensor_variance(noise: NoiseModel, run: RunData) -> FloatArray:

@@ -186,3 +186,25 @@ def test_a_fit_finds_how_late_camera_and_depth_sensor_are():
         assert high - low < width
     low, high = found.interval(EffectParameterId("sensor_delay", "depth_later"))  # it hardly dives
     assert low < 0.035 < high
+
+
+def test_a_tail_has_begun_to_beat_where_the_commands_are_ahead():
+    """A camera that starts late shows a tail that has beaten since the commands began."""
+    late_s, rows = 0.12, 3
+    setup = Setup(runs=1, duration=6.0, channels=("x", "y", "yaw"))
+    prompt = simulate(setup)
+    (run,) = prompt.runs
+    shown = {name: values[rows:] for name, values in run.channels.items()}
+    late = replace(run, time_s=run.time_s[:-rows], channels=shown)
+    problem = SeriesProblem(replace(prompt, runs=(late,)), paths=PATHS)
+    point = Point(np.zeros(len(PATHS)), {})
+    numbers = np.zeros_like(problem.variation)
+    numbers[:, [v.name for v in problem.variations].index("clock_offset")] = -late_s
+
+    def misfit(one):
+        (found,) = one.filtered(point, setup.noise)
+        return float(np.mean(found.innovations[5:] ** 2))
+
+    right = misfit(SeriesProblem(prompt, paths=PATHS))
+    assert misfit(problem.with_variation(numbers, point, setup.noise)) < 1.3 * right
+    assert misfit(problem) > 2.0 * right

@@ -136,13 +136,9 @@ class Measurement:
         bias = np.ascontiguousarray(varied_bias(self.bias, own, channels))
         delay, ages = varied_delay(self.delay, own), run.ages(own)
         ages = ages if self.ages is None else self.ages + ages
-        moved = replace(self, delay=delay, bias=bias, ages=ages)
-        errors = run.sensor_errors
-        if not errors.any():
-            return moved
-        gain = varied_gain(self.gain, errors, channels)
-        geometry = varied_geometry(self.geometry, errors, len(self.pace))
-        return replace(moved, gain=gain, geometry=geometry)
+        gain = varied_gain(self.gain, run.sensor_errors, channels)
+        geometry = varied_geometry(self.geometry, run.sensor_errors, len(self.pace))
+        return replace(self, delay=delay, gain=gain, bias=bias, geometry=geometry, ages=ages)
 
 
 Job = tuple[RunData, "Filtered", int, FloatArray, FloatArray, Measurement, FloatArray, int, int]

@@ -55,9 +55,14 @@ def white_noise_sd(dataset: Dataset, channel: str) -> float:
     return max(float(np.quantile(spreads, QUANTILE)) / _quantile_of_white_noise(), 1e-5)
 
 
+def noise_differences(values: FloatArray, order: int) -> FloatArray:
+    """Differences along the last axis, each with the spread of a sample's white noise."""
+    scale = np.sqrt(sum(comb(order, k) ** 2 for k in range(order + 1)))
+    return np.asarray(np.diff(values, order) / scale)
+
+
 def _window_spreads(values: FloatArray) -> list[float]:
-    scale = np.sqrt(sum(comb(ORDER, k) ** 2 for k in range(ORDER + 1)))
-    differences = np.diff(values, ORDER) / scale
+    differences = noise_differences(values, ORDER)
     window = min(WINDOW, len(differences))
     if window < 3:
         return []

@@ -10,15 +10,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
-from math import comb
 
 import numpy as np
 
-from fish_env.arrays import BoolArray, FloatArray
+from fish_env.arrays import FloatArray
 from fish_env.data.schema import Dataset, Run
+from fish_env.data.units import unwrap_angle
 from fish_env.identification.channels import usable_channels
+from fish_env.identification.noise import noise_differences
 from fish_env.identification.policy import IDENTIFICATION
 from fish_env.identification.runs import FREQUENCY
+from fish_env.rigidbody.gridded import WINDING
 from fish_env.sensing.devices import Device, devices_of
 
 ORDER = 8
@@ -37,8 +39,8 @@ def noise_scales(dataset: Dataset, channels: Sequence[str]) -> dict[str, FloatAr
     found = np.ones((len(dataset.runs), len(channels)))
     devices = np.array(devices_of(channels))
     if all(_slow(run) for run in dataset.runs):
-        spreads = np.array([[_spread(run.channels[n]) for n in channels] for run in dataset.runs])
-        counts = np.array([[_count(run.channels[n]) for n in channels] for run in dataset.runs])
+        told = np.array([[_spread(run, n) for n in channels] for run in dataset.runs])
+        spreads, counts = told[..., 0], told[..., 1]
         for device in np.unique(devices[devices != Device.DRIVE]).tolist():
             own = devices == device
             found[:, own] = _scales(spreads[:, own], counts[:, own])[:, None]
@@ -98,35 +100,21 @@ def _slow(run: Run) -> bool:
     return fastest * float(np.median(np.diff(run.time_s))) < FASTEST
 
 
-def _differences(values: FloatArray) -> FloatArray:
-    """Differences of high order, each with the spread of a sample's noise."""
-    scale = np.sqrt(sum(comb(ORDER, k) ** 2 for k in range(ORDER + 1)))
-    return np.asarray(np.diff(values, ORDER) / scale)
+def _spread(run: Run, channel: str) -> tuple[float, int]:
+    """Spread of a channel's noise, whatever outliers it has, and of how many differences it is.
 
-
-def _spread(values: FloatArray) -> float:
-    """Spread of the noise of a channel, whatever outliers it has; NaN where samples are too few."""
-    found = np.abs(_differences(_unwrapped(values)))
+    NaN where samples are too few.
+    """
+    values = run.channels[channel]
+    values = unwrap_angle(values) if channel in WINDING else values
+    found = np.abs(noise_differences(values, ORDER))
     found = found[np.isfinite(found)]
-    return float(np.median(found)) if len(found) > ORDER else np.nan
-
-
-def _count(values: FloatArray) -> float:
-    """Number of differences that a channel allows."""
-    return float(np.isfinite(_differences(values)).sum())
-
-
-def _unwrapped(values: FloatArray) -> FloatArray:
-    """Without turns of a whole circle, which other channels do not have; gaps stay."""
-    there: BoolArray = np.isfinite(values)
-    found = values.copy()
-    found[there] = np.unwrap(values[there])
-    return found
+    return (float(np.median(found)) if len(found) > ORDER else np.nan), len(found)
 
 
 @cache
 def _relative_variance() -> float:
     """Variance of the logarithm of a spread times the differences it is of (fixed draws)."""
     normals = np.random.default_rng(0).standard_normal((2000, 200 + ORDER))
-    spreads = [np.median(np.abs(_differences(row))) for row in normals]
+    spreads = np.median(np.abs(noise_differences(normals, ORDER)), axis=1)
     return float(200 * np.var(np.log(spreads)))

@@ -297,9 +297,8 @@ def _shown_start(run: RunData, changes: FloatArray, channels: Sequence[str]) -> 
     begun = np.zeros((N_ERROR, changes.shape[1]))
     if not run.as_measured:
         return begun
-    told = {name: changes[list(channels).index(name)] for name in channels}
-    told = {name: told[name] for name in told_at_start(run.swimming) if name in told}
-    none = np.zeros(changes.shape[1])
+    names, none = told_at_start(run.swimming), np.zeros(changes.shape[1])
+    told = {name: own for name, own in zip(channels, changes, strict=True) if name in names}
     begun[columns("position")] = [told.get(name, none) for name in _PLACE]
     euler = euler_from_quaternion(run.state0[3:7])[None]
     turned = np.array([told.get(name, none) for name in _ATTITUDE])

@@ -56,7 +56,7 @@ def test_a_noisy_run_is_told_by_its_size_with_gaps_and_an_outlier(plain):
 
 
 def test_samples_too_few_for_a_beat_tell_no_noise(plain):
-    """What is left of the motion in their differences would pass for noise."""
+    """The motion that their differences still hold would pass for noise."""
     dataset = noisier(plain, {plain.ids[3]: 3.0})
     slow = [
         replace(

@@ -85,16 +85,23 @@ def set_commands(work, width, times, values, at, start, length, skew, delay, sha
 @shared_kernel
 def step_lanes_once(work, elapsed, h, pace, late, history, tables):
     """One RK4 step of every lane, kept where it stays finite."""
-    width = BLOCK
-    for k in range(width):  # true time since the run began is `pace` times the recorded one
+    width, lanes = BLOCK, pace.shape[0]  # as many, but unknown: see rk4_step
+    for k in range(lanes):  # true time since the run began is `pace` times the recorded one
         work[TIME * width + k] = (pace[k] - 1.0) * elapsed
     rk4_step(work, width, elapsed, h, tables, late, history, 0, width, pace)
-    normalise(work, width)
+    normalise(work, width, lanes)
     for n in range(BODY * width):  # what the step has changed, see keep_step
         work[SUM * width + n] = work[X * width + n] - work[X0 * width + n]
+    finite = True
     for n in range(N_STATES * width):
-        value = work[X * width + n]
-        work[X0 * width + n] = value if abs(value) < DIVERGED else work[X0 * width + n]
+        finite &= abs(work[X * width + n]) < DIVERGED
+    if finite:  # the usual case: masked stores are slow
+        for n in range(N_STATES * width):
+            work[X0 * width + n] = work[X * width + n]
+    else:
+        for n in range(N_STATES * width):
+            value = work[X * width + n]
+            work[X0 * width + n] = value if abs(value) < DIVERGED else work[X0 * width + n]
 
 
 @kernel
@@ -216,12 +223,18 @@ def initialise_effects(work):
 
 
 @kernel
+def whole_vectors(lanes, width):
+    """So many lanes, and those that are computed together with them."""
+    return min(width, VECTOR * ((lanes + VECTOR - 1) // VECTOR))
+
+
+@kernel
 def start_effects(work, lanes, width, begin, swimming, pace, late, history, tables):
     """Which effects are on, and their states where the start of a run or beating before it has.
 
     Only so many lanes will move; the others stay where they are.
     """
-    switch_effects(min(width, VECTOR * ((lanes + VECTOR - 1) // VECTOR)), width, work)
+    switch_effects(whole_vectors(lanes, width), width, work)
     initialise_effects(work)
     if swimming & past_matters(width, work):
         base = work[X0 * width : (X0 + BASE) * width].copy()

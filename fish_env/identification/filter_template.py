@@ -46,6 +46,7 @@ from fish_env.model.composed import (
     share_told,
     start_effects,
     step_lanes_once,
+    whole_vectors,
 )
 
 # --- end ---
@@ -81,7 +82,7 @@ def slopes_of_interval(
         start = begin + i * h
         set_commands(work, width, times, values, at, start, h, skew, delay, True)
         step_lanes_once(work, start, h, pace, late, history, tables)
-        keep_step(work, width, path, i)
+        keep_step(work, width, 1, path, i)
     difference(work, width, gap)
     for j in range(N_MOVING):
         for k in range(N_ERROR):
@@ -198,7 +199,7 @@ def ekf_run(
             work, width, codes, gain, ages, h, steps, path, lens, measured[sample], rows
         )
         innovations_of(
-            work, width, measured[sample], codes, gains, biases, ages, h, steps, path, lens, e
+            work, width, 1, measured[sample], codes, gains, biases, ages, h, steps, path, lens, e
         )
         log_det = whitened_gain(
             p, rows, measured[sample], noise_variance, smear[sample], s, w, seen, k_gain
@@ -242,25 +243,25 @@ def push(work, width, basis, sample, column, size, sign, first, count):
 
 @kernel
 def take_sample(
-    work, width, measured, codes, gain, bias, ages, h, steps, path, lens, k_in, w_in, e, error,
-    white, late, history,
+    work, width, lanes, measured, codes, gain, bias, ages, h, steps, path, lens, k_in, w_in, e,
+    error, white, late, history,
 ):  # fmt: skip
     """Innovations of all lanes at one sample, whitened into white (C, width); states corrected."""
     channels = codes.shape[0]
-    innovations_of(work, width, measured, codes, gain, bias, ages, h, steps, path, lens, e)
+    innovations_of(work, width, lanes, measured, codes, gain, bias, ages, h, steps, path, lens, e)
     for i in range(channels):
-        for k in range(width):
+        for k in range(lanes):
             white[i, k] = w_in[i, 0] * e[0, k]
         for j in range(1, i + 1):
             factor = w_in[i, j]
-            for k in range(width):
+            for k in range(lanes):
                 white[i, k] += factor * e[j, k]
     for i in range(N_ERROR):
-        for k in range(width):
+        for k in range(lanes):
             error[i, k] = k_in[i, 0] * e[0, k]
         for j in range(1, channels):
             factor = k_in[i, j]
-            for k in range(width):
+            for k in range(lanes):
                 error[i, k] += factor * e[j, k]
     move(work, width, error, late, history)
 
@@ -280,7 +281,7 @@ def filter_block(
     gain, bias = np.ones((channels, width)), np.zeros((channels, width))
     ages = np.zeros((ages_all.shape[0], width))
     at = np.zeros(width, np.int64)
-    shared = True
+    shared, lanes = True, whole_vectors(count, width)
     for k in range(width):
         lane = first + min(k, count - 1)
         load_lane(work, width, k, states0[:, lane], par, lane, values[0])
@@ -313,7 +314,7 @@ def filter_block(
                 begin = clock[sample - 1] + i * h
                 set_commands(work, width, times, values, at, begin, h, skew, delay, shared)
                 step_lanes_once(work, begin, h, pace, late, history, tables)
-                keep_step(work, width, path, i)
+                keep_step(work, width, lanes, path, i)
             if pushed:
                 push(
                     work, width, push_basis, sample - 1, push_column, push_size, -1.0, first, count
@@ -323,7 +324,7 @@ def filter_block(
             for n in range(WRENCH * width, (WRENCH + 6) * width):
                 work[n] *= keep
         take_sample(
-            work, width, measured[sample], codes, gain, bias, ages, h, steps, path, lens,
+            work, width, lanes, measured[sample], codes, gain, bias, ages, h, steps, path, lens,
             k_in[sample], w_in[sample], e, error, white, late, history,
         )  # fmt: skip
         for k in range(count):

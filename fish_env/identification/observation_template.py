@@ -23,14 +23,15 @@ ROTATION, RATES = first_column("rotation"), first_column("rate")
 VELOCITIES = first_column("velocity")
 BODY = 13  # rows of the state that channels of the body follow from: pose and velocities
 MOUNT, MARKER, TILT, BENT, IRON = 0, 9, 12, 18, 20  # rows of a lens (see sensing.geometry)
+LEFT, PART = SUM, SUM + 1
 PERTURB = 1e-5  # of each error state for its slopes, but of the phase, see slopes_of_interval
 TURN = 0.05  # of the phase to either side (rad): about what it is uncertain by
 
 
 @kernel
-def normalise(work, width):
-    """Make the quaternions of the X rows unit ones."""
-    for k in range(width):
+def normalise(work, width, lanes):
+    """Make the quaternions of these lanes' X rows unit ones."""
+    for k in range(lanes):
         qw, qx = work[(X + 3) * width + k], work[(X + 4) * width + k]
         qy, qz = work[(X + 5) * width + k], work[(X + 6) * width + k]
         scale = 1.0 / np.sqrt(qw * qw + qx * qx + qy * qy + qz * qz)
@@ -41,43 +42,52 @@ def normalise(work, width):
 
 
 @kernel
-def keep_step(work, width, path, step):
+def keep_step(work, width, lanes, path, step):
     """Keep how the body's state changed in a step, and its slope at the end.
 
     Args:
-        work: the lanes, just after the step.
-        width: lanes.
+        work: all lanes, just after the step.
+        width: how many these are.
+        lanes: how many of them to keep.
         path: (steps, 26, width) what was kept of the steps of this interval, or no rows.
         step: number of the step.
     """
     if path.shape[0] > 0:
         for j in range(BODY):
-            for k in range(width):
+            for k in range(lanes):
                 path[step, j, k] = work[(SUM + j) * width + k]
                 path[step, BODY + j, k] = work[(DX + j) * width + k]
 
 
 @kernel
-def put_earlier(work, width, age, h, steps, path):
+def put_earlier(work, width, lanes, age, h, steps, path):
     """Put the body's state ``age`` (width,) seconds before the end of an interval into the X rows.
 
     The steps of h seconds are gone back, the last one in part: to second order about its end, from
-    its slope there and the change over it.
+    its slope there and the change over it. All of a step is then just that change. Two of the SUM
+    rows, which are free after a step, hold what time is left and the part of it in this step.
     """
-    for k in range(width):
-        left, step = age[k], steps - 1
-        for j in range(BODY):
+    for k in range(lanes):
+        work[LEFT * width + k] = age[k]
+    for j in range(BODY):
+        for k in range(lanes):
             work[(X + j) * width + k] = work[(X0 + j) * width + k]
-        while (left > h) & (step > 0):
-            for j in range(BODY):
-                work[(X + j) * width + k] -= path[step, j, k]
-            left -= h
-            step -= 1
+    step, on = steps - 1, True
+    while on:
+        on = False
+        for k in range(lanes):
+            left = work[LEFT * width + k]
+            part = min(left, h) if step > 0 else left
+            work[PART * width + k] = part
+            work[LEFT * width + k] = left - part
+            on |= left > part
         for j in range(BODY):
-            slope = path[step, BODY + j, k]
-            bend = (slope * h - path[step, j, k]) * (2.0 / (h * h))
-            work[(X + j) * width + k] -= left * (slope - 0.5 * left * bend)
-    normalise(work, width)
+            for k in range(lanes):
+                part, slope = work[PART * width + k], path[step, BODY + j, k]
+                bend = (slope * h - path[step, j, k]) * (2.0 / (h * h))
+                work[(X + j) * width + k] -= part * (slope - 0.5 * part * bend)
+        step -= 1
+    normalise(work, width, lanes)
 
 
 @kernel
@@ -148,14 +158,24 @@ def seen_rate(work, width, lens, k, axis, base):
 
 
 @kernel
-def seen_angle(work, width, lens, k, index, base):
-    """Roll, pitch or yaw of R M of a lane, the yaw bent by iron (rad)."""
+def seen_roll(work, width, lens, k, base):
+    """Roll of R M of a lane (rad)."""
     turn = turn_of(work, width, k, base)
-    if index == 0:
-        return angle(mounted(turn[2], lens, k, 1), mounted(turn[2], lens, k, 2))
-    if index == 1:
-        sine = min(max(-mounted(turn[2], lens, k, 0), -1.0), 1.0)
-        return angle(sine, np.sqrt(1.0 - sine * sine))
+    return angle(mounted(turn[2], lens, k, 1), mounted(turn[2], lens, k, 2))
+
+
+@kernel
+def seen_pitch(work, width, lens, k, base):
+    """Pitch of R M of a lane (rad)."""
+    turn = turn_of(work, width, k, base)
+    sine = min(max(-mounted(turn[2], lens, k, 0), -1.0), 1.0)
+    return angle(sine, np.sqrt(1.0 - sine * sine))
+
+
+@kernel
+def seen_yaw(work, width, lens, k, base):
+    """Yaw of R M of a lane, bent by iron (rad)."""
+    turn = turn_of(work, width, k, base)
     sine, cosine = mounted(turn[1], lens, k, 0), mounted(turn[0], lens, k, 0)
     scale = 1.0 / max(sine * sine + cosine * cosine, 1e-12)
     twice = lens[IRON, k] * (2.0 * sine * cosine)
@@ -164,8 +184,38 @@ def seen_angle(work, width, lens, k, index, base):
 
 
 @kernel
-def innovations_of(work, width, measured, codes, gain, bias, ages, h, steps, path, lens, e):
-    """Measured minus predicted channels of every lane, e (C, width).
+def show(work, width, lanes, kind, index, base, lens, shown):
+    """What a channel of these lanes shows of the state in the rows from ``base``, (width,).
+
+    A loop of its own for each kind: in one for all, every lane would compute every kind.
+    """
+    if kind == DRIVE:
+        for k in range(lanes):
+            shown[k] = work[ANGLE * width + k]
+    elif kind == EULER:
+        if index == 0:
+            for k in range(lanes):
+                shown[k] = seen_roll(work, width, lens, k, base)
+        elif index == 1:
+            for k in range(lanes):
+                shown[k] = seen_pitch(work, width, lens, k, base)
+        else:
+            for k in range(lanes):
+                shown[k] = seen_yaw(work, width, lens, k, base)
+    elif index < 2:
+        for k in range(lanes):
+            shown[k] = seen_place(work, width, lens, k, index, base)
+    elif index >= RATE:
+        for k in range(lanes):
+            shown[k] = seen_rate(work, width, lens, k, index - RATE, base)
+    else:
+        for k in range(lanes):
+            shown[k] = work[(base + index) * width + k]
+
+
+@kernel
+def innovations_of(work, width, lanes, measured, codes, gain, bias, ages, h, steps, path, lens, e):
+    """Measured minus predicted channels of these lanes, e (C, width).
 
     A channel's code is its kind, its index, its column and its device (see ``channels``). Each
     device shows the state of ``ages`` (devices, width) seconds ago, which the path of the last
@@ -176,21 +226,12 @@ def innovations_of(work, width, measured, codes, gain, bias, ages, h, steps, pat
     for i in range(codes.shape[0]):
         kind, index, device = codes[i, 0], codes[i, 1], codes[i, 3]
         if aged & (device != last):
-            put_earlier(work, width, ages[device], h, steps, path)
+            put_earlier(work, width, lanes, ages[device], h, steps, path)
             last = device
-        for k in range(width):
-            if kind == EULER:
-                shown = seen_angle(work, width, lens, k, index, base)
-            elif kind == DRIVE:
-                shown = work[ANGLE * width + k]
-            elif index < 2:
-                shown = seen_place(work, width, lens, k, index, base)
-            elif index >= RATE:
-                shown = seen_rate(work, width, lens, k, index - RATE, base)
-            else:
-                shown = work[(base + index) * width + k]
-            predicted = gain[i, k] * shown + bias[i, k]
-            e[i, k] = innovation(measured[i], predicted, (kind == EULER) & (index != 1))
+        show(work, width, lanes, kind, index, base, lens, e[i])
+        turns = (kind == EULER) & (index != 1)
+        for k in range(lanes):
+            e[i, k] = innovation(measured[i], gain[i, k] * e[i, k] + bias[i, k], turns)
 
 
 @kernel
@@ -257,7 +298,7 @@ def observation_rows(work, width, codes, gain, ages, h, steps, path, lens, measu
             rows[i, j] = 0.0
         kind, index, column, device = codes[i, 0], codes[i, 1], codes[i, 2], codes[i, 3]
         if aged & (device != last):
-            put_earlier(work, width, ages[device], h, steps, path)
+            put_earlier(work, width, 1, ages[device], h, steps, path)
             last = device
         size = gain[i] if measured[i] == measured[i] else 0.0
         if kind == DRIVE:

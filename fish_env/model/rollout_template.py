@@ -147,8 +147,9 @@ def rk4_step(work, width, elapsed, h, tables, late, history, first, count, pace)
             recall(work, width, TOLD, PAST, BEGIN, fraction * h, h, history, first, count)
         derive_lanes(width, elapsed, fraction * h, work, tables)
         if pace.shape[0] > 0:
+            # As long as the width, but unknown: else the loop would be unrolled, not vectorised.
             for i in range(N_SLOPES):
-                for k in range(width):
+                for k in range(pace.shape[0]):
                     work[(DX + i) * width + k] *= pace[k]
         if stage < 3:
             for n in range(N_SLOPES * width):

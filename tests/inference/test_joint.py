@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
+from fish_env.inference.estimate import own_steps
 from fish_env.inference.estimate.again import with_run_variation
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.estimate.free import Free
@@ -320,3 +321,33 @@ def test_a_spread_is_fitted_also_where_runs_begin_with_the_numbers_they_have():
     assert max(varied.noise.spread) > 0.3
     assert varied.problem.variation.any()
     assert varied.objective < own.objective - 100.0
+
+
+class Unseen(Differing):
+    """The first run shows nothing until its own number and the shared one pass a corner."""
+
+    corner, steepness = 0.5, 100.0
+
+    def __init__(self, seed):
+        super().__init__(seed)
+        self.data[0] -= self.model(2.0, self.true)[0]
+
+    def model(self, shared, own):
+        found = super().model(shared, own)
+        beyond = max(shared + own[0, 0] - self.corner, 0.0)
+        found[0] = self.steepness * beyond * self.x[0]
+        return found
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_one_run_at_a_corner_does_not_hold_back_the_others(seed):
+    """Its slopes say nothing before the step, and it follows by a step of its own after it."""
+    moved, vector, _, _, _ = descended(Unseen(seed))
+    assert vector[0] == pytest.approx(2.0, abs=0.3)
+    assert vector[0] + moved.own[0, 0] == pytest.approx(Unseen.corner, abs=0.1)
+
+
+def test_without_a_step_of_its_own_it_does(monkeypatch):
+    monkeypatch.setattr(own_steps, "OWN_DAMPINGS", ())
+    _, vector, _, _, _ = descended(Unseen(0))
+    assert vector[0] == pytest.approx(Unseen.corner, abs=0.1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -47,7 +48,8 @@ def with_own_steps(
         return tried
     for share in OWN_SHARES:
         lagging.take(model.own.at + share * (own - model.own.at))
-    lagging.step_alone()
+    with suppress(np.linalg.LinAlgError):  # where one of them diverges, what was reached counts
+        lagging.step_alone()
     return lagging.joint()
 
 

@@ -47,7 +47,7 @@ def with_own_steps(
     if not lagging.runs or 2 * len(lagging.runs) > at.problem.run_count:
         return tried
     for share in OWN_SHARES:
-        lagging.take(model.own.at + share * (own - model.own.at))
+        lagging.take(model.own.at + share * (own - model.own.at), at.filtered)
     with suppress(np.linalg.LinAlgError):  # where one of them diverges, what was reached counts
         lagging.step_alone()
     return lagging.joint()
@@ -88,11 +88,11 @@ class Lagging:
         part = self.at.problem.some(self.runs)
         return part.with_variation(own, self.point, self.noise, [near[i] for i in self.runs])
 
-    def take(self, numbers: FloatArray, near: Sequence[Evaluation] | None = None) -> bool:
+    def take(self, numbers: FloatArray, near: Sequence[Evaluation]) -> bool:
         """Take over the numbers (R, K) of runs that lose less by them; whether any does."""
         if not self.runs:
             return False
-        part = self._with(numbers, self.at.filtered if near is None else near)
+        part = self._with(numbers, near)
         found = part.filtered(self.point, self.noise)
         values, gained = own_objectives(part, found, self.noise), False
         for i, evaluation, value in zip(self.runs, found, values, strict=True):
@@ -105,20 +105,19 @@ class Lagging:
     def step_alone(self) -> None:
         """Let each take steps by its own numbers, about where the shared parameters have moved."""
         slopes: Marginal | None = None
-        asked: list[int] = []
         for damping in OWN_DAMPINGS:
             if not self.runs:
                 return
             if slopes is None:
-                part, asked = self._with(self.numbers, self.filtered), self.runs
-                near = [self.filtered[i] for i in asked]
+                near = [self.filtered[i] for i in self.runs]
+                part = self._with(self.numbers, self.filtered)
                 slopes = marginal_of(part, self.point, self.noise, near)
                 assert slopes is not None
                 residuals = np.concatenate([run.residuals for run in near])
             moved = self.numbers.copy()
-            moved[asked] = slopes.predicted(residuals, damping, self.model.least)
+            moved[self.runs] = slopes.predicted(residuals, damping, self.model.least)
             if self.take(moved, self.filtered):
-                slopes = None
+                slopes = None  # of fewer runs now, or where they no longer are
 
     def joint(self) -> Joint:
         """Everything where the step has led."""

@@ -31,6 +31,11 @@ has most of its likelihood."""
 ORDER = 4
 WINDOW = 30
 QUANTILE = 0.15
+ROUNDS, NEAR = 3, 0.4
+"""Most searches along anew filtered runs, and the relative change of the disturbance by which they
+are not to be filtered anew."""
+SHARES = (1.0, 0.5, 0.25, 0.1)
+"""Of the way to the likeliest noise model along the present motion, tried one after another."""
 GAIN = 0.1
 """The noise model is found when a step gains no more log likelihood."""
 
@@ -200,15 +205,51 @@ def fitted_noise(
     """
     allowed = JITTER_SD_RANGE[0], min(JITTER_SD_RANGE[1], problem.largest_jitter_s)
     plausible = replace(disturbance_range(problem.fish), jitter=allowed)
-    found = noise
-    for _ in range(3):
-        runs, made_with = problem.filtered(point, found, keep_slopes=True), found
+    runs = problem.filtered(point, noise, keep_slopes=True)
+    for _ in range(ROUNDS):
         # The lean filter will do: covariances are replayed, and no effect is computed again.
-        replay = partial(problem.lean_filter.replay, runs, made_with)
-        found = _searched(replay, found, plausible, largest_sensor_sd)
-        if made_with.is_close(found, 0.4):
-            break
-    return found
+        replay = partial(problem.lean_filter.replay, runs, noise)
+        found = _searched(replay, noise, plausible, largest_sensor_sd)
+        if noise.is_close(found, NEAR):
+            return found
+        step = _confirmed(problem, point, noise, found, _likelihood(runs))
+        if step is None:
+            return noise
+        noise, runs = step
+    return noise
+
+
+def _confirmed(
+    problem: FilteredRuns, point: Point, noise: NoiseModel, found: NoiseModel, least: float
+) -> tuple[NoiseModel, list[Filtered]] | None:
+    """The noise model found, or one on the way to it, if filtered runs are as likely under it.
+
+    A replay keeps the motion that the runs were linearised along. A filter that follows the data
+    more, or less, may lose a beat that another keeps.
+
+    Args:
+        problem: the runs.
+        point: values of the parameters.
+        noise: the noise model before.
+        found: the likeliest by the replay.
+        least: log likelihood of the runs under the noise model before.
+
+    Returns:
+        The noise model, and the runs filtered under it; None where each is less likely.
+    """
+    for share in SHARES:
+        trial = found if share == 1.0 else noise.towards(found, share)
+        try:
+            runs = problem.filtered(point, trial, keep_slopes=True)
+        except np.linalg.LinAlgError:
+            continue
+        if _likelihood(runs) >= least:
+            return trial, runs
+    return None
+
+
+def _likelihood(runs: Sequence[Filtered]) -> float:
+    return sum(run.log_likelihood for run in runs)
 
 
 def _searched(

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -15,6 +16,8 @@ LARGEST_TURN = 0.3
 """By which one sample may correct the tail's phase (rad). What a phase does is a sine: over this
 much it is off its tangent by 5 %, and beyond it a correction soon points the wrong way."""
 
+DISTURBANCE = ("force_sd", "moment_sd", "correlation_s")
+"""Names of the numbers of the disturbance."""
 UNEVEN_PHASE_SD = 0.03
 """Random walk of the tail's phase (rad/s^0.5) that a fit begins with where runs beat differently:
 no such beat is constant to the last. Its size is then estimated with the disturbance, up to
@@ -45,9 +48,25 @@ class NoiseModel:
 
     def is_close(self, other: NoiseModel, share: float) -> bool:
         """Whether the disturbance of another noise model differs by less than a share of this."""
-        names = ("force_sd", "moment_sd", "correlation_s")
-        pairs = [(getattr(self, name), getattr(other, name)) for name in names]
+        pairs = [(getattr(self, name), getattr(other, name)) for name in DISTURBANCE]
         return all(abs(np.log(b / a)) < share for a, b in pairs)
+
+    def towards(self, other: NoiseModel, share: float) -> NoiseModel:
+        """Part of the way to another noise model, in logarithms of the disturbance and sensors.
+
+        Args:
+            other: the noise model.
+            share: of the way; the jitter is the other's.
+        """
+
+        def between(a: Any, b: Any) -> Any:
+            return a ** (1.0 - share) * b**share
+
+        return replace(
+            other,
+            sensor_sd=between(self.sensor_sd, other.sensor_sd),
+            **{n: between(getattr(self, n), getattr(other, n)) for n in DISTURBANCE},
+        )
 
     @property
     def phase_reach(self) -> float:

@@ -2,6 +2,7 @@
 
 import warnings
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from fish_env.identification.noise import (
     DisturbanceRange,
     disturbance_range,
     fit_noise,
+    fitted_noise,
     white_noise_sd,
 )
 from fish_env.identification.noise_model import NoiseModel
@@ -134,3 +136,41 @@ def test_a_disturbance_that_never_ends_is_a_misfit_with_another_name():
     assert not within.left_by(replace(felt, correlation_s=2.0))
     faint = replace(felt, force_sd=0.02 * within.force[1])
     assert not within.left_by(faint), "how long a faint one lasts no run tells"
+
+
+class ToyRuns:
+    """Toy runs: what a noise model makes of them along one motion, and filtered anew."""
+
+    fish = load_fish("zheng-2021-a")
+    largest_jitter_s = 0.0
+
+    def __init__(self, wanted, filter_anew):
+        self.along = toy(wanted)
+        self.lean_filter = SimpleNamespace(replay=lambda runs, made_with, noise: self.along(noise))
+        self.filter_anew = filter_anew
+
+    def filtered(self, point, noise, near=(), keep_slopes=False):
+        return self.filter_anew(self, noise)
+
+
+@pytest.mark.parametrize("lost", ["less likely", "diverged"])
+def test_a_noise_model_under_which_runs_lose_a_beat_is_not_taken(lost):
+    """A replay cannot know it: the likeliest noise model on the way that keeps them is."""
+    start = NoiseModel(np.array([0.001]), 3e-3, 1e-4, 1.0)
+    wanted = (0.015, 3e-4, 0.4)
+
+    def filtered(runs, noise):
+        if noise.force_sd > 0.01:
+            if lost == "diverged":
+                raise np.linalg.LinAlgError
+            return [SimpleNamespace(log_likelihood=-1e9)]
+        return [SimpleNamespace(log_likelihood=runs.along(noise).log_likelihood)]
+
+    losing = ToyRuns(wanted, filtered)
+    found = fitted_noise(losing, None, start, None)
+    assert start.force_sd < found.force_sd <= 0.01
+    assert losing.along(found).log_likelihood > losing.along(start).log_likelihood
+    keeping = ToyRuns(wanted, lambda runs, noise: [runs.along(noise)])
+    np.testing.assert_allclose(
+        three_sizes(fitted_noise(keeping, None, start, None)), wanted, rtol=0.03
+    )

@@ -32,8 +32,8 @@ ORDER = 4
 WINDOW = 30
 QUANTILE = 0.15
 ROUNDS, NEAR = 3, 0.4
-"""Most searches along anew filtered runs, and the relative change of the disturbance by which they
-are not to be filtered anew."""
+"""Most searches along anew filtered runs, and the relative change of the disturbance and of the
+sensors by which they are not to be filtered anew."""
 SHARES = (1.0, 0.5, 0.25, 0.1)
 """Of the way to the likeliest noise model along the present motion, tried one after another."""
 GAIN = 0.1
@@ -172,6 +172,9 @@ class FilteredRuns(Protocol):
     def lean_filter(self) -> RunFilter:
         """The quickest filter that knows the runs."""
 
+    def some(self, runs: Sequence[int]) -> FilteredRuns:
+        """The same with some of its runs."""
+
     def filtered(
         self,
         point: Point,
@@ -190,7 +193,12 @@ def runs_for_noise(runs: Sequence[RunData]) -> int:
 
 
 def fitted_noise(
-    problem: FilteredRuns, point: Point, noise: NoiseModel, largest_sensor_sd: FloatArray | None
+    problem: FilteredRuns,
+    few: Sequence[int],
+    point: Point,
+    noise: NoiseModel,
+    largest_sensor_sd: FloatArray | None,
+    filtered: Sequence[Filtered] = (),
 ) -> NoiseModel:
     """Noise model of largest likelihood at a point.
 
@@ -198,24 +206,31 @@ def fitted_noise(
     which once stood in for a misfit does not stay.
 
     Args:
-        problem: the runs, few of them.
+        problem: the runs.
+        few: those that tell the noise.
         point: values of the parameters.
         noise: the present noise model.
         largest_sensor_sd: as :func:`fit_noise` takes it.
+        filtered: the runs filtered under the present noise model, if they are.
     """
     allowed = JITTER_SD_RANGE[0], min(JITTER_SD_RANGE[1], problem.largest_jitter_s)
     plausible = replace(disturbance_range(problem.fish), jitter=allowed)
-    runs = problem.filtered(point, noise, keep_slopes=True)
+    some = problem.some(few)
+    filtered = filtered or problem.filtered(point, noise, keep_slopes=True)
+    telling = [filtered[run] for run in few]
+    if any(run.slopes is None for run in telling):
+        telling = some.filtered(point, noise, keep_slopes=True)
     for _ in range(ROUNDS):
         # The lean filter will do: covariances are replayed, and no effect is computed again.
-        replay = partial(problem.lean_filter.replay, runs, noise)
+        replay = partial(some.lean_filter.replay, telling, noise)
         found = _searched(replay, noise, plausible, largest_sensor_sd)
-        if noise.is_close(found, NEAR):
+        if noise.is_close(found, NEAR) and noise.sensors_are_close(found, NEAR):
             return found
-        step = _confirmed(problem, point, noise, found, _likelihood(runs))
+        step = _confirmed(problem, point, noise, found, _likelihood(filtered))
         if step is None:
             return noise
-        noise, runs = step
+        noise, filtered = step
+        telling = [filtered[run] for run in few]
     return noise
 
 

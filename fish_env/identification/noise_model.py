@@ -51,6 +51,10 @@ class NoiseModel:
         pairs = [(getattr(self, name), getattr(other, name)) for name in DISTURBANCE]
         return all(abs(np.log(b / a)) < share for a, b in pairs)
 
+    def sensors_are_close(self, other: NoiseModel, share: float) -> bool:
+        """Whether the noise of another's sensors differs by less than a share of this one's."""
+        return bool(np.all(np.abs(np.log(other.sensor_sd / self.sensor_sd)) < share))
+
     def towards(self, other: NoiseModel, share: float) -> NoiseModel:
         """Part of the way to another noise model, in logarithms of the disturbance and sensors.
 

@@ -67,7 +67,7 @@ def renumbered(
     values: FloatArray,
     point: Point,
     noise: NoiseModel,
-    near: Sequence[Filtered] = (),
+    near: Sequence[Filtered | None] = (),
 ) -> list[RunData]:
     """The runs with other numbers. A run that keeps its numbers stays as it is.
 
@@ -78,7 +78,8 @@ def renumbered(
         noise: noise model.
         near: the runs filtered at numbers close by, with their slopes; what other errors do to
             samples then changes as that motion says, and where all runs keep their numbers it comes
-            nearer to what that motion says, unless it agrees already.
+            nearer to what that motion says, unless it agrees already. None of a run that stays as
+            it is.
 
     Raises:
         LinAlgError: a number is not finite, or the simulation diverges.
@@ -93,7 +94,10 @@ def renumbered(
         kept = np.array_equal(values, _numbers(runs))
         change = _undone if kept else _moved
         triples = zip(numbered, runs, near, strict=True)
-        found = [change(run, before, f, problem.channels) for run, before, f in triples]
+        found = [
+            run if f is None else change(run, before, f, problem.channels)
+            for run, before, f in triples
+        ]
         return runs if kept and _agree(runs, found, problem.sensor_sd) else found
     changed = []
     for i, run in enumerate(runs):

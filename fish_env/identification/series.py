@@ -194,7 +194,7 @@ class SeriesProblem(Problem):
         """Noise model of largest likelihood at a point, from as many runs as that takes."""
         largest = self.largest_sensor_sd if final else None
         few = self.spread(runs_for_noise(self.runs))
-        return fitted_noise(self.some(few), point, noise, largest)
+        return fitted_noise(self, few, point, noise, largest, filtered)
 
     def disturbance_at_limit(self, noise: NoiseModel) -> tuple[str, ...]:
         """How the disturbance leaves what is plausible: a misfit with another name."""

@@ -262,7 +262,8 @@ class Problem(Protocol):
             point: values of the shared parameters, close to theirs.
             noise: noise model.
             near: evaluation at numbers close by; what follows from the motion is then taken from
-                it, and not from the motion that these numbers show.
+                it, and not from the motion that these numbers show. None of a run that keeps its
+                numbers and stays as it is.
         """
         return self
 

@@ -15,7 +15,7 @@ from tests.identification.synthetic import PATHS, Setup, simulate
 def found_in(setup: Setup, **noise):
     problem = SeriesProblem(simulate(setup), paths=PATHS)
     start = replace(setup.noise, jitter_sd=0.0, **noise)
-    return fitted_noise(problem, problem.start, start, None)
+    return fitted_noise(problem, range(problem.run_count), problem.start, start, None)
 
 
 def test_rates_are_those_of_the_channels():

@@ -81,7 +81,10 @@ def test_the_noise_of_a_run_is_not_taken_for_a_disturbance(plain):
     assert loud.noise_scale == pytest.approx(4.0, rel=0.25)
 
     def scatter(problem):
-        noise = fitted_noise(problem, point, problem.default_noise(), problem.largest_sensor_sd)
+        noise = fitted_noise(
+            problem, range(problem.run_count), point, problem.default_noise(),
+            problem.largest_sensor_sd,
+        )  # fmt: skip
         found = problem.filtered(point, noise)
         return [float(np.sqrt(np.nanmean(f.innovations[10:] ** 2))) for f in found]
 

@@ -18,7 +18,6 @@ from fish_env.inference.estimate.free import (
     Linearised,
     objective,
     objective_of,
-    objective_with,
     quadratic,
     residuals_at,
     spread_of,
@@ -26,6 +25,7 @@ from fish_env.inference.estimate.free import (
 from fish_env.inference.estimate.gauss_newton import Linearise, Quadratic, descend
 from fish_env.inference.estimate.information import gradient, information, leverage, prior_precision
 from fish_env.inference.estimate.joint import descend_jointly
+from fish_env.inference.estimate.joint_model import Joint
 from fish_env.inference.estimate.run_variation import Marginal
 from fish_env.inference.estimate.settle import predicted_variation
 from fish_env.inference.estimate.slopes import Slopes
@@ -228,7 +228,9 @@ def fit(
         value, filtered = objective(problem, free, vector, noise, near=filtered)
         if marginal is not None:
             marginal = slopes.marginal(problem, vector, filtered)
-            value = objective_with(free, vector, filtered, marginal)
+            assert marginal is not None
+            at = Joint.of(problem, free, vector, filtered, noise)
+            value = at.marginal_value(marginal)
     return _finish(problem, slopes, names, vector, value, filtered, marginal)
 
 

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from fish_env.arrays import FloatArray
-from fish_env.inference.estimate.free import Free, objective_with
+from fish_env.inference.estimate.free import Free
 from fish_env.inference.estimate.gauss_newton import AS_PROMISED
 from fish_env.inference.estimate.joint_model import Joint, Model, evaluated
 from fish_env.inference.estimate.own_steps import ENOUGH, with_own_steps
@@ -96,8 +96,7 @@ def descend_jointly(
     else:
         marginal = slopes.marginal(at.problem, at.vector, at.filtered)
     assert marginal is not None
-    value = objective_with(free, at.vector, at.filtered, marginal)
-    return at.problem, at.vector, value, at.filtered, marginal
+    return at.problem, at.vector, at.marginal_value(marginal), at.filtered, marginal
 
 
 def _without_lost_numbers(at: Joint, free: Free, noise: Any) -> Joint:
@@ -116,19 +115,40 @@ def _without_lost_numbers(at: Joint, free: Free, noise: Any) -> Joint:
 def _agreed(at: Joint, free: Free, noise: Any) -> Joint:
     """The same numbers, with what follows from the motion nearer to that motion.
 
-    The value may rise by that. Where it rises by more than the noise of all residuals, the motion
-    and what follows from it drive each other away, and stay as they are.
+    The value may rise by that. Where that of a run rises by more than the noise of its residuals,
+    the motion and what follows from it drive each other away, and both stay as they are.
     """
-    problem = at.problem
-    if not problem.variation.any():
+    if not at.problem.variation.any():
         return at
-    point = free.unpack(at.vector)
+    near: list[Evaluation | None] = list(at.filtered)
+    noise_of_runs = np.array([len(run.residuals) for run in at.filtered])
+    for _ in range(2):
+        agreed = _nearer(at, free, noise, near)
+        if agreed is at:
+            return at
+        apart = np.flatnonzero(~(agreed.of_runs < at.of_runs + noise_of_runs))
+        if not apart.size:
+            return agreed
+        for run in apart:
+            near[run] = None
+    return at
+
+
+def _nearer(at: Joint, free: Free, noise: Any, near: Sequence[Evaluation | None]) -> Joint:
+    """With what follows from some motion; the same where that agrees, or the simulation diverges.
+
+    Args:
+        at: numbers, and what they leave.
+        free: the shared parameters.
+        noise: noise model.
+        near: motion of each run; None of one that stays as it is.
+    """
+    problem, point = at.problem, free.unpack(at.vector)
     try:
-        moved = problem.with_variation(problem.variation, point, noise, at.filtered)
-        agreed = at if moved is problem else evaluated(moved, free, at.vector, noise)
+        moved = problem.with_variation(problem.variation, point, noise, near)
+        return at if moved is problem else evaluated(moved, free, at.vector, noise)
     except np.linalg.LinAlgError:
         return at
-    return agreed if agreed.value < at.value + len(at.residuals) else at
 
 
 def _better(model: Model, noise: Any, at: Joint, first: int) -> tuple[Joint | None, int]:

@@ -22,6 +22,7 @@ from fish_env.inference.estimate.free import (
 from fish_env.inference.estimate.run_variation import Marginal
 from fish_env.inference.estimate.slopes import Slopes
 from fish_env.inference.evaluation import Evaluation
+from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Problem
 
 
@@ -44,20 +45,44 @@ class Joint:
     value: float
     of_runs: FloatArray
 
+    @classmethod
+    def of(
+        cls,
+        problem: Problem,
+        free: Free,
+        vector: FloatArray,
+        filtered: Sequence[Evaluation],
+        noise: Any,
+    ) -> Joint:
+        """Everything at a point (n,), from an evaluation there."""
+        of_runs = own_objectives(problem, filtered, noise)
+        return cls(problem, vector, filtered, with_prior(free, vector, of_runs), of_runs)
+
     @property
     def residuals(self) -> FloatArray:
         """(D,) whitened."""
         return np.concatenate([run.residuals for run in self.filtered])
+
+    def marginal_value(self, marginal: Marginal) -> float:
+        """-2 log likelihood + prior with the runs' own numbers integrated out.
+
+        The linear model says what a run would still gain by its own numbers. A gain of a few is one
+        that the last steps left over; more of it is none: the run was led there, and lost.
+
+        Args:
+            marginal: integrates the own numbers out, by slopes at the point.
+        """
+        residuals = self.residuals
+        saved = residuals**2 - marginal.residuals(residuals) ** 2
+        left = np.sum(marginal.at**2, axis=1) + np.bincount(marginal.run_of, saved)
+        return self.value - float(np.minimum(left, POLICY.evidence_doubt).sum()) + marginal.log_det
 
 
 def evaluated(problem: Problem, free: Free, vector: FloatArray, noise: Any) -> Joint:
     """Everything at a point; infinite where no vehicle can be so, or the simulation diverges."""
     if not problem.baseline.possible(vector[: free.count]):
         return Joint(problem, vector, (), np.inf, np.full(problem.run_count, np.inf))
-    filtered = problem.filtered(free.unpack(vector), noise)
-    of_runs = own_objectives(problem, filtered, noise)
-    value = with_prior(free, vector, of_runs)
-    return Joint(problem, vector, filtered, value, of_runs)
+    return Joint.of(problem, free, vector, problem.filtered(free.unpack(vector), noise), noise)
 
 
 class Model:

@@ -12,6 +12,7 @@ import numpy as np
 from fish_env.arrays import FloatArray, IntArray
 from fish_env.inference.adequacy import disturbance_at_limit
 from fish_env.inference.estimate.again import search_steps, with_run_variation
+from fish_env.inference.estimate.coarse_fit import CoarseFit
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.estimate.information import information, prior_precision
 from fish_env.inference.hypotheses import CauseId, EffectParameterId
@@ -161,7 +162,7 @@ def reached(make: Callable[[], T]) -> T | None:
         return None
 
 
-def fitted_again(problem: Problem, at: Fit, noise: Any, rounds: int = 2) -> Fit | None:
+def fitted_again(problem: Problem, at: CoarseFit | Fit, noise: Any, rounds: int = 2) -> Fit | None:
     """A fit taken on, its noise estimated anew; None where the simulation diverges.
 
     Args:

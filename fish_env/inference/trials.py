@@ -8,10 +8,13 @@ from a lag of some size and under a small disturbance its few steps end far belo
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 from fish_env.inference.adequacy import beyond_plausible
-from fish_env.inference.estimate.fit import Fit, fit
+from fish_env.inference.estimate.coarse_fit import CoarseFit
+from fish_env.inference.estimate.fit import fit
 from fish_env.inference.estimate.settle import usual_runs
 from fish_env.inference.explanation import Explanation, fitted_again, reached
 from fish_env.inference.hypotheses import EffectName, EffectParameterId, listed
@@ -22,6 +25,24 @@ from fish_env.inference.projection import Signal
 from fish_env.inference.screening import Screen
 from fish_env.inference.search import is_off
 from fish_env.inference.starts import probed
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Where a trial has led. The fit itself takes much memory, and there are many.
+
+    Attributes:
+        reached: effects, and their values.
+        noise: noise model there.
+    """
+
+    reached: CoarseFit
+    noise: Any
+
+    @property
+    def objective(self) -> float:
+        """-2 log likelihood + prior."""
+        return self.reached.objective
 
 
 def tried_out(
@@ -46,14 +67,14 @@ def tried_out(
     closest = _promising(current, hidden)
     if closest:
         report(f"fitting {listed(closest)}, each alone")
-    whole = [partial(_in_all_runs, current, name, own) for name, own in closest.items()]
+    whole = [partial(_in_all_runs, current, name, trial) for name, trial in closest.items()]
     fitted = [more for more in side_by_side(whole) if more]
     best = min(fitted, key=lambda more: more.score, default=current)
     return best if best.score < current.score - POLICY.evidence_doubt else None
 
 
-def _promising(current: Explanation, hidden: Sequence[Signal]) -> dict[EffectName, Fit]:
-    """The few trials to go on from. The others take much memory, and end here."""
+def _promising(current: Explanation, hidden: Sequence[Signal]) -> dict[EffectName, Trial]:
+    """The few trials to go on from."""
     problem = current.fit.problem
     begun = [(s.cause.effect, values) for s in hidden for values in probed(problem, s)]
     tasks = [partial(_trial, current, *begin) for begin in [("", {}), *begun]]
@@ -62,13 +83,13 @@ def _promising(current: Explanation, hidden: Sequence[Signal]) -> dict[EffectNam
 
 
 def _closest(
-    current: Explanation, without: Fit | None, found: Sequence[Fit]
-) -> dict[EffectName, Fit]:
+    current: Explanation, without: Trial | None, found: Sequence[Trial]
+) -> dict[EffectName, Trial]:
     """The trial that explains most, and one of another effect that explains nearly as much."""
-    best: dict[EffectName, Fit] = {}
-    for own in sorted(found, key=lambda own: own.objective):
-        (name,) = map(EffectName, {*own.effects} - {*current.fit.effects})
-        best.setdefault(name, own)
+    best: dict[EffectName, Trial] = {}
+    for trial in sorted(found, key=lambda trial: trial.objective):
+        (name,) = map(EffectName, {*trial.reached.effects} - {*current.fit.effects})
+        best.setdefault(name, trial)
     if not best:
         return {}
     least = next(iter(best.values())).objective
@@ -78,20 +99,20 @@ def _closest(
         return {}
     enough = least + POLICY.coarse_fit_behind * (without.objective - least)
     few = list(best.items())[: POLICY.most_close_trials]
-    return {name: own for name, own in few if own.objective <= enough}
+    return {name: trial for name, trial in few if trial.objective <= enough}
 
 
-def _in_all_runs(current: Explanation, name: EffectName, own: Fit) -> Explanation | None:
+def _in_all_runs(current: Explanation, name: EffectName, trial: Trial) -> Explanation | None:
     """The explanation with one more effect, from its trial; None where the fit is of no use."""
     problem = current.fit.problem
-    fresh = usual_runs(problem, own.point, own.noise)
-    whole = fitted_again(fresh, own, own.noise)
+    fresh = usual_runs(problem, trial.reached.point, trial.noise)
+    whole = fitted_again(fresh, trial.reached, trial.noise)
     if whole is None or beyond_plausible(whole, name) or is_off(problem, whole.point, name):
         return None
     return Explanation((*current.causes, name), whole)
 
 
-def _trial(current: Explanation, name: str, values: dict[EffectParameterId, float]) -> Fit | None:
+def _trial(current: Explanation, name: str, values: dict[EffectParameterId, float]) -> Trial | None:
     """A few steps on a few runs, from a nominal vehicle and a small disturbance.
 
     Coefficients and runs' own numbers of the present fit have gone far to make up for what is
@@ -109,4 +130,8 @@ def _trial(current: Explanation, name: str, values: dict[EffectParameterId, floa
     noise = few.default_noise()
     fresh = usual_runs(few, begin, noise)
     start = (effects, begin, noise, own.released)
-    return reached(lambda: fit(fresh, *start, iterations=POLICY.trial_steps, rounds=1))
+    found = reached(lambda: fit(fresh, *start, iterations=POLICY.trial_steps, rounds=1))
+    if found is None:
+        return None
+    ended = CoarseFit(found.effects, found.released, found.point, found.objective)
+    return Trial(ended, found.noise)

@@ -5,8 +5,11 @@ depend on the noise model. Differences of whitened innovations and of their whit
 information together, so that a few steps find what a search by values alone takes hundreds of
 evaluations for. Where a model is far off, innovations are much larger than expected. The expected
 information then makes bold steps, and the average of the expected and the observed one makes
-careful ones: the better of both is taken. Sources: Gupta and Mehra (1974), IEEE Transactions on
-Automatic Control 19, 774; Gilmour, Thompson and Cullis (1995), Biometrics 51, 1440.
+careful ones: the better of both is taken. Near the end neither is the curvature, as the model is
+off there too. What they leave out is learnt from how the score changed by the steps so far.
+Sources: Gupta and Mehra (1974), IEEE Transactions on Automatic Control 19, 774; Gilmour, Thompson
+and Cullis (1995), Biometrics 51, 1440; Dennis, Gay and Welsch (1981), ACM Transactions on
+Mathematical Software 7, 348.
 """
 
 from __future__ import annotations
@@ -26,6 +29,11 @@ BEYOND = 50.0
 """Log likelihood per unit of a logarithm with which a parameter pushes beyond its bound."""
 LONGEST = 2.0
 """Of a step in a logarithm: from a quiet tank to one at the limit in two or three."""
+FLATTEST = 0.05
+"""Least curvature that is believed, over the least of the average information."""
+ACROSS = 1e-6
+"""Cosine between a step and what is learnt from it, below which nothing is (Nocedal and Wright,
+2006, Numerical Optimization, section 6.2)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +73,8 @@ def climb(
         watched: how many of the first parameters are watched.
     """
     at, here = start, replay(start)
+    last: tuple[FloatArray, FloatArray] | None = None
+    unseen = np.zeros((len(at), len(at)))
     for _ in range(MOST_STEPS):
         with np.errstate(over="ignore", invalid="ignore"):
             system = _system(replay, at, here, upper)
@@ -77,8 +87,15 @@ def climb(
         if system.gain(bold) < least_gain:
             break
         careful = minimise_in_box(system.average, -system.score, low, high).step
+        tries = [bold, careful]
+        if last is not None:
+            unseen = system.unseen(unseen, at - last[0], last[1] - system.score)
+            if system.believes(unseen):
+                learnt = minimise_in_box(system.average + unseen, -system.score, low, high).step
+                tries.append(learnt)
+        last = at, system.score
         before = here.log_likelihood
-        for steps in ((bold, careful), (0.3 * careful,)):
+        for steps in (tries, (0.3 * careful,)):
             for step in steps:
                 tried = np.clip(at + step, lower, upper)
                 there = replay(tried)
@@ -105,6 +122,25 @@ class System:
     score: FloatArray
     expected: FloatArray
     average: FloatArray
+
+    def unseen(self, before: FloatArray, step: FloatArray, change: FloatArray) -> FloatArray:
+        """What the average information leaves out of the curvature (n, n): symmetric, of rank one.
+
+        Args:
+            before: (n, n) what was known of it before a step.
+            step: (n,) the step that led here.
+            change: (n,) by how much the score fell along it.
+        """
+        left = change - (self.average + before) @ step
+        along = float(left @ step)
+        if abs(along) <= ACROSS * np.linalg.norm(left) * np.linalg.norm(step):
+            return before
+        return np.asarray(before + np.outer(left, left) / along)
+
+    def believes(self, unseen: FloatArray) -> bool:
+        """Whether the curvature with what the information leaves out is one of a maximum."""
+        least = FLATTEST * np.linalg.eigvalsh(self.average)[0]
+        return bool(np.linalg.eigvalsh(self.average + unseen)[0] > least)
 
     def gain(self, step: FloatArray) -> float:
         """Log likelihood that a step gains by the expected information."""

@@ -16,7 +16,7 @@ from fish_env.identification.noise import (
     white_noise_sd,
 )
 from fish_env.identification.noise_model import NoiseModel
-from fish_env.identification.noise_scoring import Replayed
+from fish_env.identification.noise_scoring import Replayed, System
 from fish_env.identification.series import SeriesProblem
 from fish_env.inference.policy import POLICY
 from fish_env.params import load_fish
@@ -177,3 +177,18 @@ def test_a_noise_model_under_which_runs_lose_a_beat_is_not_taken(lost):
     np.testing.assert_allclose(
         three_sizes(fitted_noise(keeping, [0], None, start, None)), wanted, rtol=0.03
     )
+
+
+def test_curvature_that_the_information_leaves_out_is_learnt():
+    """After as many steps as there are parameters a quadratic's whole curvature is known."""
+    rng = np.random.default_rng(4)
+    whole = np.diag([3.0, 2.0, 1.0, 0.5]) + 0.1
+    system = System(np.zeros(4), np.eye(4), np.eye(4))
+    unseen = np.zeros((4, 4))
+    for step in rng.standard_normal((4, 4)):
+        unseen = system.unseen(unseen, step, whole @ step)
+        np.testing.assert_allclose((system.average + unseen) @ step, whole @ step, atol=1e-9)
+    np.testing.assert_allclose(system.average + unseen, whole, atol=1e-6)
+    assert system.believes(unseen)
+    assert not system.believes(-np.eye(4)), "nothing rises towards a minimum"
+    np.testing.assert_array_equal(system.unseen(unseen, step, whole @ step), unseen)

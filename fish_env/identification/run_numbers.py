@@ -95,7 +95,7 @@ def renumbered(
         change = _undone if kept else _moved
         triples = zip(numbered, runs, near, strict=True)
         found = [
-            run if f is None else change(run, before, f, problem.channels)
+            before if f is None else change(run, before, f, problem.channels)
             for run, before, f in triples
         ]
         return runs if kept and _agree(runs, found, problem.sensor_sd) else found

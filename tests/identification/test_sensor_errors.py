@@ -126,6 +126,19 @@ def test_samples_put_right_by_a_motion_nearby_come_to_the_same(filtered):
     assert apart[-1] < 0.1 < apart[0]
 
 
+def test_a_run_that_stays_keeps_what_errors_do_to_its_samples(filtered):
+    problem, point, noise, _ = filtered
+    numbers = np.zeros_like(problem.variation)
+    numbers[:, [v.name for v in problem.variations].index("compass_sin_yaw")] = 0.2
+    (run,) = problem.with_variation(numbers, point, noise).runs
+    off = replace(run, distortion=run.distortion + 3.0 * problem.sensor_sd)
+    both = problem.with_runs([off, off])
+    seen = both.filtered(point, noise, keep_slopes=True)
+    stays, follows = both.with_variation(both.variation, point, noise, [None, seen[1]]).runs
+    np.testing.assert_array_equal(stays.corrected, off.corrected)
+    assert np.nanmax(np.abs(follows.corrected - off.corrected) / problem.sensor_sd) > 1.0
+
+
 def test_slopes_need_a_filter_that_kept_them(filtered):
     problem, point, noise, _ = filtered
     (run,), (result,) = problem.runs, problem.filtered(point, noise)

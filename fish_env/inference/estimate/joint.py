@@ -120,35 +120,21 @@ def _agreed(at: Joint, free: Free, noise: Any) -> Joint:
     """
     if not at.problem.variation.any():
         return at
-    near: list[Evaluation | None] = list(at.filtered)
-    noise_of_runs = np.array([len(run.residuals) for run in at.filtered])
-    for _ in range(2):
-        agreed = _nearer(at, free, noise, near)
-        if agreed is at:
-            return at
-        apart = np.flatnonzero(~(agreed.of_runs < at.of_runs + noise_of_runs))
-        if not apart.size:
-            return agreed
-        for run in apart:
-            near[run] = None
-    return at
-
-
-def _nearer(at: Joint, free: Free, noise: Any, near: Sequence[Evaluation | None]) -> Joint:
-    """With what follows from some motion; the same where that agrees, or the simulation diverges.
-
-    Args:
-        at: numbers, and what they leave.
-        free: the shared parameters.
-        noise: noise model.
-        near: motion of each run; None of one that stays as it is.
-    """
     problem, point = at.problem, free.unpack(at.vector)
     try:
-        moved = problem.with_variation(problem.variation, point, noise, near)
-        return at if moved is problem else evaluated(moved, free, at.vector, noise)
+        moved = problem.with_variation(problem.variation, point, noise, at.filtered)
+        agreed = at if moved is problem else evaluated(moved, free, at.vector, noise)
     except np.linalg.LinAlgError:
         return at
+    noise_of_runs = np.array([len(run.residuals) for run in at.filtered])
+    stays = ~(agreed.of_runs < at.of_runs + noise_of_runs)
+    if agreed is at or not stays.any():
+        return agreed
+    pairs = list(zip(stays.tolist(), at.filtered, agreed.filtered, strict=True))
+    near = [None if still else before for still, before, _ in pairs]
+    moved = problem.with_variation(problem.variation, point, noise, near)
+    filtered = [before if still else after for still, before, after in pairs]
+    return at if moved is problem else Joint.of(moved, free, at.vector, filtered, noise)
 
 
 def _better(model: Model, noise: Any, at: Joint, first: int) -> tuple[Joint | None, int]:

@@ -1,6 +1,6 @@
 """What runs share and also differ in: no better known than a mean over the runs."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -8,6 +8,7 @@ import pytest
 from fish_env.effects import catalogue
 from fish_env.identification.variation import EVERY
 from fish_env.inference.estimate.fit import fit
+from fish_env.inference.estimate.profile import profiled
 from fish_env.inference.estimate.run_variation import RunVariation
 from tests.inference.stated import Numbered, White, effect, size_of
 
@@ -88,3 +89,13 @@ def test_what_runs_differ_in_beside_an_effect_names_a_parameter_of_it():
     assert len(named) == len(set(named)) == 12
     for id in named:
         assert id.name in {p.name for p in catalogue()[id.effect].parameters}
+
+
+def test_a_profile_begins_with_the_gain_that_its_fits_count():
+    """A gain that a run did not reach counts in none: else each would look better than the fit."""
+    problem = Drifting(0)
+    own = fit(problem, ["drift"], noise=Spreading(), refit_noise=False)
+    uncounted = replace(own, objective=own.objective + 50.0)
+    known = profiled(uncounted)
+    assert known.point is own.point
+    assert known.interval(DRIFT) == profiled(own).interval(DRIFT)

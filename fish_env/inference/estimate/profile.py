@@ -16,7 +16,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from fish_env.inference.estimate.fit import Fit, fit, gauss_newton
-from fish_env.inference.estimate.free import Free
+from fish_env.inference.estimate.free import Free, objective_with
 from fish_env.inference.estimate.information import information
 from fish_env.inference.estimate.slopes import Slopes
 from fish_env.inference.evaluation import Evaluation
@@ -132,7 +132,7 @@ def profiled(own: Fit) -> Fit:
         profile = profile_of(own, freedom.id, (freedom.lower, freedom.upper))
         seen = profile.seen()
         best = min(seen, key=lambda held: held.objective)
-        if best.objective < own.objective - BETTER:
+        if best.objective < profile.start.objective - BETTER:
             return profiled(_moved(own, best.point))
         ends[freedom.id] = profile.interval(seen)
     return replace(own, profiles=ends)
@@ -150,10 +150,21 @@ def profile_of(own: Fit, parameter: EffectParameterId, bounds: tuple[float, floa
     free = Free(own.problem, own.effects, own.released)
     white = np.linalg.inv(information(own.linearised.slopes, free.prior))[i, i]
     widened = float(own.covariance[i, i] / white)
-    start = Held(float(own.estimates[i]), own.objective, own.point, own.filtered)
+    start = Held(float(own.estimates[i]), _followed(own, free), own.point, own.filtered)
     sd = float(np.sqrt(own.covariance[i, i]))
     worse = float(chdtri(1, 1.0 - POLICY.interval_level)) * widened
     return Profile(partial(_held, own, parameter), start, sd, bounds, worse)
+
+
+def _followed(own: Fit, free: Free) -> float:
+    """The objective of a fit as those with a parameter held have it.
+
+    There the runs' own numbers follow in the linear model, as far as that says.
+    """
+    marginal = own.linearised.marginal
+    if marginal is None:
+        return own.objective
+    return objective_with(free, free.pack(own.point), own.filtered, marginal)
 
 
 def _held(own: Fit, parameter: EffectParameterId, value: float, near: Held) -> Held:

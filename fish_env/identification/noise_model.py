@@ -60,7 +60,7 @@ class NoiseModel:
 
         Args:
             other: the noise model.
-            share: of the way; the jitter is the other's.
+            share: of the way; jitter and phase are the other's.
         """
 
         def between(a: Any, b: Any) -> Any:

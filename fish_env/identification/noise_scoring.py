@@ -30,7 +30,8 @@ BEYOND = 50.0
 LONGEST = 2.0
 """Of a step in a logarithm: from a quiet tank to one at the limit in two or three."""
 FLATTEST = 0.05
-"""Least curvature that is believed, over the least of the average information."""
+"""Least curvature that is believed, over the least of the average information. What is wrongly
+believed costs one replay, as the best of all steps is taken."""
 ACROSS = 1e-6
 """Cosine between a step and what is learnt from it, below which nothing is (Nocedal and Wright,
 2006, Numerical Optimization, section 6.2)."""

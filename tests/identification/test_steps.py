@@ -10,8 +10,9 @@ from fish_env.identification.command_jumps import SWITCH_S
 from fish_env.identification.open_loop import errors
 from fish_env.identification.runs import FINER
 from fish_env.identification.series import SeriesProblem
+from fish_env.identification.tail_drive import tail_drive
 from fish_env.inference.effort import QUICK
-from fish_env.inference.estimate.again import refined
+from fish_env.inference.estimate.again import refined, to_search
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.estimate.free import Free, linearise
 from fish_env.inference.hypotheses import EffectParameterId
@@ -190,6 +191,20 @@ def test_a_fit_in_long_steps_is_refined(dataset):
     assert found.problem.longest_step == pytest.approx(0.5 * problem.longest_step)
     assert found.estimates[0] == pytest.approx(exact.estimates[0], abs=0.05 * sd)
     assert refined(found) is found
+
+
+@pytest.mark.parametrize(("lag", "finer"), [(0.005, 2.0), (0.03, 1.0)])
+def test_a_lag_that_long_steps_cannot_have_keeps_a_search_in_the_usual_ones(dataset, lag, finer):
+    usual = SeriesProblem(dataset, paths=(PATHS[0],)).with_drive(tail_drive({}, uneven=True))
+    at = Point(np.zeros(1), {EffectParameterId("servo_lag", "time_constant"): lag})
+    noise = noise_of(usual)
+    found = fit(usual, ("servo_lag",), at, noise, refit_noise=False, iterations=0)
+    assert found.point.effects == at.effects
+    assert to_search(usual).longest_step == pytest.approx(2.0 * usual.longest_step)
+    searched = to_search(usual, found)
+    assert searched.longest_step == pytest.approx(to_search(usual).longest_step / finer)
+    again = fit(searched, ("servo_lag",), at, noise, refit_noise=False, iterations=0)
+    assert again.point.effects == at.effects
 
 
 def gliding(dataset):

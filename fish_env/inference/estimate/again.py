@@ -72,16 +72,29 @@ def search_steps(problem: Problem) -> int:
     return FEWER_STEPS if problem.drive.uneven else USUAL_STEPS
 
 
-def to_search(problem: Problem) -> Problem:
+def to_search(problem: Problem, found: Fit | None = None) -> Problem:
     """The problem in the steps of fits that only compare causes.
 
     Where each run has a drive of its own such fits take longest, what is still missing moves
     estimates by far more than long steps do, and all that is compared is in the same steps: finer
-    ones are for estimates to be published.
+    ones are for estimates to be published. A lag that was found and that long steps cannot have is
+    no lag to begin from in them: with another one runs lose beats of their tails.
+
+    Args:
+        problem: the problem.
+        found: what was fitted so far, if anything was.
     """
     if not problem.drive.uneven:
         return problem
-    return problem.without_refinement().with_long_steps()
+    long = problem.without_refinement().with_long_steps()
+    return long if found is None or _can_have(long, found) else problem
+
+
+def _can_have(problem: Problem, found: Fit) -> bool:
+    """Whether the effects of a fit may be as they are in the steps of a problem."""
+    free = Free(problem, found.effects, found.released)
+    vector = free.pack(found.point)
+    return np.array_equal(free.bounds.clip(vector)[free.count :], vector[free.count :])
 
 
 def run_variation(own: Fit) -> Spread:

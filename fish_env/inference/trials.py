@@ -8,9 +8,7 @@ from a lag of some size and under a small disturbance its few steps end far belo
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 from fish_env.inference.adequacy import beyond_plausible
 from fish_env.inference.estimate.coarse_fit import CoarseFit
@@ -25,24 +23,6 @@ from fish_env.inference.projection import Signal
 from fish_env.inference.screening import Screen
 from fish_env.inference.search import is_off
 from fish_env.inference.starts import probed
-
-
-@dataclass(frozen=True)
-class Trial:
-    """Where a trial has led. The fit itself takes much memory, and there are many.
-
-    Attributes:
-        reached: effects, and their values.
-        noise: noise model there.
-    """
-
-    reached: CoarseFit
-    noise: Any
-
-    @property
-    def objective(self) -> float:
-        """-2 log likelihood + prior."""
-        return self.reached.objective
 
 
 def tried_out(
@@ -73,7 +53,7 @@ def tried_out(
     return best if best.score < current.score - POLICY.evidence_doubt else None
 
 
-def _promising(current: Explanation, hidden: Sequence[Signal]) -> dict[EffectName, Trial]:
+def _promising(current: Explanation, hidden: Sequence[Signal]) -> dict[EffectName, CoarseFit]:
     """The few trials to go on from."""
     problem = current.fit.problem
     begun = [(s.cause.effect, values) for s in hidden for values in probed(problem, s)]
@@ -83,12 +63,12 @@ def _promising(current: Explanation, hidden: Sequence[Signal]) -> dict[EffectNam
 
 
 def _closest(
-    current: Explanation, without: Trial | None, found: Sequence[Trial]
-) -> dict[EffectName, Trial]:
+    current: Explanation, without: CoarseFit | None, found: Sequence[CoarseFit]
+) -> dict[EffectName, CoarseFit]:
     """The trial that explains most, and one of another effect that explains nearly as much."""
-    best: dict[EffectName, Trial] = {}
+    best: dict[EffectName, CoarseFit] = {}
     for trial in sorted(found, key=lambda trial: trial.objective):
-        (name,) = map(EffectName, {*trial.reached.effects} - {*current.fit.effects})
+        (name,) = map(EffectName, {*trial.effects} - {*current.fit.effects})
         best.setdefault(name, trial)
     if not best:
         return {}
@@ -102,21 +82,24 @@ def _closest(
     return {name: trial for name, trial in few if trial.objective <= enough}
 
 
-def _in_all_runs(current: Explanation, name: EffectName, trial: Trial) -> Explanation | None:
+def _in_all_runs(current: Explanation, name: EffectName, trial: CoarseFit) -> Explanation | None:
     """The explanation with one more effect, from its trial; None where the fit is of no use."""
     problem = current.fit.problem
-    fresh = usual_runs(problem, trial.reached.point, trial.noise)
-    whole = fitted_again(fresh, trial.reached, trial.noise)
+    noise = problem.default_noise()
+    whole = fitted_again(usual_runs(problem, trial.point, noise), trial, noise)
     if whole is None or beyond_plausible(whole, name) or is_off(problem, whole.point, name):
         return None
     return Explanation((*current.causes, name), whole)
 
 
-def _trial(current: Explanation, name: str, values: dict[EffectParameterId, float]) -> Trial | None:
-    """A few steps on a few runs, from a nominal vehicle and a small disturbance.
+def _trial(
+    current: Explanation, name: str, values: dict[EffectParameterId, float]
+) -> CoarseFit | None:
+    """A few steps on a few runs, from a nominal vehicle and under a small disturbance.
 
     Coefficients and runs' own numbers of the present fit have gone far to make up for what is
-    missing.
+    missing. The disturbance stays small: what it would grow to beside what is still missing follows
+    everything, tells trials apart by little else than its size, and takes longest to find.
 
     Args:
         current: causes accepted so far.
@@ -130,8 +113,9 @@ def _trial(current: Explanation, name: str, values: dict[EffectParameterId, floa
     noise = few.default_noise()
     fresh = usual_runs(few, begin, noise)
     start = (effects, begin, noise, own.released)
-    found = reached(lambda: fit(fresh, *start, iterations=POLICY.trial_steps, rounds=1))
+    steps = POLICY.trial_steps
+    found = reached(lambda: fit(fresh, *start, refit_noise=False, iterations=steps))
     if found is None:
         return None
-    ended = CoarseFit(found.effects, found.released, found.point, found.objective)
-    return Trial(ended, found.noise)
+    # The fit itself takes much memory, and there are many.
+    return CoarseFit(found.effects, found.released, found.point, found.objective)

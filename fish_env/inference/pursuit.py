@@ -206,7 +206,7 @@ def _fitted(current: Explanation, coarse: CoarseFit) -> Fit | None:
     In steps that are the same for all effects: finer ones, for those that are not smooth, are for
     estimates to be published.
     """
-    problem = to_search(current.fit.problem.without_refinement(), current.fit)
+    problem = to_search(current.fit.problem.without_refinement(), coarse)
     start = (coarse.effects, coarse.point, current.fit.noise, coarse.released)
     return reached(lambda: fit(problem, *start, rounds=2, iterations=FEWER_STEPS))
 

@@ -197,7 +197,7 @@ def _led(
     while left:
         name, coarse = left.pop(0)
         report(f"fitting {name_of(name)}")
-        leader = in_full(base, coarse)
+        leader = in_full(base.problem, coarse, base.noise)
         if leader is not None:
             first = Explanation((*current.causes, name), leader)
             return [first, *_rest(current, left, leader, report)]
@@ -252,16 +252,12 @@ def _best_first(
     return [Explanation(ranked[0].causes, first), *others], first.noise
 
 
-def in_full(base: Fit, coarse: CoarseFit) -> Fit | None:
+def in_full(problem: Problem, coarse: CoarseFit, noise: Any) -> Fit | None:
     """The full fit from a coarse one, first on a few runs; None where the simulation diverges.
 
     Where each run has a drive of its own, in the steps of a search.
-
-    Args:
-        base: fit with one cause less, whose noise model it begins from.
-        coarse: the coarse fit.
     """
-    problem, noise = to_search(base.problem, base), base.noise
+    problem = to_search(problem, coarse)
     few = problem.subset(POLICY.few_runs)
     # The noise of the sensors is told in a second round only.
     rounds = 2 if few is problem else 1

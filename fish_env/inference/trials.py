@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from fish_env.inference.adequacy import beyond_plausible
+from fish_env.inference.estimate.again import following
 from fish_env.inference.estimate.coarse_fit import CoarseFit
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.estimate.settle import usual_runs
@@ -84,7 +85,7 @@ def _closest(
 
 def _in_all_runs(current: Explanation, name: EffectName, trial: CoarseFit) -> Explanation | None:
     """The explanation with one more effect, from its trial; None where the fit is of no use."""
-    problem = current.fit.problem
+    problem = following(current.fit.problem, trial)
     noise = problem.default_noise()
     whole = fitted_again(usual_runs(problem, trial.point, noise), trial, noise)
     if whole is None or beyond_plausible(whole, name) or is_off(problem, whole.point, name):

@@ -12,7 +12,8 @@ from fish_env.identification.runs import FINER
 from fish_env.identification.series import SeriesProblem
 from fish_env.identification.tail_drive import tail_drive
 from fish_env.inference.effort import QUICK
-from fish_env.inference.estimate.again import refined, to_search
+from fish_env.inference.estimate.again import following, refined, to_search
+from fish_env.inference.estimate.coarse_fit import CoarseFit
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.estimate.free import Free, linearise
 from fish_env.inference.hypotheses import EffectParameterId
@@ -193,18 +194,21 @@ def test_a_fit_in_long_steps_is_refined(dataset):
     assert refined(found) is found
 
 
-@pytest.mark.parametrize(("lag", "finer"), [(0.005, 2.0), (0.03, 1.0)])
-def test_a_lag_that_long_steps_cannot_have_keeps_a_search_in_the_usual_ones(dataset, lag, finer):
+@pytest.mark.parametrize(("lag", "finer"), [(0.005, 2.0), ("shortest", 2.0), (0.03, 1.0)])
+def test_a_search_goes_on_in_steps_that_can_have_its_lag(dataset, lag, finer):
     usual = SeriesProblem(dataset, paths=(PATHS[0],)).with_drive(tail_drive({}, uneven=True))
-    at = Point(np.zeros(1), {EffectParameterId("servo_lag", "time_constant"): lag})
-    noise = noise_of(usual)
-    found = fit(usual, ("servo_lag",), at, noise, refit_noise=False, iterations=0)
-    assert found.point.effects == at.effects
-    assert to_search(usual).longest_step == pytest.approx(2.0 * usual.longest_step)
-    searched = to_search(usual, found)
-    assert searched.longest_step == pytest.approx(to_search(usual).longest_step / finer)
-    again = fit(searched, ("servo_lag",), at, noise, refit_noise=False, iterations=0)
-    assert again.point.effects == at.effects
+    long, effects = to_search(usual), ("servo_lag",)
+    assert long.longest_step == pytest.approx(2.0 * usual.longest_step)
+    (gap,) = Free(long, effects, ()).bounds.gaps
+    value = gap.least if lag == "shortest" else lag
+    at = Point(np.zeros(1), {EffectParameterId("servo_lag", "time_constant"): value})
+    begin = CoarseFit(effects, (), at, 0.0)
+    for searched in (to_search(usual, begin), to_search(long, begin), following(long, begin)):
+        assert searched.longest_step == pytest.approx(long.longest_step / finer)
+        assert searched.unrefined
+        held = {"noise": noise_of(usual), "refit_noise": False, "iterations": 0}
+        assert fit(searched, effects, at, **held).point.effects == at.effects
+    assert following(usual, begin) is usual
 
 
 def gliding(dataset):

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fish_env.inference.estimate.coarse_fit import CoarseFit
 from fish_env.inference.estimate.fit import FEWER_STEPS, USUAL_STEPS, Fit, fit
 from fish_env.inference.estimate.free import DIFFERENCE, Free, linearise, spread_of
 from fish_env.inference.estimate.gauss_newton import predicted_decrease
@@ -16,6 +17,8 @@ from fish_env.inference.hypotheses import CauseId, of_effects
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
 
+AT_EDGE = 1.001
+"""A lag is at the shortest that steps can have up to so many times that."""
 MORE = 3
 """Most fits until one is converged."""
 
@@ -72,29 +75,37 @@ def search_steps(problem: Problem) -> int:
     return FEWER_STEPS if problem.drive.uneven else USUAL_STEPS
 
 
-def to_search(problem: Problem, found: Fit | None = None) -> Problem:
+def to_search(problem: Problem, begin: CoarseFit | None = None) -> Problem:
     """The problem in the steps of fits that only compare causes.
 
     Where each run has a drive of its own such fits take longest, what is still missing moves
     estimates by far more than long steps do, and all that is compared is in the same steps: finer
-    ones are for estimates to be published. A lag that was found and that long steps cannot have is
-    no lag to begin from in them: with another one runs lose beats of their tails.
+    ones are for estimates to be published.
 
     Args:
         problem: the problem.
-        found: what was fitted so far, if anything was.
+        begin: where a fit begins, if that is known.
     """
     if not problem.drive.uneven:
         return problem
     long = problem.without_refinement().with_long_steps()
-    return long if found is None or _can_have(long, found) else problem
+    return long if begin is None else following(long, begin)
 
 
-def _can_have(problem: Problem, found: Fit) -> bool:
-    """Whether the effects of a fit may be as they are in the steps of a problem."""
-    free = Free(problem, found.effects, found.released)
-    vector = free.pack(found.point)
-    return np.array_equal(free.bounds.clip(vector)[free.count :], vector[free.count :])
+def following(problem: Problem, begin: CoarseFit) -> Problem:
+    """The problem, in the usual steps if a fit begins with a lag as short as its own can have.
+
+    The right lag may be shorter. With another one runs lose beats of their tails, and no further
+    cause is found.
+
+    Args:
+        problem: the problem, perhaps in long steps.
+        begin: where a fit begins.
+    """
+    free = Free(problem, begin.effects, begin.released)
+    vector = free.pack(begin.point)
+    short = [g.off < vector[g.number] <= AT_EDGE * g.least for g in free.bounds.gaps]
+    return problem.with_refinement().without_refinement() if any(short) else problem
 
 
 def run_variation(own: Fit) -> Spread:

@@ -203,8 +203,8 @@ def _confusable(current: Explanation, cause: CauseId) -> tuple[str, ...]:
 def _fitted(current: Explanation, coarse: CoarseFit) -> Fit | None:
     """The full fit from a coarse one, with the noise that it leaves.
 
-    In steps that are the same for all effects: finer ones, for those that are not smooth, are for
-    estimates to be published.
+    In steps that are the same for all effects, but for lags too short for them: finer ones, for
+    effects that are not smooth, are for estimates to be published.
     """
     problem = to_search(current.fit.problem.without_refinement(), coarse)
     start = (coarse.effects, coarse.point, current.fit.noise, coarse.released)

@@ -162,6 +162,8 @@ def extended(
             found = more or found
             break
         found = more
+    if begun.accepted.causes and found.accepted is begun.accepted:
+        return begun  # settled before
     return settled(found, effort.retries, report)
 
 

@@ -16,6 +16,7 @@ from fish_env.inference.estimate.coarse_fit import CoarseFit
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.estimate.information import information, prior_precision
 from fish_env.inference.hypotheses import CauseId, EffectParameterId
+from fish_env.inference.in_place import in_step_without, without_causes
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Problem
 
@@ -60,7 +61,7 @@ class Explanation:
             dropped: effects that are no longer among the causes.
         """
         if dropped:
-            found = reached(partial(with_run_variation, self.fit, dropped))
+            found = reached(lambda: with_run_variation(self.fit, dropped, self._in_step(dropped)))
             if found is None:
                 return self
             return Explanation(tuple(c for c in self.causes if c not in dropped), found)
@@ -69,6 +70,9 @@ class Explanation:
         if found is None or found is self.fit or (stands_in and not beside_misfit):
             return self
         return Explanation(self.causes, found)
+
+    def _in_step(self, dropped: Collection[CauseId]) -> Problem:
+        return in_step_without(self.fit, dropped, without_causes(self.fit, dropped))
 
     def varied_to_the_end(self) -> Explanation:
         """With what the runs differ in also beside a misfit, again while that tells much more.

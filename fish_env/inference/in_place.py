@@ -95,6 +95,24 @@ def in_step(runs: Problem, own: Fit, cause: CauseId, at: CoarseFit) -> Problem:
     return runs.with_variation(runs.variation + gained, at.point, own.noise)
 
 
+def in_step_without(own: Fit, dropped: Collection[CauseId], begin: CoarseFit) -> Problem:
+    """The runs of a fit with numbers that keep them in step without some of its causes.
+
+    Args:
+        own: fit with the causes.
+        dropped: the causes.
+        begin: where a fit begins without them.
+
+    Raises:
+        LinAlgError: the simulation diverges there.
+    """
+    runs = own.problem
+    for cause in dropped:
+        if moved_to_runs(own, cause):
+            runs = in_step(runs, own, cause, begin)
+    return runs
+
+
 def moved_to_runs(own: Fit, cause: CauseId) -> bool:
     """Whether numbers of the runs may take on what they have of a cause in common.
 

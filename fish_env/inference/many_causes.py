@@ -58,6 +58,7 @@ def pursue(
         varied = current.varied(beside_misfit=True)
         if varied.score < current.score - POLICY.evidence_doubt:
             current, shown = varied, screen(varied.fit, causes, rng)
+    fewest = 1
     for _ in range(POLICY.most_single_searches):
         if not disturbance_at_limit(current.fit):
             break
@@ -65,6 +66,7 @@ def pursue(
         more = tried_out(current, kept, report)
         more = more or pursued(current, kept, report, least, relaxed_log_p, most=1)
         if more is current:
+            fewest = 2
             break
         more, shown = _simplified(more, screen(more.fit, causes, rng), causes, rng, report)
         current = _against_likes(more, shown, report)
@@ -72,9 +74,11 @@ def pursue(
             replaced += [p for p in zip(current.causes, more.causes, strict=True) if p[0] != p[1]]
             shown = screen(current.fit, causes, rng)
     for _ in range(POLICY.pursuits):
-        more = pursued(current, beside(current, shown), report, least, relaxed_log_p)
+        kept = beside(current, shown)
+        more = pursued(current, kept, report, least, relaxed_log_p, fewest=fewest)
         if more is current:
             break
+        fewest = 1
         current, shown = more, screen(more.fit, causes, rng)
         current, shown = _simplified(current, shown, causes, rng, report)
         if disturbance_at_limit(current.fit):

@@ -38,7 +38,7 @@ from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
 from fish_env.inference.projection import Projector, Signal
 from fish_env.inference.result import ResidualModel
-from fish_env.inference.substitution import without
+from fish_env.inference.substitution import without_in_step
 from fish_env.inference.tails import chi2_log_tail
 
 Describe = Callable[[Fit, float, Problem | None], ResidualModel | None]
@@ -72,7 +72,7 @@ def confirmed(
     if doubtful := _dependent(accepted) - measured:
         left_out = listed(sorted(doubtful, key=name_of))
         report(f"rejecting {left_out}: coefficients contradict their priors")
-        smaller = without(accepted, doubtful) if doubtful < {*accepted.causes} else None
+        smaller = without_in_step(accepted, doubtful) if doubtful < {*accepted.causes} else None
         if smaller is None:
             return None
         accepted = smaller
@@ -89,7 +89,7 @@ def confirmed(
             if log_p[weakest] < threshold:
                 return accepted
             report(f"rejecting {name_of(weakest)}: generic forces explain as much")
-        smaller = without(accepted, (weakest,))
+        smaller = without_in_step(accepted, (weakest,))
         if smaller is None:
             return None
         accepted = smaller
@@ -166,7 +166,7 @@ def sustained(
             return found
         left_out = name_of(worst)
         report(f"rejecting {left_out}: it does not improve open-loop predictions of most runs")
-        smaller = without(found, (worst,))
+        smaller = without_in_step(found, (worst,))
         if smaller is None:
             return None
         found = smaller

@@ -139,6 +139,7 @@ def pursued(
     least: float = 0.0,
     relaxed_log_p: float = 0.0,
     most: int = POLICY.most_causes,
+    fewest: int = 1,
 ) -> Explanation:
     """The explanation with all causes that show beside it and are needed; itself without such.
 
@@ -149,10 +150,11 @@ def pursued(
         least: statistic below which a simulation error explains a cause.
         relaxed_log_p: added to the log p-value that makes a cause significant.
         most: further causes.
+        fewest: causes that have to show; two where one alone was of no use.
     """
     room = min(most, POLICY.most_causes - len(current.causes))
     picks = picked(Projector(current.fit.extrapolated), shown, room, least, relaxed_log_p)
-    if not picks:
+    if len(picks) < fewest:
         return current
     for causes in _led([pick.signal.cause.effect for pick in picks], current, shown, report):
         found = _needed(current, causes, picks, shown, report)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -20,7 +20,7 @@ from fish_env.inference.hypotheses import (
     name_of,
     of_effects,
 )
-from fish_env.inference.in_place import replaced, without_causes
+from fish_env.inference.in_place import in_step_without, replaced, without_causes
 from fish_env.inference.parallel import side_by_side
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
@@ -175,13 +175,34 @@ def without(
         dropped: those to drop.
         least: growth of the score from which the fit is of no use, and may stop early.
     """
+    return _smaller(current, dropped, lambda begin: current.fit.problem, least)
+
+
+def without_in_step(current: Explanation, dropped: Collection[CauseId]) -> Explanation | None:
+    """The fit without causes that are known not to be needed, the runs' numbers in their place.
+
+    :func:`without` asks whether a cause is needed, and begins out of step without a rate.
+
+    Args:
+        current: all causes.
+        dropped: those to drop.
+    """
+    return _smaller(current, dropped, partial(in_step_without, current.fit, dropped), np.inf)
+
+
+def _smaller(
+    current: Explanation,
+    dropped: Collection[CauseId],
+    runs: Callable[[CoarseFit], Problem],
+    least: float,
+) -> Explanation | None:
     own = current.fit
     begin = without_causes(own, dropped)
     # The log determinant of all estimates changes too as they move without a cause.
     enough = own.objective + least + current.narrowed_by(dropped) + POLICY.linear_doubt
     smaller = reached(
         lambda: fit(
-            own.problem, begin.effects, begin.point, own.noise, begin.released,
+            runs(begin), begin.effects, begin.point, own.noise, begin.released,
             refit_noise=False, iterations=4, give_up_above=enough,
         )
     )  # fmt: skip

@@ -12,6 +12,7 @@ from fish_env.inference.lookalikes import asked_of_rates, decided
 from fish_env.inference.probes import causes_of
 from fish_env.inference.problem import Point
 from fish_env.inference.screening import screen
+from fish_env.inference.substitution import without, without_in_step
 from fish_env.inference.vehicle import Drive
 from tests.inference.stated import Evaluated, Numbered, White, effect, size_of
 
@@ -133,3 +134,34 @@ def test_a_cause_is_not_left_to_runs_that_would_differ_by_more_than_ordinary_one
     current, shown = explained(Beating(reading=0.3, beats=np.full(RUNS, 0.25)), CLOCK, DRAG)
     best, _ = asked_of_rates(current, shown, [].append)
     assert best.causes == (BEAT, DRAG)
+
+
+def shared_beat():
+    """What all runs have in common of their rates in a cause, and the rest in their numbers."""
+    stated = Beating(beats=BEATS - BEATS.mean())
+    stated.data = Beating().data
+    current, _ = explained(stated, BEAT, DRAG, beat=BEATS.mean())
+    assert current.fit.point.effects[size_of(BEAT)] == pytest.approx(BEATS.mean(), abs=0.03)
+    return stated, current
+
+
+@pytest.mark.parametrize(
+    "dropping",
+    [without_in_step, lambda current, dropped: current.varied(dropped=dropped)],
+    ids=["rejected", "insignificant"],
+)
+def test_runs_stay_in_step_when_a_rate_is_dropped(dropping):
+    stated, current = shared_beat()
+    smaller = dropping(current, (BEAT,))
+    _, misfit = stated.begun[0]
+    assert misfit < 2.0
+    assert smaller.causes == (DRAG,)
+    assert smaller.fit.problem.own[:, 0] == pytest.approx(BEATS, abs=0.03)
+
+
+def test_whether_a_rate_is_needed_is_asked_out_of_step():
+    """Numbers of its runs would make up for any rate: it has to be worth its cost."""
+    stated, current = shared_beat()
+    without(current, (BEAT,))
+    _, misfit = stated.begun[0]
+    assert misfit > 10.0

@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from fish_env.inference.attribution import attribute, extended
 from fish_env.inference.effects import DeclaredEffect
 from fish_env.inference.elimination import insignificant
 from fish_env.inference.estimate.fit import Fit, fit
@@ -201,6 +202,26 @@ def test_what_is_like_a_cause_found_does_not_push_out_what_shows():
     said = []
     pursued(current, shown, said.append, most=1)
     assert "fitting delay, bias together" in said
+
+
+def test_where_one_cause_alone_was_of_no_use_two_have_to_show():
+    baseline, shown = screened()
+    said = []
+    nothing = Explanation((), baseline)
+    alone = shown.only(lambda signal: signal.cause.id == BIAS.effect)
+    assert pursued(nothing, alone, said.append, fewest=2) is nothing
+    assert not said
+    assert pursued(nothing, alone, said.append).causes == (BIAS.effect,)
+
+
+def test_a_search_that_adds_nothing_fits_nothing_again():
+    baseline, _ = screened()
+    causes, rng = causes_of(problem()), np.random.default_rng(0)
+    found = attribute(problem(), baseline, causes, rng)
+    said = []
+    assert set(found.accepted.causes) == NAMES
+    assert extended(found, causes, rng, report=said.append) is found
+    assert "removing unnecessary causes" not in said
 
 
 def with_its_limit(declared: bool) -> Stated:

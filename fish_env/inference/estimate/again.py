@@ -93,7 +93,7 @@ def to_search(problem: Problem, begin: CoarseFit | None = None) -> Problem:
 
 
 def following(problem: Problem, begin: CoarseFit) -> Problem:
-    """The problem, in the usual steps if a fit begins with a lag as short as its own can have.
+    """The problem, in the usual steps if a fit begins with a lag as short as long ones can have.
 
     The right lag may be shorter. With another one runs lose beats of their tails, and no further
     cause is found.
@@ -104,8 +104,11 @@ def following(problem: Problem, begin: CoarseFit) -> Problem:
     """
     free = Free(problem, begin.effects, begin.released)
     vector = free.pack(begin.point)
-    short = [g.off < vector[g.number] <= AT_EDGE * g.least for g in free.bounds.gaps]
-    return problem.with_refinement().without_refinement() if any(short) else problem
+    if not any(g.off < vector[g.number] <= AT_EDGE * g.least for g in free.bounds.gaps):
+        return problem
+    usual = problem.with_refinement()
+    finer = usual.longest_step < problem.longest_step
+    return usual.without_refinement() if finer else problem
 
 
 def run_variation(own: Fit) -> Spread:
@@ -129,7 +132,9 @@ def run_variation(own: Fit) -> Spread:
     return fit_spread(likelihood, problem.variations)
 
 
-def with_run_variation(own: Fit, dropped: Collection[CauseId] = ()) -> Fit:
+def with_run_variation(
+    own: Fit, dropped: Collection[CauseId] = (), runs: Problem | None = None
+) -> Fit:
     """The fit, made again where its runs differ by more, or less, than it allows for.
 
     A few runs tell no spread. Runs whose drive is uneven differ in everything: every spread is then
@@ -138,8 +143,9 @@ def with_run_variation(own: Fit, dropped: Collection[CauseId] = ()) -> Fit:
     Args:
         own: the fit.
         dropped: effects that the new fit goes without.
+        runs: those of the fit with numbers to begin from; default: as in the fit.
     """
-    problem, noise = own.problem, own.noise
+    problem, noise = runs or own.problem, own.noise
     enough = problem.run_count >= POLICY.fewest_runs_for_spread
     if problem.variations and enough and not problem.drive.uneven:
         found = run_variation(own)

@@ -40,7 +40,7 @@ from fish_env.identification.sensors import largest_jitter_of, largest_noise
 from fish_env.identification.tail_drive import LATE, TailDrive
 from fish_env.identification.variation import EVERY, USUAL, VARIATIONS
 from fish_env.identification.variation_slopes import swum_slopes
-from fish_env.identification.wave_phases import settle_wave_phases
+from fish_env.identification.wave_phases import AMPLITUDE, settle_wave_phases
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.hypotheses import EffectParameterId, effect_names, effects_of
 from fish_env.inference.probes import phase_grid
@@ -223,10 +223,13 @@ class SeriesProblem(Problem):
         """Largest jitter of the sample times that the channels allow (s)."""
         return largest_jitter_of(self.dataset)
 
-    @property
-    def starts_known(self) -> bool:
-        """Whether the tail's phase at the start of every run is known, or its own number has it."""
-        return all(r.phase_known or (r.phase_found and self.drive.uneven) for r in self.runs)
+    def starts_known(self, further: Iterable[str] = ()) -> bool:
+        """Whether the tail's phase at the start of every run is known, or its own number has it.
+
+        And no wave is to begin, whose phase nothing has told so far.
+        """
+        known = all(r.phase_known or (r.phase_found and self.drive.uneven) for r in self.runs)
+        return known and AMPLITUDE.effect not in further
 
     def relaxed_noise(self, noise: NoiseModel) -> NoiseModel:
         """The noise model with a random-walk tail phase."""

@@ -38,7 +38,7 @@ VARIATIONS = (
     RunVariation("inertial_delay", "s", 0.03, shared=True, positive=True),
     RunVariation("depth_delay", "s", 0.02, shared=True, positive=True),
     RunVariation("start_phase", "rad", 0.2),
-    RunVariation("wave_phase", "rad", 1.8),
+    RunVariation("wave_phase", "rad", 1.8, beside=Shared("wave", "phase")),
 )
 """Trim is how far the barycentre of the whole fish at rest is moved. The beat and its sag are
 beside what combs have found, see ``own_beats``. Devices are late by a frame of a camera; a filter

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fish_env.inference.changes import SETTINGS_AT_ONCE
 from fish_env.inference.effects import EffectParameter
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.evaluation import GenericTerms, LackOfFit
@@ -19,7 +20,7 @@ from fish_env.inference.hypotheses import CauseId, Coefficient, EffectName, Effe
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause
 from fish_env.inference.projection import Projector, Signal
-from fish_env.inference.screening import SETTINGS_AT_ONCE, null_threshold
+from fish_env.inference.screening import null_threshold
 from fish_env.inference.tails import chi2_log_tail
 
 FAR = "prior standard deviations from where it is known to be"

@@ -47,6 +47,7 @@ def preconditions(
         fit: the refitted baseline, to simulate each effect at the size that is published; without
             it sizes are taken in proportion from plausible ones.
     """
+    screen = screen.only(lambda signal: signal.tries == 1)  # a size is asked of one alternative
     strongest = _representative(problem, screen)
     sizes = _sizes(problem, screen, strongest, fit)
     result = []

@@ -221,6 +221,11 @@ def _turns(parameter: EffectParameter) -> bool:
     return parameter.unit == "rad" and high - low > 6.0
 
 
+def _is_direction(parameter: EffectParameter) -> bool:
+    low, high = parameter.plausible
+    return parameter.unit == "rad" and high - low >= 6.0
+
+
 def _oscillations(effect: Effect, length: float) -> tuple[tuple[Probe, ...], ...]:
     """Sine and cosine at every frequency that runs of a length (s) can tell from its neighbours."""
     phase = phase_of(effect)
@@ -237,6 +242,30 @@ def _oscillations(effect: Effect, length: float) -> tuple[tuple[Probe, ...], ...
     )
 
 
+def turned(effect: Effect, alternatives: Sequence[tuple[Probe, ...]]) -> list[tuple[Probe, ...]]:
+    """Alternatives of an oscillation, each in every direction that it may go.
+
+    Args:
+        effect: the effect.
+        alternatives: sine and cosine of each.
+    """
+    phase = phase_of(effect)
+    for direction in (p for p in effect.parameters if p.shapes and p.probed):
+        if direction.name != phase and _is_direction(direction):
+            alternatives = [
+                tuple({**p, direction.name: _turned(direction, p[direction.name], i)} for p in own)
+                for own in alternatives
+                for i in range(DIRECTIONS)
+            ]
+    return list(alternatives)
+
+
+def _turned(direction: EffectParameter, value: float, steps: int) -> float:
+    """A direction turned by some of the steps of a full turn, within one turn of zero."""
+    angle = value + 2.0 * np.pi / DIRECTIONS * steps
+    return float((angle + np.pi) % (2.0 * np.pi) - np.pi)
+
+
 def _frequencies(parameter: EffectParameter, length: float) -> tuple[float, ...]:
     """Two thirds of a cycle in a run apart, but no more than :data:`MOST_FREQUENCIES`."""
     low, high = parameter.plausible
@@ -249,34 +278,6 @@ def _middle(parameter: EffectParameter) -> tuple[float, ...]:
         return (parameter.neutral,)
     low, high = parameter.plausible
     return (float(np.sqrt(low * high)) if low > 0.0 else 0.5 * (low + high),)
-
-
-def combined(
-    effect: Effect, settings: Sequence[Probe], size: Sequence[float], start: Probe
-) -> Probe:
-    """Parameters that do what so many times each setting does, where effects add.
-
-    Args:
-        effect: the effect.
-        settings: one alternative of :func:`probes_of`.
-        size: multiple of each setting.
-        start: values that the settings depart from.
-    """
-    phase = phase_of(effect)
-    if phase:
-        (amplitude,) = (p.name for p in effect.switching)
-        # One of sine and cosine may be left out: a planar record may hold nothing of it.
-        pairs = zip(size, settings, strict=True)
-        whole = sum(n * setting[amplitude] * np.exp(1j * setting[phase]) for n, setting in pairs)
-        return {**settings[0], amplitude: float(np.abs(whole)), phase: float(np.angle(whole))}
-    values = {**start, **{p.name: settings[0][p.name] for p in effect.parameters if p.shapes}}
-    for factor, setting in zip(size, settings, strict=True):
-        for name in (p.name for p in effect.switching):
-            endless = np.isinf(start[name])
-            values[name] = (
-                setting[name] if endless else values[name] + factor * (setting[name] - start[name])
-            )
-    return values
 
 
 def mirrored(effect: Effect, probe: Probe) -> Probe:
@@ -355,7 +356,7 @@ def _shape_values(parameter: EffectParameter) -> tuple[float, ...]:
     if not parameter.probed:
         return (parameter.neutral,)
     low, high = parameter.plausible
-    if parameter.unit == "rad" and high - low >= 6.0:  # both ends are one direction
+    if _is_direction(parameter):  # both ends are one direction
         return tuple((low + 2.0 * np.pi / DIRECTIONS * np.arange(DIRECTIONS)).tolist())
     if low > 0 and high / low > 4:
         return tuple(np.geomspace(low, high, 3).tolist())

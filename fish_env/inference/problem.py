@@ -317,9 +317,12 @@ class Problem(Protocol):
         """
         return self
 
-    @property
-    def starts_known(self) -> bool:
-        """Whether nothing has to be settled."""
+    def starts_known(self, further: Iterable[str] = ()) -> bool:
+        """Whether nothing has to be settled.
+
+        Args:
+            further: effects that a fit is about to begin with.
+        """
         return True
 
     def relaxed_noise(self, noise: Any) -> Any | None:

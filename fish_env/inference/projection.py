@@ -85,10 +85,12 @@ class Signal(Projected):
     Attributes:
         variance_inflation: factor by which coloured residuals widen the score, at least 1.
         followed: (n, m) how the free parameters of the fit follow the change in a refit.
+        tries: alternatives that it is the best of, where the others are not kept.
     """
 
     variance_inflation: float
     followed: FloatArray | None = None
+    tries: int = 1
 
     @property
     def statistic(self) -> float:
@@ -103,7 +105,12 @@ class Signal(Projected):
     @property
     def log_p(self) -> float:
         """Logarithm of the p-value of this one test: overwhelming evidence still ranks."""
-        return float(chi2_log_tail(self.statistic, self.freedom))
+        return self.log_p_of(self.statistic)
+
+    def log_p_of(self, statistic: float) -> float:
+        """Logarithm of the p-value of a statistic of this test, by Bonferroni's bound on tries."""
+        chance = float(chi2_log_tail(statistic, self.freedom)) + np.log(self.tries)
+        return float(min(chance, 0.0))
 
     @cached_property
     def to_orthonormal(self) -> FloatArray:

@@ -28,7 +28,6 @@ from fish_env.inference.problem import Point
 from fish_env.inference.projection import Projector, Signal
 from fish_env.inference.screening import Screen
 from fish_env.inference.starts import linear_estimate, probed, starts
-from fish_env.inference.tails import chi2_log_tail
 
 Report = Callable[[str], None]
 
@@ -104,7 +103,7 @@ def _system(
 
 def _log_p(score: FloatArray, info: FloatArray, signal: Signal, least: float) -> float:
     statistic = float(score @ np.linalg.solve(info, score)) / signal.variance_inflation
-    return float(chi2_log_tail(statistic, signal.freedom)) if statistic >= least else np.inf
+    return signal.log_p_of(statistic) if statistic >= least else np.inf
 
 
 def _sized(

@@ -8,16 +8,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fish_env.arrays import FloatArray
+from fish_env.inference.changes import SETTINGS_AT_ONCE, kinds, residual_changes
 from fish_env.inference.estimate.fit import Fit
-from fish_env.inference.estimate.free import diverged
 from fish_env.inference.estimate.products import gram, inner
-from fish_env.inference.hypotheses import CauseId, Coefficient, effects_of
+from fish_env.inference.hypotheses import CauseId, Coefficient
+from fish_env.inference.oscillations import in_each_run, with_columns
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import (
     Cause,
-    Probe,
     best_of_each,
-    effect_values,
     farthest,
     finer,
     of_visible,
@@ -25,10 +24,6 @@ from fish_env.inference.probes import (
 from fish_env.inference.problem import Problem
 from fish_env.inference.projection import Projector, Signal, in_parts
 from fish_env.inference.tails import chi2_log_tail, noncentrality
-
-LANES_AT_ONCE = 96
-SETTINGS_AT_ONCE = LANES_AT_ONCE - 1
-"""One lane is that of the fit itself."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,7 +125,8 @@ def _effect_signals(fit: Fit, projector: Projector, causes: Sequence[Cause]) -> 
     found = _signals_of(fit, projector, tests)
     unseen = [test for test, signal in zip(tests, found, strict=True) if signal is None]
     further = _signals_of(fit, projector, _far_tests(fit.problem, unseen))
-    return [signal for signal in (*found, *further) if signal is not None]
+    known = [signal for signal in (*found, *further) if signal is not None]
+    return [*known, *in_each_run(fit, projector, causes)]
 
 
 def _far_tests(problem: Problem, tests: Sequence[tuple[Cause, int]]) -> list[tuple[Cause, int]]:
@@ -164,9 +160,11 @@ def _signals_of(
 def _parts(fit: Fit, tests: Sequence[tuple[Cause, int]]) -> list[list[int]]:
     """Tests in parts of which each is evaluated at once: their residuals take memory."""
     count = [len(cause.probes[index]) for cause, index in tests]
-    kinds = _kinds(fit, [cause.effect for cause, _ in tests], sum(count))
+    alike_ones = kinds(fit, [cause.effect for cause, _ in tests], sum(count))
     return [
-        part for alike in kinds for part in in_parts(alike, lambda i: count[i], SETTINGS_AT_ONCE)
+        part
+        for alike in alike_ones
+        for part in in_parts(alike, lambda i: count[i], SETTINGS_AT_ONCE)
     ]
 
 
@@ -175,70 +173,12 @@ def _signals_together(
 ) -> list[Signal | None]:
     """Signals of alternatives of causes; None where the simulation diverges with one."""
     jobs = [(cause.effect, probe) for cause, index in tests for probe in cause.probes[index]]
-    start = np.repeat(fit.point.z[:, None], len(jobs), axis=1)
-    columns = residual_changes(fit, jobs, start)
-    ends = np.cumsum([len(cause.probes[index]) for cause, index in tests]).tolist()
-    rows = [range(first, end) for first, end in zip([0, *ends], ends, strict=False)]
-    own = [(cause, index, mine) for (cause, index), mine in zip(tests, rows, strict=True)]
+    columns = residual_changes(fit, jobs)
+    own = with_columns(tests)
     found = projector.signals(own, columns.T)
     for i, (cause, index, mine) in enumerate(own):
         found[i] = found[i] or of_visible(projector.signal, cause, index, columns[:, list(mine)])
     return found
-
-
-def residual_changes(fit: Fit, jobs: Sequence[tuple[str, Probe]], z: FloatArray) -> FloatArray:
-    """Change of the residuals (D, n) with each setting of an effect.
-
-    Not a number where the simulation diverges.
-
-    Args:
-        fit: what the change is from.
-        jobs: effect and setting, n of them.
-        z: (coefficients, n) where to simulate each.
-    """
-    rows = _changes_of_kinds(fit, fit.comparing, jobs, z)
-    lost = np.flatnonzero(diverged(rows)).tolist()
-    if lost and fit.comparing is not fit.problem:
-        again = [jobs[i] for i in lost]
-        rows[lost] = _changes_of_kinds(fit, fit.problem, again, z[:, lost])
-    rows[diverged(rows)] = np.nan
-    return fit.linearised.whitened(rows).T
-
-
-def _changes_of_kinds(
-    fit: Fit, problem: Problem, jobs: Sequence[tuple[str, Probe]], z: FloatArray
-) -> FloatArray:
-    """The changes (n, D) of all jobs, each computed by the quickest kernel that can."""
-    rows = np.empty((len(jobs), len(fit.linearised.residuals)))
-    for alike in _kinds(fit, [name for name, _ in jobs], len(jobs)):
-        for first in range(0, len(alike), SETTINGS_AT_ONCE):
-            part = alike[first : first + SETTINGS_AT_ONCE]
-            rows[part] = _changes_at_once(fit, problem, [jobs[i] for i in part], z[:, part])
-    return rows
-
-
-def _kinds(fit: Fit, names: Sequence[str], settings: int) -> list[list[int]]:
-    """Numbers of effects that one kernel computes, so that none pays for effects of another kind.
-
-    A few settings stay together: kernels take whole blocks of lanes, however few are filled.
-    """
-    if settings <= SETTINGS_AT_ONCE:
-        return [list(range(len(names)))]
-    kinds: dict[object, list[int]] = {}
-    for i, name in enumerate(names):
-        key = fit.problem.batch_key([*effects_of(fit.point.effects), name])
-        kinds.setdefault(key, []).append(i)
-    return list(kinds.values())
-
-
-def _changes_at_once(
-    fit: Fit, problem: Problem, jobs: Sequence[tuple[str, Probe]], z: FloatArray
-) -> FloatArray:
-    base = {**problem.neutral(dict.fromkeys(name for name, _ in jobs)), **fit.point.effects}
-    values = [base, *(effect_values(problem, name, probe) for name, probe in jobs)]
-    lanes = {id: np.array([own.get(id, base[id]) for own in values]) for id in base}
-    start = np.column_stack([fit.point.z, z])
-    return problem.changes(start, lanes, fit.noise, fit.filtered)
 
 
 def _coefficient_signals(projector: Projector, causes: Sequence[Cause], fit: Fit) -> list[Signal]:

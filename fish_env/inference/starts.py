@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -10,10 +10,11 @@ from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.hypotheses import EffectParameterId, of_effects
 from fish_env.inference.policy import POLICY
-from fish_env.inference.probes import combined, effect_values, mirrored
+from fish_env.inference.probes import Probe, effect_values, mirrored, phase_of
 from fish_env.inference.problem import Point, Problem
 from fish_env.inference.projection import Signal
 from fish_env.inference.screening import zoomed
+from fish_env.inference.vehicle import Effect
 
 
 def starts(base: Fit, signal: Signal, z: FloatArray | None = None) -> list[Point]:
@@ -85,3 +86,43 @@ def probed(
     begin = [effect_values(problem, cause.effect, p) for p in settings]
     measured = of_effects(problem.drive.in_step, {cause.effect})
     return [{**begin[0], **measured}, *begin] if measured else begin
+
+
+def combined(
+    effect: Effect, settings: Sequence[Probe], size: Sequence[float], start: Probe
+) -> Probe:
+    """Parameters that do what so many times each setting does, where effects add.
+
+    Args:
+        effect: the effect.
+        settings: one alternative of :func:`probes_of`; of an oscillation perhaps once a run.
+        size: multiple of each setting.
+        start: values that the settings depart from.
+    """
+    if phase := phase_of(effect):
+        return _oscillation(effect, phase, settings, size)
+    values = {**start, **{p.name: settings[0][p.name] for p in effect.parameters if p.shapes}}
+    for factor, setting in zip(size, settings, strict=True):
+        for name in (p.name for p in effect.switching):
+            endless = np.isinf(start[name])
+            values[name] = (
+                setting[name] if endless else values[name] + factor * (setting[name] - start[name])
+            )
+    return values
+
+
+def _oscillation(
+    effect: Effect, phase: str, settings: Sequence[Probe], size: Sequence[float]
+) -> Probe:
+    """Amplitude and phase of so many times each setting.
+
+    Where settings repeat, once for each run, the amplitude is the root mean square of the runs'
+    own, and the phase that of their sum. One of sine and cosine may be left out: a planar record
+    may hold nothing of it.
+    """
+    (amplitude,) = (p.name for p in effect.switching)
+    own = [setting[amplitude] * np.exp(1j * setting[phase]) for setting in settings]
+    runs = sum(setting == settings[0] for setting in settings)
+    waves = (np.array(own) * np.array(size)).reshape(runs, -1).sum(axis=1)
+    whole, power = waves.sum(), float(np.mean(np.abs(waves) ** 2))
+    return {**settings[0], amplitude: float(np.sqrt(power)), phase: float(np.angle(whole))}

@@ -7,10 +7,10 @@ import pytest
 
 from fish_env.identification import SeriesProblem, fit
 from fish_env.identification.generic_forces import BoundForces, generic_forces
+from fish_env.inference.changes import residual_changes
 from fish_env.inference.estimate.coarse_fit import CoarseFitter
 from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
-from fish_env.inference.screening import residual_changes
 from tests.identification.synthetic import PATHS, Setup, simulate
 from tests.inference.stated import Stated, apart, effect, size_of
 

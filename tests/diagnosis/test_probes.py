@@ -6,13 +6,13 @@ import pytest
 from fish_env.effects import catalogue
 from fish_env.inference.probes import (
     Cause,
-    combined,
     each_alone,
     finer,
     mirrored,
     of_visible,
     probes_of,
 )
+from fish_env.inference.starts import combined
 from fish_env.model.effect import Effect, EffectParameter
 
 EFFECTS = sorted(catalogue())

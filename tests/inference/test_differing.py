@@ -86,7 +86,7 @@ def test_the_shared_number_is_the_mean_over_runs():
 
 def test_what_runs_differ_in_beside_an_effect_names_a_parameter_of_it():
     named = [v.beside for v in EVERY if v.beside is not None]
-    assert len(named) == len(set(named)) == 12
+    assert len(named) == len(set(named)) == 13
     for id in named:
         assert id.name in {p.name for p in catalogue()[id.effect].parameters}
 

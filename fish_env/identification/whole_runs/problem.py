@@ -251,8 +251,7 @@ class WholeRunProblem(Problem):
         """A centimetre and 0.05 rad, with fifteen independent samples a run."""
         return first_noise(self.channels)
 
-    @property
-    def starts_known(self) -> bool:
+    def starts_known(self, further: Iterable[str] = ()) -> bool:
         """Whether the own numbers of every run are near their estimates."""
         return self.starts is not None
 

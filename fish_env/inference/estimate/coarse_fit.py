@@ -158,7 +158,8 @@ class CoarseFitter:
     ) -> tuple[Problem, FloatArray]:
         """The best of some vectors, and the problem settled there."""
         noise = self.fit.noise
-        if few.starts_known:
+        further = {f.id.effect for f in free.freedoms} - {*self.fit.effects}
+        if few.starts_known(further):
             return few, self._best_acting(few, free, vectors)
         vectors = self._likeliest(few, free, vectors, POLICY.most_settled_starts)
         settled = [few.settled(free.unpack(v), noise, nearby=True) for v in vectors]

@@ -11,9 +11,14 @@ from fish_env.data import CommandSteps, Dataset, Run
 from fish_env.data.vocabulary import COMMANDS
 from fish_env.identification.series import SeriesProblem
 from fish_env.identification.variation import USUAL, WAVE
+from fish_env.identification.wave_phases import AMPLITUDE
+from fish_env.inference.estimate.coarse_fit import CoarseFitter
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.hypotheses import EffectParameterId
+from fish_env.inference.probes import causes_of
 from fish_env.inference.problem import Point
+from fish_env.inference.screening import screen
+from fish_env.inference.starts import starts
 from fish_env.params import load_fish
 from fish_env.simulator import Simulator
 from tests.identification.synthetic import FISH, PATHS, SENSOR_SD
@@ -71,6 +76,36 @@ def test_without_a_wave_or_differences_nothing_is_settled(problem):
     assert not still.variation.any()
     alike = problem.settled(begin(problem), problem.default_noise())
     assert not alike.variation.any()
+
+
+def screened(problem, noise):
+    """The best signal of a wave against a fit that knows of none."""
+    still = SeriesProblem(problem.dataset, paths=PATHS)
+    own = fit(still, noise=noise, refit_noise=False)
+    only = [cause for cause in causes_of(still) if cause.id == "wave"]
+    return own, screen(own, only, np.random.default_rng(0)).best()[0]
+
+
+def test_a_wave_shows_that_meets_each_run_in_another_phase(problem):
+    """Against it, and with one phase for all runs, little of it does."""
+    own, shown = screened(problem, differing(problem))
+    shape = shown.cause.probes[shown.probe][0]
+    assert shape["frequency"] == pytest.approx(TRUTH["frequency"], abs=0.05)
+    assert apart(shape["heading"], TRUTH["heading"]) < np.pi / 3.0
+    assert shown.freedom == 2 * len(PHASES)
+    _, alike = screened(problem, problem.default_noise())
+    assert shown.log_p < -100.0
+    assert alike.log_p > -5.0
+    begun = starts(own, shown)
+    found = CoarseFitter(own).coarse_fit(("wave",), (), begun)
+    assert found.point.effects[AMPLITUDE] == pytest.approx(TRUTH["amplitude"], rel=0.1)
+
+
+def test_many_tries_are_allowed_for(problem):
+    _, shown = screened(problem, differing(problem))
+    once = replace(shown, tries=1)
+    assert shown.tries > 50
+    assert shown.log_p == pytest.approx(once.log_p + np.log(shown.tries))
 
 
 @pytest.mark.slow

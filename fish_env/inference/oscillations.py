@@ -14,12 +14,13 @@ from itertools import pairwise
 import numpy as np
 
 from fish_env.arrays import FloatArray, IntArray
+from fish_env.inference.around import turned
 from fish_env.inference.changes import SETTINGS_AT_ONCE, residual_changes
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.free import spread_of
 from fish_env.inference.hypotheses import CauseId, EffectName, EffectParameterId
 from fish_env.inference.policy import POLICY
-from fish_env.inference.probes import Cause, Probe, phase_of, turned
+from fish_env.inference.probes import Cause, Probe, phase_of
 from fish_env.inference.projection import Projector, Signal, in_parts
 
 Alternative = tuple[Probe, ...]

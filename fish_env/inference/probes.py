@@ -221,7 +221,8 @@ def _turns(parameter: EffectParameter) -> bool:
     return parameter.unit == "rad" and high - low > 6.0
 
 
-def _is_direction(parameter: EffectParameter) -> bool:
+def is_direction(parameter: EffectParameter) -> bool:
+    """Whether a shape is a direction: plausible all around."""
     low, high = parameter.plausible
     return parameter.unit == "rad" and high - low >= 6.0
 
@@ -240,30 +241,6 @@ def _oscillations(effect: Effect, length: float) -> tuple[tuple[Probe, ...], ...
         )
         for chosen in product(*values)
     )
-
-
-def turned(effect: Effect, alternatives: Sequence[tuple[Probe, ...]]) -> list[tuple[Probe, ...]]:
-    """Alternatives of an oscillation, each in every direction that it may go.
-
-    Args:
-        effect: the effect.
-        alternatives: sine and cosine of each.
-    """
-    phase = phase_of(effect)
-    for direction in (p for p in effect.parameters if p.shapes and p.probed):
-        if direction.name != phase and _is_direction(direction):
-            alternatives = [
-                tuple({**p, direction.name: _turned(direction, p[direction.name], i)} for p in own)
-                for own in alternatives
-                for i in range(DIRECTIONS)
-            ]
-    return list(alternatives)
-
-
-def _turned(direction: EffectParameter, value: float, steps: int) -> float:
-    """A direction turned by some of the steps of a full turn, within one turn of zero."""
-    angle = value + 2.0 * np.pi / DIRECTIONS * steps
-    return float((angle + np.pi) % (2.0 * np.pi) - np.pi)
 
 
 def _frequencies(parameter: EffectParameter, length: float) -> tuple[float, ...]:
@@ -308,43 +285,6 @@ def phase_grid(effect: Effect, cycles: float) -> tuple[Probe, ...]:
     return tuple({size.name: float(value)} for value in np.linspace(low, high, count))
 
 
-def finer(effect: Effect, probe: Probe, length: float) -> tuple[tuple[Probe, ...], ...]:
-    """Sine and cosine at frequencies and other shapes around those of a probe.
-
-    Between two frequencies that differ by a small part of a cycle in a run, a fit can get stuck.
-
-    Args:
-        effect: the effect; no alternatives unless it oscillates.
-        probe: its parameters.
-        length: of the longest run (s).
-    """
-    phase = phase_of(effect)
-    if not phase:
-        return ()
-    shapes = [p for p in effect.parameters if p.shapes and p.name != phase]
-    values = [_around(s, probe[s.name], length) for s in shapes]
-    return tuple(
-        tuple(
-            {**probe, **dict(zip((s.name for s in shapes), chosen, strict=True)), phase: turn}
-            for turn in QUARTER
-        )
-        for chosen in product(*values)
-    )
-
-
-def _around(parameter: EffectParameter, value: float, length: float) -> tuple[float, ...]:
-    if not parameter.probed:
-        return (value,)
-    low, high = parameter.plausible
-    if parameter.unit == "Hz":
-        values = value + np.linspace(-0.7, 0.7, 15) / max(length, 1.0)
-    elif parameter.unit == "rad":  # a direction: all four quarters
-        values = value + np.array([-0.5, 0.0, 0.5, 1.0]) * np.pi
-    else:
-        values = value * np.array([0.4, 1.0, 2.5])
-    return tuple(np.unique(np.clip(values, low, high)).tolist())
-
-
 def _alternative(
     effect: Effect, switches: Sequence[EffectParameter], setting: Probe, share: float
 ) -> tuple[Probe, ...]:
@@ -356,11 +296,17 @@ def _shape_values(parameter: EffectParameter) -> tuple[float, ...]:
     if not parameter.probed:
         return (parameter.neutral,)
     low, high = parameter.plausible
-    if _is_direction(parameter):  # both ends are one direction
+    if is_direction(parameter):  # both ends are one direction
         return tuple((low + 2.0 * np.pi / DIRECTIONS * np.arange(DIRECTIONS)).tolist())
-    if low > 0 and high / low > 4:
+    if is_wide(parameter):
         return tuple(np.geomspace(low, high, 3).tolist())
     return tuple(np.linspace(low, high, 3).tolist())
+
+
+def is_wide(parameter: EffectParameter) -> bool:
+    """Whether a shape is known by its order of magnitude."""
+    low, high = parameter.plausible
+    return low > 0.0 and high / low > 4.0
 
 
 def _between(p: EffectParameter, share: float) -> float:

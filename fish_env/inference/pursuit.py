@@ -26,7 +26,7 @@ from fish_env.inference.hypotheses import CauseId, Coefficient, EffectName, list
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point
 from fish_env.inference.projection import Projector, Signal
-from fish_env.inference.screening import Screen
+from fish_env.inference.screening import Screen, zoomed
 from fish_env.inference.starts import linear_estimate, probed, starts
 
 Report = Callable[[str], None]
@@ -259,13 +259,15 @@ def _together(
     base = current.fit
     sizes = {pick.signal.cause.effect: pick for pick in picks}
     signals = shown.by_effect()
-    linear = dict(base.point.effects)
+    linear, mild = dict(base.point.effects), dict(base.point.effects)
     for name in causes:
         pick = sizes.get(name)
-        linear |= linear_estimate(base, pick.signal, pick.size) if pick else {}
-    mild = dict(base.point.effects)
-    for name in causes:
-        mild |= probed(base.problem, signals[name])[0]
+        closer = zoomed(base, pick.signal if pick else signals[name])
+        if pick:
+            # Sizes together hold for the alternative that was picked.
+            size = pick.size if closer is pick.signal else closer.size
+            linear |= linear_estimate(base, closer, size)
+        mild |= probed(base.problem, closer)[0]
     faint = {**base.problem.beginning(causes), **base.point.effects}
     begin = [Point(base.point.z, values) for values in ({**mild, **linear}, mild, faint)]
     effects = (*base.effects, *causes)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fish_env.arrays import FloatArray
+from fish_env.inference.around import finer, nearer
 from fish_env.inference.changes import SETTINGS_AT_ONCE, kinds, residual_changes
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.products import gram, inner
@@ -16,14 +17,17 @@ from fish_env.inference.oscillations import in_each_run, with_columns
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import (
     Cause,
+    Probe,
     best_of_each,
     farthest,
-    finer,
     of_visible,
 )
 from fish_env.inference.problem import Problem
 from fish_env.inference.projection import Projector, Signal, in_parts
 from fish_env.inference.tails import chi2_log_tail, noncentrality
+
+CLOSER = (0.25, 0.12, 0.06)
+"""Shares of a shape's plausible range by which it is moved, one after another."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,13 +111,24 @@ def screen(
 
 
 def zoomed(fit: Fit, signal: Signal) -> Signal:
-    """The best signal around one of an oscillation; any other signal as it is."""
+    """The best signal of the same effect with its shape, or frequency, a little different.
+
+    A screen tries each shape at a few values. Between two of them a fit may lead anywhere.
+    """
     problem, cause = fit.problem, signal.cause
-    length = problem.longest_run
-    around = finer(problem.known[cause.effect], cause.probes[signal.probe][0], length)
+    effect = problem.known[cause.effect]
+    around = finer(effect, cause.probes[signal.probe][0], problem.longest_run)
+    if around:
+        return _best_of(fit, signal, around)
+    for share in CLOSER:
+        signal = _best_of(fit, signal, nearer(effect, signal.cause.probes[signal.probe], share))
+    return signal
+
+
+def _best_of(fit: Fit, signal: Signal, around: tuple[tuple[Probe, ...], ...]) -> Signal:
     if not around:
         return signal
-    close = Cause(cause.id, around)
+    close = Cause(signal.cause.id, around)
     return min((signal, *_effect_signals(fit, Projector(fit), [close])), key=lambda s: s.log_p)
 
 

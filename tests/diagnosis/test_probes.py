@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from fish_env.effects import catalogue
+from fish_env.inference.around import finer
 from fish_env.inference.probes import (
     Cause,
     each_alone,
-    finer,
     mirrored,
     of_visible,
     probes_of,

@@ -24,7 +24,7 @@ from fish_env.inference.estimate.fit import FEWER_STEPS, Fit, fit
 from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.hypotheses import CauseId, Coefficient, EffectName, listed
 from fish_env.inference.policy import POLICY
-from fish_env.inference.problem import Point
+from fish_env.inference.problem import Point, Problem
 from fish_env.inference.projection import Projector, Signal
 from fish_env.inference.screening import Screen, zoomed
 from fish_env.inference.starts import linear_estimate, probed, starts
@@ -174,7 +174,8 @@ def _needed(
     coarse = _together(current, causes, picks, shown)
     if coarse is None:
         return current
-    fitted = _fitted(current, coarse)
+    problem = to_search(current.fit.problem.without_refinement(), coarse)
+    fitted = _fitted(problem, current, coarse)
     if fitted is None:
         return current
     found = Explanation((*current.causes, *causes), fitted)
@@ -192,8 +193,23 @@ def _needed(
         # The linear model does not hold as far as the values at which they are off.
         report(f"fitting again with {listed(name for name in idle if name not in wild)}")
         found = whole.varied(beside_misfit=True, dropped=wild)
-    better = found.score < current.score - POLICY.evidence_doubt
+    better = found.score < _in_steps_of(problem, current).score - POLICY.evidence_doubt
     return found if better and not implausible_estimates(found.fit) else current
+
+
+def _in_steps_of(problem: Problem, current: Explanation) -> Explanation:
+    """An explanation as fits with further effects are made: in the steps of their problem.
+
+    A drive whose rate jumps is simulated in finer ones, and longer ones cost more than many a cause
+    gains.
+    """
+    own, before, values = current.fit, current.fit.problem, current.fit.point.effects
+    as_fine = before.refines_steps(values) == problem.refines_steps(values)
+    if as_fine and (before.longest_step == problem.longest_step or own.looks_alike(problem)):
+        return current
+    start = (own.effects, own.point, own.noise, own.released)
+    again = reached(lambda: fit(problem, *start, rounds=2, iterations=FEWER_STEPS))
+    return current if again is None else Explanation(current.causes, again)
 
 
 def _confusable(current: Explanation, cause: CauseId) -> tuple[str, ...]:
@@ -201,13 +217,12 @@ def _confusable(current: Explanation, cause: CauseId) -> tuple[str, ...]:
     return () if isinstance(cause, Coefficient) else known[cause].confusable_with
 
 
-def _fitted(current: Explanation, coarse: CoarseFit) -> Fit | None:
+def _fitted(problem: Problem, current: Explanation, coarse: CoarseFit) -> Fit | None:
     """The full fit from a coarse one, with the noise that it leaves.
 
     In steps that are the same for all effects, but for lags too short for them: finer ones, for
     effects that are not smooth, are for estimates to be published.
     """
-    problem = to_search(current.fit.problem.without_refinement(), coarse)
     start = (coarse.effects, coarse.point, current.fit.noise, coarse.released)
     return reached(lambda: fit(problem, *start, rounds=2, iterations=FEWER_STEPS))
 

@@ -224,6 +224,38 @@ def test_a_search_that_adds_nothing_fits_nothing_again():
     assert "removing unnecessary causes" not in said
 
 
+class Jumping(Stated):
+    """An effect that makes the motion jump: without finer steps its simulation misses more."""
+
+    def __init__(self, coarse=False):
+        def residuals(z, effects):
+            jump, other = effects[size_of("jump")], effects[size_of("other")]
+            missed = 8.0 if coarse and jump else 0.0
+            return np.tile([jump - 30.0, other - 6.0, float(z.sum()), missed], (3, 1))
+
+        super().__init__(residuals, [effect("jump", 40.0), effect("other", 20.0)])
+        self.coarse = coarse
+
+    def without_refinement(self):
+        return Jumping(coarse=True)
+
+    def refines_steps(self, effects):
+        return not self.coarse and any(id.effect == "jump" for id in effects)
+
+    def refined(self):
+        return self, 2
+
+
+def test_a_further_cause_is_judged_in_the_steps_that_it_is_fitted_in():
+    """Finer steps gain more than the cause does, which is found nevertheless."""
+    fine = Jumping()
+    current = Explanation(("jump",), fit(fine, ("jump",)))
+    coarse = fit(fine.without_refinement(), ("jump", "other"))
+    assert Explanation(("jump", "other"), coarse).score > current.score + 6.0
+    shown = screen(current.fit, causes_of(fine), np.random.default_rng(0))
+    assert pursued(current, shown, silent).causes == ("jump", "other")
+
+
 def with_its_limit(declared: bool) -> Stated:
     """Two effects that do the same, one of them declared as the other's limit, and a third."""
     parts = (lambda values: {"simple": dict(values)}) if declared else None

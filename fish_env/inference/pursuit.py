@@ -20,7 +20,7 @@ from fish_env.inference.adequacy import beyond_plausible, implausible_estimates
 from fish_env.inference.elimination import allowed_loss, insignificant, off_values
 from fish_env.inference.estimate.again import to_search
 from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
-from fish_env.inference.estimate.fit import FEWER_STEPS, Fit, fit
+from fish_env.inference.estimate.fit import FEWER_STEPS, Fit, fit, objective_at
 from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.hypotheses import CauseId, Coefficient, EffectName, listed
 from fish_env.inference.policy import POLICY
@@ -221,9 +221,18 @@ def _fitted(problem: Problem, current: Explanation, coarse: CoarseFit) -> Fit | 
     """The full fit from a coarse one, with the noise that it leaves.
 
     In steps that are the same for all effects, but for lags too short for them: finer ones, for
-    effects that are not smooth, are for estimates to be published.
+    effects that are not smooth, are for estimates to be published. What a coarse fit on a few runs
+    makes of the parameters that were known before may be worse on all of them than they were.
     """
-    start = (coarse.effects, coarse.point, current.fit.noise, coarse.released)
+    own = current.fit
+    as_known = Point(own.point.z, {**coarse.point.effects, **own.point.effects})
+
+    def left(point: Point) -> float:
+        value = reached(partial(objective_at, problem, coarse.effects, point, own.noise))
+        return np.inf if value is None else value
+
+    begin = min((coarse.point, as_known), key=left)
+    start = (coarse.effects, begin, own.noise, coarse.released)
     return reached(lambda: fit(problem, *start, rounds=2, iterations=FEWER_STEPS))
 
 

@@ -64,11 +64,21 @@ def fastest(values):
     return 1.0 / (TWO_PI * values["natural_frequency"] * (zeta + sqrt(zeta * zeta - 1.0)))
 
 
+STIFF_HZ = 8.0
+"""Natural frequency above which a tail is stiffer than any that bends."""
+
+
 def lags(values):
-    """Overdamped, its response is two lags in a row; the shorter is nearly a delay."""
+    """Overdamped, its response is two lags in a row; the shorter is nearly a delay.
+
+    Of a stiff tail only the lag 2 damping_ratio / w is left: beats do not reach its resonance.
+    """
     zeta, omega = values["damping_ratio"], TWO_PI * values["natural_frequency"]
-    if zeta < 1.0 or omega == inf:
+    if omega == inf:
         return {}
+    if zeta < 1.0:
+        stiff = omega > TWO_PI * STIFF_HZ
+        return {"servo_lag": {"time_constant": 2.0 * zeta / omega}} if stiff else {}
     root = sqrt(zeta * zeta - 1.0)
     shorter, longer = (zeta - root) / omega, (zeta + root) / omega
     return {"servo_lag": {"time_constant": longer}, "servo_delay": {"delay": shorter}}
@@ -81,7 +91,9 @@ EFFECT = Effect(
     equation="xi'' + 2 damping_ratio w xi' + w^2 xi = w^2 cmd, w = 2 pi natural_frequency",
     source="Pseudo-rigid-body model, Howell, Compliant Mechanisms, chapter 5",
     parameters=(
-        EffectParameter("natural_frequency", "Hz", inf, 0.1, inf, (3.0, 8.0), "in water, undamped"),
+        EffectParameter(
+            "natural_frequency", "Hz", inf, 0.1, inf, (3.0, STIFF_HZ), "in water, undamped"
+        ),
         EffectParameter(
             "damping_ratio", "-", 1.0, 0.05, 5.0, (0.2, 1.2), "1 is critical", shapes=True
         ),

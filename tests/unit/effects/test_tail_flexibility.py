@@ -75,3 +75,18 @@ def test_overdamped_it_is_a_lag_and_nearly_a_delay(natural, zeta, part):
 def test_what_rings_is_no_lag():
     assert not get_effect("tail_flexibility").in_parts(EFFECTS["tail_flexibility"])
     assert not get_effect("tail_flexibility").in_parts(get_effect("tail_flexibility").neutral)
+
+
+def test_a_stiff_tail_is_late_and_nothing_else():
+    """As its declaration says: beats do not reach its resonance. A tail that bends is no lag."""
+    flexible = get_effect("tail_flexibility")
+    values = {"natural_frequency": 16.0, "damping_ratio": 0.5}
+    limit = flexible.in_parts(values)
+    assert [*limit] == ["servo_lag"]
+    beat = [{"t": 0.0, "tail_amplitude": 0.3, "tail_frequency": 1.5}]
+    late, lag, plain = (
+        tail(own, run(own, beat, 3.0, dt=0.002))[0]
+        for own in ({"tail_flexibility": values}, limit, {})
+    )
+    assert np.abs(late - lag)[500:].max() < 0.15 * np.abs(late - plain)[500:].max()
+    assert flexible.in_parts({**values, "natural_frequency": 6.0}) == {}

@@ -191,9 +191,13 @@ class SeriesProblem(Problem):
         filtered: Sequence[Filtered] = (),
         leverage: Callable[[], FloatArray] | None = None,
     ) -> NoiseModel:
-        """Noise model of largest likelihood at a point, from as many runs as that takes."""
+        """Noise model of largest likelihood at a point, from as many runs as that takes.
+
+        From all of them where they differ: what suits some suits the others worse.
+        """
         largest = self.largest_sensor_sd if final else None
-        few = self.spread(runs_for_noise(self.runs))
+        count = self.run_count if noise.spread.any() else runs_for_noise(self.runs)
+        few = self.spread(count)
         return fitted_noise(self, few, point, noise, largest, filtered)
 
     def disturbance_at_limit(self, noise: NoiseModel) -> tuple[str, ...]:

@@ -320,3 +320,27 @@ def test_a_spread_is_fitted_also_where_runs_begin_with_the_numbers_they_have():
     assert max(varied.noise.spread) > 0.3
     assert varied.problem.variation.any()
     assert varied.objective < own.objective - 100.0
+
+
+class Misleading(Differing):
+    """Noise that suits some runs, and all of them together less."""
+
+    def fitted_noise(self, point, noise, final, filtered, leverage):
+        return Spreading(sd=0.6 * noise.sd)
+
+    def filtered(self, point, noise, near=()):
+        rows = self._rows(point.z, point.effects, noise)
+        cost = SAMPLES * np.log(noise.sd)
+        return [Evaluated(float(-0.5 * row @ row - cost), row) for row in rows]
+
+
+def test_a_fit_ends_under_no_noise_that_makes_all_runs_less_likely():
+    """Else each repeat is a little worse, and further causes would have to make up for that."""
+    problem = Misleading()
+    once = fit(problem, noise=Spreading(), rounds=2)
+    assert once.noise == Spreading()
+    assert once.objective == pytest.approx(fit(problem, noise=Spreading(), rounds=1).objective)
+    again = fit(once.problem, once.effects, once.point, once.noise, rounds=2)
+    assert again.objective <= once.objective + 1e-6
+    noisy = fit(problem, noise=Spreading(sd=2.0), rounds=2)
+    assert noisy.noise.sd == pytest.approx(1.2), "noise that is better is taken over"

@@ -12,7 +12,7 @@ from fish_env.inference.explanation import Explanation
 from fish_env.inference.pipeline import cross_validated, with_slow_causes, with_weaker_causes
 from fish_env.inference.probes import causes_of
 from fish_env.inference.screening import Screen
-from tests.inference.stated import Stated, White, apart, effect
+from tests.inference.stated import Evaluated, Stated, White, apart, effect
 
 SHOWN = Screen((), -11.0, 0.05)
 LEFT = Adequacy(False, -11.0, (Misfit("u", "heave", -12.0, 0.01),))
@@ -102,13 +102,21 @@ def test_one_half_of_the_runs_refutes_chance_in_the_other(causes, gain, reached)
 
 
 class Hiding(Pushed):
-    """A disturbance that stays wherever a sample is far off, and then hides what moves it."""
+    """A disturbance that stays wherever a sample is far off, and then hides what moves it.
 
-    STAYS = White(50.0)
+    It makes that likelier, but less so than what moved it would.
+    """
+
+    STAYS, COST = White(50.0), 5.0
 
     def fitted_noise(self, point, noise, final, filtered, leverage):
         left = noise.sd * np.concatenate([run.residuals for run in filtered])
         return self.STAYS if np.abs(left).max() > 5.0 else White()
+
+    def filtered(self, point, noise, near=()):
+        cost = self.COST if noise == self.STAYS else 0.0
+        rows = self._rows(point.z, point.effects, noise)
+        return [Evaluated(float(-0.5 * row @ row - cost), row) for row in rows]
 
     def disturbance_at_limit(self, noise):
         return ("a disturbance that stays",) if noise == self.STAYS else ()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -25,9 +25,8 @@ from fish_env.inference.estimate.free import (
 from fish_env.inference.estimate.gauss_newton import Linearise, Quadratic, descend
 from fish_env.inference.estimate.information import gradient, information, leverage, prior_precision
 from fish_env.inference.estimate.joint import descend_jointly
-from fish_env.inference.estimate.joint_model import Joint
+from fish_env.inference.estimate.rounds import Reached, last, noise_of
 from fish_env.inference.estimate.run_variation import Marginal
-from fish_env.inference.estimate.settle import predicted_variation
 from fish_env.inference.estimate.slopes import Slopes
 from fish_env.inference.evaluation import Evaluation
 from fish_env.inference.hypotheses import Coefficient, ParameterId
@@ -192,7 +191,7 @@ def fit(
     noise = noise or problem.default_noise()
     filtered: Sequence[Evaluation] = ()
     marginal: Marginal | None = None
-    last = noise
+    reached: Reached | None = None
     for round_ in range(rounds if refit_noise else 1):
         report(f"fitting parameters, round {round_ + 1}")
         limits = (iterations, tolerance, give_up_above)
@@ -210,27 +209,22 @@ def fit(
                 )
                 problem = begun
         except np.linalg.LinAlgError:
-            if round_ == 0:
+            if reached is None:
                 raise
-            noise = last  # a filter that follows the data less is not stable beside this model
-            break
+            value = np.inf  # a filter that follows the data less is not stable beside this model
         if not refit_noise:
             break
-        report(f"fitting the noise, round {round_ + 1}")
-        last = noise
-        noise = _noise_of(slopes, problem, vector, filtered, round_ > 0)
-        if last.is_close(noise, POLICY.same_noise):
+        if reached is not None and not value < reached.value:
+            problem, vector, noise = reached[:3]
             break
-    if refit_noise:
-        point, slopes = free.unpack(vector), Slopes(free, noise)
-        # The numbers of runs were those that suit the noise before.
-        problem, marginal = predicted_variation(problem, point, noise, nearby=True)
-        value, filtered = objective(problem, free, vector, noise, near=filtered)
-        if marginal is not None:
-            marginal = slopes.marginal(problem, vector, filtered)
-            assert marginal is not None
-            at = Joint.of(problem, free, vector, filtered, noise)
-            value = at.marginal_value(marginal)
+        reached = Reached(problem, vector, noise, value)
+        report(f"fitting the noise, round {round_ + 1}")
+        noise = noise_of(slopes, problem, vector, filtered, round_ > 0)
+        if reached.noise.is_close(noise, POLICY.same_noise):
+            break
+    if reached is not None:
+        filtered = () if noise is reached.noise else filtered
+        problem, vector, slopes, filtered, value, marginal = last(reached, free, noise, filtered)
     return _finish(problem, slopes, names, vector, value, filtered, marginal)
 
 
@@ -279,34 +273,6 @@ def gauss_newton(
     limits = (free.bounds.beside(vector), iterations, tolerance, give_up_above)
     exactly, quickly = modelled(slopes.exact), modelled(slopes.quick)
     return descend(vector, evaluate, exactly, *limits, quickly=quickly)
-
-
-def _noise_of(
-    slopes: Slopes,
-    problem: Problem,
-    vector: FloatArray,
-    filtered: Sequence[Evaluation],
-    final: bool,
-) -> Any:
-    """The noise model that suits an evaluation.
-
-    Args:
-        slopes: under the noise model so far.
-        problem: the problem.
-        vector: (n,) where it was evaluated.
-        filtered: the evaluation.
-        final: whether the parameters are near their estimates.
-    """
-    followed = partial(_leverage, slopes, problem, vector, filtered)
-    point = slopes.free.unpack(vector)
-    return problem.fitted_noise(point, slopes.noise, final, filtered, followed)
-
-
-def _leverage(
-    slopes: Slopes, problem: Problem, vector: FloatArray, filtered: Sequence[Evaluation]
-) -> FloatArray:
-    """Share of each residual that the free parameters follow (D,)."""
-    return leverage(slopes.exact(problem, vector, filtered).slopes, slopes.free.prior)
 
 
 def _extrapolated(own: Fit) -> Fit:

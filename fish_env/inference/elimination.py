@@ -14,6 +14,7 @@ from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import (
     CauseId,
     Coefficient,
+    EffectName,
     EffectParameterId,
     ParameterId,
 )
@@ -69,6 +70,8 @@ def _smaller(current: Explanation, needed: Collection[CauseId], judged: bool) ->
         if (alone or judged) and not doubtful:
             continue
         least = POLICY.evidence_doubt + (allowed_loss(current.fit, cause) if doubtful else 0.0)
+        if not alone and foreseen_loss(current, cause) > least + POLICY.linear_doubt:
+            continue
         smaller = None if _is_needed(fitter, cause, least) else without(current, (cause,), least)
         if smaller and smaller.score < current.score + least:
             found.append(smaller)
@@ -118,6 +121,21 @@ def surely_acts(fit: Fit, cause: CauseId) -> bool:
     if not isinstance(cause, Coefficient) and not _is_off_at_finite(fit, cause):
         return False
     return _from_off(fit, off_values(fit, cause)) > POLICY.sure_sd**2
+
+
+def foreseen_loss(current: Explanation, cause: CauseId) -> float:
+    """By how much the score grows without a cause, in the linear model; zero where none tells.
+
+    That is of what is off at infinity, and where the motion's rate jumps.
+
+    Args:
+        current: all causes with their fit.
+        cause: the one to drop.
+    """
+    own = current.fit
+    if not isinstance(cause, Coefficient) and not _is_linear(own, cause):
+        return 0.0
+    return _from_off(own, off_values(own, cause)) - current.narrowed_by((cause,))
 
 
 def may_not_act(fit: Fit, cause: CauseId) -> bool:
@@ -188,6 +206,10 @@ def off_values(fit: Fit, cause: CauseId) -> dict[ParameterId, float]:
         id: off if np.isfinite(off) else 2.0 * float(fit.estimates[fit.ids.index(id)])
         for id, off in neutral.items()
     }
+
+
+def _is_linear(fit: Fit, name: EffectName) -> bool:
+    return _is_off_at_finite(fit, name) and not fit.problem.is_nonsmooth((name,))
 
 
 def _is_off_at_finite(fit: Fit, name: str) -> bool:

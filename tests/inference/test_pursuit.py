@@ -9,7 +9,7 @@ import pytest
 
 from fish_env.inference.attribution import attribute, extended
 from fish_env.inference.effects import DeclaredEffect
-from fish_env.inference.elimination import insignificant
+from fish_env.inference.elimination import backward_elimination, insignificant
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.many_causes import beside, challenged, each_in_turn, pursue
@@ -222,6 +222,22 @@ def test_a_search_that_adds_nothing_fits_nothing_again():
     assert set(found.accepted.causes) == NAMES
     assert extended(found, causes, rng, report=said.append) is found
     assert "removing unnecessary causes" not in said
+
+
+@pytest.mark.parametrize(("size", "fitted"), [(4.0, False), (2.0, True)], ids=["plain", "open"])
+def test_what_the_linear_model_foresees_to_be_needed_is_not_fitted_without(size, fitted):
+    """Seven standard errors are plain, three and a half are not."""
+
+    def residuals(z, effects):
+        small, large = effects[size_of("small")] - size, effects[size_of("large")] - 40.0
+        return np.tile([small, large, float(z.sum())], (3, 1))
+
+    problem = Stated(residuals, [effect("small", 10.0), effect("large", 60.0)])
+    current = Explanation(("small", "large"), fit(problem, ("small", "large")))
+    problem.log.simulated.clear()
+    kept, rivals = backward_elimination(current)
+    assert (kept.causes, rivals) == (current.causes, ())
+    assert any("small" not in effects for effects, _ in problem.log.simulated) == fitted
 
 
 class Jumping(Stated):

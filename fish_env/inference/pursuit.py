@@ -222,16 +222,19 @@ def _fitted(problem: Problem, current: Explanation, coarse: CoarseFit) -> Fit | 
 
     In steps that are the same for all effects, but for lags too short for them: finer ones, for
     effects that are not smooth, are for estimates to be published. What a coarse fit on a few runs
-    makes of the parameters that were known before may be worse on all of them than they were.
+    makes of the parameters that were known before may be worse on all of them than they were,
+    and so may the further effects.
     """
     own = current.fit
-    as_known = Point(own.point.z, {**coarse.point.effects, **own.point.effects})
+    faint = {**problem.beginning(coarse.effects), **own.point.effects}
+    as_known = {**coarse.point.effects, **own.point.effects}
 
     def left(point: Point) -> float:
         value = reached(partial(objective_at, problem, coarse.effects, point, own.noise))
         return np.inf if value is None else value
 
-    begin = min((coarse.point, as_known), key=left)
+    known = [Point(own.point.z, values) for values in (as_known, faint)]
+    begin = min((coarse.point, *known), key=left)
     start = (coarse.effects, begin, own.noise, coarse.released)
     return reached(lambda: fit(problem, *start, rounds=2, iterations=FEWER_STEPS))
 

@@ -23,7 +23,7 @@ from fish_env.identification.in_step import nominal_point
 from fish_env.identification.policy import IDENTIFICATION
 from fish_env.identification.runs import PHASE, RunData
 from fish_env.identification.series import SeriesProblem
-from fish_env.identification.tail_drive import RATE, SCALE, TailDrive
+from fish_env.identification.tail_drive import LATE, RATE, SCALE, TailDrive, tail_drive
 from fish_env.identification.variation import USUAL_BEAT, USUAL_SAG
 from fish_env.inference.hypotheses import EffectParameterId
 
@@ -43,6 +43,8 @@ PHASE_SD = 0.2
 """How far the phase at the start of a run may be from the declared one (rad)."""
 HALF_NORMAL = np.array([math.sqrt(2.0 / math.pi), math.sqrt(1.0 - 2.0 / math.pi)])
 """Mean and spread of what is normal and only counted where positive: batteries lose charge."""
+LAGS = 5
+"""Sizes of each effect that makes the tail late."""
 AT_ONCE = 64
 """Teeth of a comb that are evaluated together: what each leaves of every sample takes memory."""
 
@@ -57,21 +59,79 @@ class OwnBeats:
         sags: share of the beat that is lost each second (1/s), by run id; empty likewise.
         gains: share of what the common beat leaves that its own takes away, by run id, of all runs
             whose own is another.
+        left: logarithm of what the best beat of each run leaves, their mean.
     """
 
     drive: TailDrive | None = None
     own: Mapping[str, float] = field(default_factory=dict)
     sags: Mapping[str, float] = field(default_factory=dict)
     gains: Mapping[str, float] = field(default_factory=dict)
+    left: float = math.inf
 
 
 def own_beats(problem: SeriesProblem, differ: bool = False) -> OwnBeats:
     """Tail frequencies of runs by a comb of them, and how they sag where runs differ.
 
+    A tail that is late hides how runs differ, or lets them differ by something else. Where they
+    seem to differ, and a late tail explains much, they are looked at once more with that.
+
     Args:
         problem: all runs, those that are kept for judging too.
         differ: whether runs are known to differ in their beat.
     """
+    found = _seen(problem, differ)
+    if found.drive is None or not (found.own or found.gains):
+        return found
+    lag = _lag(problem.with_drive(replace(found.drive, uneven=False)))
+    if not lag:
+        return found
+    late = tail_drive({**problem.drive.measured, **lag}, certain=True)
+    again = _seen(problem.with_drive(late), differ)
+    much = -math.log1p(-IDENTIFICATION.noticeable_own_beat)
+    if again.drive is None or again.left > found.left - much:
+        return found
+    shared = {id: value for id, value in again.drive.measured.items() if id not in lag}
+    drive = tail_drive(shared, problem.drive.certain, uneven=again.drive.uneven)
+    return replace(again, drive=drive)
+
+
+def _lag(problem: SeriesProblem) -> dict[EffectParameterId, float]:
+    """The late tail that leaves least at the beat that all runs share; none if it takes little.
+
+    None either if it would be later than is plausible.
+
+    Args:
+        problem: the runs, told that beat.
+    """
+    switches = [(name, p) for name in LATE for p in problem.known[name].switching]
+    sizes = [
+        (EffectParameterId(name, p.name), size)
+        for name, p in switches
+        for size in np.geomspace(*p.plausible, LAGS).tolist()
+    ]
+    latest = {
+        (EffectParameterId(name, p.name), p.plausible[0 if math.isinf(p.neutral) else 1])
+        for name, p in switches
+    }
+    neutral = problem.neutral(LATE)
+    comb = {
+        id: np.array([neutral[id], *(size if id == own else neutral[id] for own, size in sizes)])
+        for id in dict.fromkeys(id for id, _ in sizes)
+    }
+    left = _left(problem.with_long_steps(), comb)
+    if left is None:
+        return {}
+    total = left.sum(axis=1)
+    best = int(np.argmin(total))
+    if total[best] > (1.0 - IDENTIFICATION.noticeable_own_beat) * total[0]:
+        return {}
+    id, size = sizes[best - 1]
+    is_last = any(id == other and math.isclose(size, end) for other, end in latest)
+    return {} if is_last else {id: size}
+
+
+def _seen(problem: SeriesProblem, differ: bool) -> OwnBeats:
+    """As :func:`own_beats`, beside what is known of the drive alone."""
     # Long steps get the phase right, and all that is compared is in the same.
     free = problem.with_runs([_with_free_phase(run) for run in problem.runs]).with_long_steps()
     few = len(free.runs) < IDENTIFICATION.fewest_runs_for_beats
@@ -95,12 +155,15 @@ def own_beats(problem: SeriesProblem, differ: bool = False) -> OwnBeats:
         if abs(found[run.id] - 1.0) >= IDENTIFICATION.least_beat_difference:
             gains[run.id] = 1.0 - float(mine[own] / mine[common])
     drive = problem.drive.at(together)
+    least = float(np.log(left.min(axis=0)).mean())
     if not (differ or _differ(gains.values())):
-        return OwnBeats(drive, gains=gains)
+        return OwnBeats(drive, gains=gains, left=least)
     if drive.effects and not drive.certain:
         # What runs differ by may look like a law of their beats.
-        return own_beats(problem.with_drive(TailDrive()), differ=True)
-    return replace(_sagging(free.with_drive(replace(drive, uneven=True)), found), gains=gains)
+        return _seen(problem.with_drive(TailDrive()), differ=True)
+    return replace(
+        _sagging(free.with_drive(replace(drive, uneven=True)), found), gains=gains, left=least
+    )
 
 
 def _comb(problem: SeriesProblem) -> tuple[FloatArray, FloatArray] | None:

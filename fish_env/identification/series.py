@@ -191,13 +191,9 @@ class SeriesProblem(Problem):
         filtered: Sequence[Filtered] = (),
         leverage: Callable[[], FloatArray] | None = None,
     ) -> NoiseModel:
-        """Noise model of largest likelihood at a point, from as many runs as that takes.
-
-        From all of them where they differ: what suits some suits the others worse.
-        """
+        """Noise model of largest likelihood at a point, from all runs where they differ."""
         largest = self.largest_sensor_sd if final else None
-        count = self.run_count if noise.spread.any() else runs_for_noise(self.runs)
-        few = self.spread(count)
+        few = self.spread(self.run_count if noise.spread.any() else runs_for_noise(self.runs))
         return fitted_noise(self, few, point, noise, largest, filtered)
 
     def disturbance_at_limit(self, noise: NoiseModel) -> tuple[str, ...]:
@@ -228,10 +224,7 @@ class SeriesProblem(Problem):
         return largest_jitter_of(self.dataset)
 
     def starts_known(self, further: Iterable[str] = ()) -> bool:
-        """Whether the tail's phase at the start of every run is known, or its own number has it.
-
-        And no wave is to begin, whose phase nothing has told so far.
-        """
+        """Whether no run's tail begins in an unknown phase, and no wave is to begin in one."""
         known = all(r.phase_known or (r.phase_found and self.drive.uneven) for r in self.runs)
         return known and AMPLITUDE.effect not in further
 

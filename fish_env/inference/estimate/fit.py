@@ -222,7 +222,8 @@ def fit(
         noise = noise_of(slopes, problem, vector, filtered, round_ > 0)
         if reached.noise.is_close(noise, POLICY.same_noise):
             break
-    if reached is not None:
+    if refit_noise:
+        reached = reached or Reached(problem, vector, None, np.inf)
         filtered = () if noise is reached.noise else filtered
         problem, vector, slopes, filtered, value, marginal = last(reached, free, noise, filtered)
     return _finish(problem, slopes, names, vector, value, filtered, marginal)

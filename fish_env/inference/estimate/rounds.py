@@ -18,7 +18,10 @@ from fish_env.inference.problem import Problem
 
 
 class Reached(NamedTuple):
-    """Where a round of a fit has led: the problem, the vector (n,), its noise, and the value."""
+    """Where a round of a fit has led: the problem, the vector (n,), its noise, and the value.
+
+    Before the first, without a noise and infinite.
+    """
 
     problem: Problem
     vector: FloatArray

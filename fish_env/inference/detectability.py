@@ -15,7 +15,7 @@ import numpy as np
 
 from fish_env.arrays import BoolArray, FloatArray
 from fish_env.inference import tails
-from fish_env.inference.changes import residual_changes
+from fish_env.inference.changes import Jobs, residual_changes
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.free import Free
 from fish_env.inference.policy import POLICY
@@ -24,7 +24,6 @@ from fish_env.inference.problem import Problem
 from fish_env.inference.projection import Projector, Signal
 from fish_env.inference.screening import Screen, smallest_detectable
 
-Jobs = Sequence[tuple[str, Probe]]
 ROUNDS, MORE_ROUNDS = 3, 5
 """The further ones are for effects that do nothing at first: a limit that is never met."""
 SILENT = 1e-9

@@ -215,7 +215,7 @@ def fit(
         if not refit_noise:
             break
         if reached is not None and not value < reached.value:
-            problem, vector, noise = reached[:3]
+            problem, vector, noise, filtered = *reached[:3], ()
             break
         reached = Reached(problem, vector, noise, value)
         report(f"fitting the noise, round {round_ + 1}")
@@ -224,7 +224,6 @@ def fit(
             break
     if refit_noise:
         reached = reached or Reached(problem, vector, None, np.inf)
-        filtered = () if noise is reached.noise else filtered
         problem, vector, slopes, filtered, value, marginal = last(reached, free, noise, filtered)
     return _finish(problem, slopes, names, vector, value, filtered, marginal)
 

@@ -41,7 +41,7 @@ def last(
         reached: where the last round has led.
         free: the free parameters.
         noise: the noise model fitted there.
-        filtered: the evaluation there.
+        filtered: the evaluation there, or none.
     """
     problem, vector, before, value = reached
     if noise is not before:
@@ -51,7 +51,7 @@ def last(
         found = evaluated_at(moved, free, vector, noise, filtered)
         if found[-2] < value:
             return moved, vector, *found
-    return problem, vector, *evaluated_at(problem, free, vector, before)
+    return problem, vector, *evaluated_at(problem, free, vector, before, filtered)
 
 
 def evaluated_at(

@@ -82,7 +82,9 @@ def agreed(best: Explanation, other: Explanation) -> bool:
 
 
 def same_causes(problem: Problem, causes: Sequence[CauseId], others: Sequence[CauseId]) -> bool:
-    """Whether two explanations of as many causes say the same, one cause after the other."""
+    """Whether two explanations say the same, one cause after the other."""
+    if len(causes) != len(others):
+        return False  # two causes were one taken apart, or one of them was there already
     return all(a == b or same(problem, a, b) for a, b in zip(causes, others, strict=True))
 
 

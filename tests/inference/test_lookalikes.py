@@ -15,6 +15,7 @@ from fish_env.inference.lookalikes import (
 )
 from fish_env.inference.probes import causes_of
 from fish_env.inference.problem import Point
+from fish_env.inference.rivals import rivals_of
 from fish_env.inference.screening import screen
 from fish_env.inference.vehicle import Drive
 from tests.inference.stated import Stated, effect, size_of
@@ -182,3 +183,10 @@ def test_beside_the_unknown_a_rate_has_those_that_do_as_well_beside_it(share, ri
 def test_beside_the_unknown_a_rate_leaves_its_place_to_a_better_one():
     best, alike = decided(*explained(of_rates(0.9), LIMIT), [].append)
     assert (best.causes, alike) == ((LAG,), ())
+
+
+def test_explanations_of_fewer_causes_are_rivals_and_not_the_same():
+    stated = problem(0.5, lag=0.0)
+    both = Explanation((LAG, LIMIT), fit(stated, [LAG, LIMIT]))
+    one = Explanation((LAG,), fit(stated, [LAG]))
+    assert rivals_of(both, [one]) == (one,)

@@ -29,7 +29,6 @@ from fish_env.identification.beats import beats_of, by_run, uneven
 from fish_env.identification.generic_forces import wrench_unit
 from fish_env.identification.series import series_of
 from fish_env.identification.variation import USUAL_BEAT, USUAL_SAG
-from fish_env.inference.attribution import Ranked
 from fish_env.inference.effort import effort_of
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.free import least_of, spread_of
@@ -37,6 +36,7 @@ from fish_env.inference.estimate.run_variation import shown_spread
 from fish_env.inference.hypotheses import name_of
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import coefficient_sizes
+from fish_env.inference.ranking import Ranked
 from fish_env.inference.screening import smallest_detectable
 from fish_env.rigidbody import consistency, noise_floor, outliers
 from fish_env.version import VERSION

@@ -38,7 +38,7 @@ from fish_env.identification.runs import FINER, RunData, prepare_run
 from fish_env.identification.sensor_errors import slopes_of_runs
 from fish_env.identification.sensors import largest_jitter_of, largest_noise
 from fish_env.identification.tail_drive import LATE, TailDrive
-from fish_env.identification.variation import EVERY, USUAL, VARIATIONS
+from fish_env.identification.variation import COMMON, EVERY, USUAL, VARIATIONS
 from fish_env.identification.variation_slopes import swum_slopes
 from fish_env.identification.wave_phases import AMPLITUDE, settle_wave_phases
 from fish_env.inference.estimate.fit import Fit
@@ -70,7 +70,7 @@ class SeriesProblem(Problem):
     hidden_by_drive = LATE
     out_of_step = effect_names("frequency_scale", "battery_sag", "clock_scale", "clock_skew")
     interchangeable = ALIKE
-    variations = EVERY
+    variations, common_effects = EVERY, COMMON
 
     def __init__(
         self,

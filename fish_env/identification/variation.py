@@ -8,13 +8,15 @@ by hand. A battery slows the tail by what is left of its charge.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from fish_env.arrays import FloatArray
+from fish_env.effects.refraction import INDEX
 from fish_env.identification.policy import IDENTIFICATION
-from fish_env.inference.estimate.run_variation import RunVariation
+from fish_env.inference.estimate.run_variation import CommonEffect, RunVariation
 from fish_env.inference.hypotheses import EffectParameterId as Shared
 from fish_env.params.packing import RECORD_FIELDS
 from fish_env.sensing.devices import Device, devices_of
@@ -51,6 +53,7 @@ BEAT, SAG, START, WAVE = (
     for name in ("beat", "beat_sag", "start_phase", "wave_phase")
 )
 DEGREE = float(np.deg2rad(1.0))
+ANGLES = ("roll", "pitch", "yaw")
 SENSOR_ERRORS = (
     RunVariation("marker_x", "m", 0.01, shared=True),
     RunVariation("marker_y", "m", 0.01, shared=True),
@@ -101,6 +104,42 @@ IN_SAMPLES = np.array(
 )
 """(K,) whether an error is taken off the samples: what sensors make of a state cannot tell it."""
 EVERY = (*VARIATIONS, *SENSOR_ERRORS)
+
+
+def _alike(effect: str, numbers: Sequence[str], names: Sequence[str]) -> CommonEffect:
+    """An effect whose parameters are what runs share of their numbers, each of one."""
+
+    def values(shared: Sequence[float]) -> dict[str, float]:
+        return dict(zip(names, shared, strict=True))
+
+    return CommonEffect(effect, tuple(numbers), values)
+
+
+def _gains(shared: Sequence[float]) -> dict[str, float]:
+    return {axis: 1.0 + value for axis, value in zip("pqr", shared, strict=True)}
+
+
+def _iron(shared: Sequence[float]) -> dict[str, float]:
+    sine, cosine = shared
+    return {"amplitude": math.hypot(sine, cosine), "angle": math.atan2(cosine, sine)}
+
+
+def _bent(shared: Sequence[float]) -> dict[str, float] | None:
+    (per_metre,) = shared
+    return {"height": 1.0 / (INDEX * per_metre)} if per_metre > 0.0 else None
+
+
+COMMON = (
+    _alike("sensor_delay", ("camera_delay", "depth_delay"), ("camera_later", "depth_later")),
+    _alike("marker_offset", [f"marker_{axis}" for axis in "xyz"], "xyz"),
+    _alike("attitude_misalignment", [f"mounting_{name}" for name in ANGLES], ANGLES),
+    _alike("camera_tilt", ("camera_roll", "camera_pitch"), ("roll", "pitch")),
+    CommonEffect("gyro_scale", tuple(f"gyro_gain_{axis}" for axis in "pqr"), _gains),
+    CommonEffect("soft_iron", ("compass_sin_2_yaw", "compass_cos_2_yaw"), _iron),
+    CommonEffect("refraction", ("camera_scale_per_depth",), _bent),
+)
+"""What sensors get wrong in all runs alike. Runs keep delays of their inertial unit: that of a
+filter inside it is no delay of all sensors."""
 USUAL = np.array([variation.usual for variation in EVERY])
 UPRIGHT = ("z", "roll", "pitch", "w", "p", "q")
 """Channels that show how a fish floats. A camera above the tank alone sees none of them."""

@@ -7,9 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from scipy.special import stdtrit
 
-from fish_env.arrays import FloatArray
 from fish_env.inference.adequacy import disturbance_at_limit, implausible_estimates
 from fish_env.inference.drive import beside_drive, drifting, measured, under_relaxed_noise
 from fish_env.inference.effort import FULL, Effort
@@ -17,7 +15,7 @@ from fish_env.inference.elimination import backward_elimination, without_idle
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import CauseId, Coefficient
-from fish_env.inference.left_out import left_out_scores
+from fish_env.inference.in_common import with_common_errors
 from fish_env.inference.many_causes import challenged, pursue
 from fish_env.inference.parallel import both, side_by_side
 from fish_env.inference.policy import POLICY
@@ -26,27 +24,12 @@ from fish_env.inference.probes import Cause
 from fish_env.inference.problem import Problem
 from fish_env.inference.projection import Signal
 from fish_env.inference.publication import published
+from fish_env.inference.ranking import Ranked, ranking_of
 from fish_env.inference.rivals import agreed, explained_away, rivals_of, tied
 from fish_env.inference.screening import Screen, screen
 from fish_env.inference.search import refits, restart_from_winner
 from fish_env.inference.shortlist import like, newly_shown, shortlisted
 from fish_env.inference.trials import tried_out
-
-
-@dataclass(frozen=True)
-class Ranked:
-    """How much better one cause predicts runs than the baseline does.
-
-    Attributes:
-        cause: which.
-        score: log score of all runs, each left out in turn, above that of the baseline under the
-            same noise.
-        interval: 95 % interval of the score over runs like these.
-    """
-
-    cause: CauseId
-    score: float
-    interval: tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,6 +147,8 @@ def extended(
         found = more
     if begun.accepted.causes and found.accepted is begun.accepted:
         return begun  # settled before
+    if effort.retries:
+        found = search.in_common(found)
     return settled(found, effort.retries, report)
 
 
@@ -256,6 +241,22 @@ class Search:
             found, accepted=current, rivals=rivals, shown=after, gain=gain,
             failed=frozenset(),
         )  # fmt: skip
+
+    def in_common(self, found: Attribution) -> Attribution:
+        """With what runs share as effects, and further effects that show beside these.
+
+        Beside a disturbance of implausible strength runs' numbers stand in for what is missing.
+        """
+        before = found.accepted
+        if disturbance_at_limit(before.fit):
+            return found
+        current = with_common_errors(before, found.shown.threshold, self.report)
+        if current is before:
+            return found
+        after = screen(current.fit, self.causes, self.rng)
+        gain = found.gain + before.score - current.score
+        begun = replace(found, accepted=current, shown=after, gain=gain, failed=frozenset())
+        return self.together(begun)
 
     def in_step(self, begun: Attribution, best: Explanation) -> Attribution | None:
         """With a cause and what puts the drive in step; None where one cause explains more.
@@ -355,27 +356,6 @@ class Search:
         if varied is not best:
             after = screen(varied.fit, self.causes, self.rng)
         return varied, tried[1:], after
-
-
-def ranking_of(tried: Sequence[Explanation], base: Explanation) -> tuple[Ranked, ...]:
-    """Explanations by how well they predict runs left out, the best first.
-
-    Args:
-        tried: explanations with one cause more than ``base``.
-        base: what they are judged against; a single run can be left out of nothing.
-    """
-    if len(base.fit.filtered) < 2:
-        return ()
-    before = left_out_scores(base)
-    found = [_ranked(e.causes[-1], left_out_scores(e) - before) for e in tried]
-    return tuple(sorted(found, key=lambda r: -r.score))
-
-
-def _ranked(cause: CauseId, gains: FloatArray) -> Ranked:
-    """A cause by what it gains in each run (runs,)."""
-    count, total = len(gains), float(gains.sum())
-    half = float(stdtrit(count - 1, POLICY.interval_ends[1]) * gains.std(ddof=1) * np.sqrt(count))
-    return Ranked(cause, total, (total - half, total + half))
 
 
 def roughness(explanation: Explanation) -> float:

@@ -15,7 +15,7 @@ import numpy as np
 
 from fish_env.arrays import BoolArray, FloatArray, IntArray
 from fish_env.inference.estimate.information import block_index
-from fish_env.inference.estimate.run_variation import RunVariation
+from fish_env.inference.estimate.run_variation import CommonEffect, RunVariation
 from fish_env.inference.evaluation import Evaluation, GenericTerms, LackOfFit
 from fish_env.inference.hypotheses import Coefficient, EffectName, EffectParameterId
 from fish_env.inference.vehicle import (
@@ -59,6 +59,7 @@ class Problem(Protocol):
             periods no small change tells which way to go.
         interchangeable: sets of coefficients that act alike.
         variations: what runs may differ in, K of them.
+        common_effects: effects that do in all runs what such numbers do in single ones.
         drive: what was measured of a periodic drive.
         coefficient_step: change of a coefficient (in units of its prior) that slopes are taken by.
     """
@@ -70,6 +71,7 @@ class Problem(Protocol):
     out_of_step: tuple[EffectName, ...] = ()
     interchangeable: tuple[frozenset[Coefficient], ...] = ()
     variations: tuple[RunVariation, ...] = ()
+    common_effects: tuple[CommonEffect, ...] = ()
     drive: Drive = Drive()
     coefficient_step: float = 0.05
 

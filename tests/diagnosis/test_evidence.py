@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from fish_env.inference.attribution import ranking_of
 from fish_env.inference.estimate.free import Linearised
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import Coefficient
 from fish_env.inference.left_out import left_out_scores
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point
+from fish_env.inference.ranking import ranking_of
 from fish_env.inference.rivals import agreed, alike
 from tests.diagnosis.linear import COEFFICIENTS, PATHS, LinearProblem
 from tests.inference.stated import Evaluated, Stated, effect, fit_of, size_of

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import replace
 
 import numpy as np
@@ -117,6 +117,19 @@ def run_variation(own: Fit) -> Spread:
     Args:
         own: the fit; its weighting is held.
     """
+    return fit_spread(own_likelihoods(own)(()), own.problem.variations)
+
+
+def own_likelihoods(own: Fit) -> Callable[[Collection[int]], Likelihood]:
+    """How likely spreads are, in usual ones, in the linear model about a fit.
+
+    Args:
+        own: the fit; its weighting is held.
+
+    Returns:
+        The likelihood from numbers that runs share too, beside those of which only differences are
+        variation.
+    """
     problem, usual = own.problem, np.array([v.usual for v in own.problem.variations])
     free = Free(problem, own.effects, own.released)
     vector, lin = free.pack(own.point), own.linearised
@@ -124,12 +137,15 @@ def run_variation(own: Fit) -> Spread:
         lin = linearise(problem, free, vector, own.noise, own.filtered)
     steps = DIFFERENCE * usual
     slopes = problem.variation_slopes(own.point, own.noise, own.filtered, steps) * usual
-    likelihood = Likelihood(
-        lin.residuals, lin.slopes, slopes, problem.variation / usual, lin.run_of,
-        information(lin.slopes, free.prior), free.prior * vector,
-        np.array([not v.shared for v in problem.variations]),
-    )  # fmt: skip
-    return fit_spread(likelihood, problem.variations)
+    prior = information(lin.slopes, free.prior), free.prior * vector
+    at = problem.variation / usual
+
+    def likelihood(alike: Collection[int]) -> Likelihood:
+        common = [not v.shared or i in alike for i, v in enumerate(problem.variations)]
+        given = (lin.residuals, lin.slopes, slopes, at, lin.run_of, *prior)
+        return Likelihood(*given, np.array(common))
+
+    return likelihood
 
 
 def with_run_variation(

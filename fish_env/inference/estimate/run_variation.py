@@ -10,7 +10,7 @@ conditional estimation as in Lindstrom and Bates (1990), Biometrics 46, 673.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -54,6 +54,22 @@ class RunVariation:
     def largest(self) -> float:
         """Largest spread, in usual ones, that is taken for variation."""
         return POLICY.beyond_usual if self.shared else POLICY.largest_run_spread
+
+
+@dataclass(frozen=True)
+class CommonEffect:
+    """An effect that does in all runs what numbers of their own do in single ones.
+
+    Attributes:
+        effect: its name.
+        numbers: names of the variations.
+        values: its parameters from what runs share of each number (SI); None where no effect does
+            that. Others stay at neutral.
+    """
+
+    effect: str
+    numbers: tuple[str, ...]
+    values: Callable[[Sequence[float]], Mapping[str, float] | None]
 
 
 def shown_spread(values: FloatArray, variance: FloatArray) -> FloatArray:

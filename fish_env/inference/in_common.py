@@ -1,0 +1,154 @@
+"""What runs share of their own numbers: an effect, or nothing.
+
+Where runs differ in everything, each has its own errors of every sensor from the first fit on. That
+is the safe beginning, and too free an end: a sensor that sits askew does so in all runs alike, and
+six runs that each have the same error of their own cost more than one error that all share. Once
+causes are found, numbers that all runs share become an effect, and those that no run needs become
+none. What is left can take up less of the causes that are still hidden. Both are judged by the
+evidence: the numbers are random effects, whose spread counts in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from fish_env.arrays import FloatArray
+from fish_env.inference.elimination import insignificant
+from fish_env.inference.estimate.again import own_likelihoods, search_steps
+from fish_env.inference.estimate.fit import Fit, fit
+from fish_env.inference.estimate.free import spread_of
+from fish_env.inference.estimate.run_variation import CommonEffect
+from fish_env.inference.estimate.spread import WIDE
+from fish_env.inference.explanation import Explanation, reached
+from fish_env.inference.hypotheses import EffectName, EffectParameterId, listed
+from fish_env.inference.policy import POLICY
+from fish_env.inference.problem import Point, Problem
+
+Report = Callable[[str], None]
+
+
+def with_common_errors(current: Explanation, threshold: float, report: Report) -> Explanation:
+    """The explanation with what its runs share as effects, and without numbers that none needs.
+
+    Itself where that is no better.
+
+    Args:
+        current: causes with their fit.
+        threshold: log p-value that each further effect has to pass.
+        report: told what is being done.
+    """
+    own = current.fit
+    if not spread_of(own.problem, own.noise).any():
+        return current
+    numbers = Numbers(own)
+    idle = numbers.unneeded()
+    shared = numbers.in_common()[: POLICY.most_causes - len(current.causes)]
+    while shared or idle:
+        names = [EffectName(one.effect) for one in shared]
+        report(f"fitting {listed(names)}, which runs share" if names else "fitting fewer numbers")
+        fitted = reached(partial(_refitted, own, shared, idle))
+        if fitted is None:
+            return current
+        found = Explanation((*current.causes, *names), fitted)
+        weak = insignificant(fitted, names, threshold)
+        if not weak:
+            return found if found.score < current.score else current
+        shared = [one for one in shared if one.effect not in weak]
+    return current
+
+
+class Numbers:
+    """The numbers of runs that a fit has, in its linear model.
+
+    Args:
+        own: the fit.
+    """
+
+    def __init__(self, own: Fit) -> None:
+        self.own, self.problem = own, own.problem
+        usual = np.array([variation.usual for variation in self.problem.variations])
+        self.spread: FloatArray = spread_of(self.problem, own.noise) / usual
+        self._likelihoods = own_likelihoods(own)
+        self._usual = self._likelihoods(())
+
+    def in_common(self) -> list[CommonEffect]:
+        """Effects that are likelier than numbers of runs, and than nothing, the clearest first."""
+        effects = self.problem.common_effects
+        found: list[tuple[float, int]] = []
+        for i, one in enumerate(effects):
+            at, begin = begun(self.problem, one)
+            if one.effect in self.own.effects or not self.spread[at].all() or begin is None:
+                continue
+            fewer = _without(self.spread, at)
+            alike = self._likelihoods(at)(fewer) - len(at) * float(np.log(WIDE))
+            otherwise = min(self._usual(self.spread), self._usual(fewer))
+            if alike < otherwise - POLICY.evidence_doubt:
+                found.append((alike, i))
+        return [effects[i] for _, i in sorted(found)]
+
+    def unneeded(self) -> list[int]:
+        """Numbers that the data are likelier without, of those that runs may share.
+
+        What only single runs can have, as their trim, stays.
+        """
+        sd, gone = self.spread, list[int]()
+        best = self._usual(sd)
+        may_go = [i for i in np.flatnonzero(sd).tolist() if self.problem.variations[i].shared]
+        while may_go:
+            value, i = min((self._usual(_without(sd, [i])), i) for i in may_go)
+            if value >= best:
+                break
+            best, sd = value, _without(sd, [i])
+            gone.append(i)
+            may_go.remove(i)
+        return gone
+
+
+def _without(sd: FloatArray, which: Sequence[int]) -> FloatArray:
+    fewer = sd.copy()
+    fewer[list(which)] = 0.0
+    return fewer
+
+
+def begun(
+    problem: Problem, one: CommonEffect
+) -> tuple[list[int], dict[EffectParameterId, float] | None]:
+    """Which numbers runs share by an effect, and where it begins; None where it does not do that.
+
+    Args:
+        problem: the runs with their numbers.
+        one: the effect.
+    """
+    names = [variation.name for variation in problem.variations]
+    at = [names.index(name) for name in one.numbers]
+    values = one.values(problem.variation[:, at].mean(axis=0).tolist())
+    if values is None:
+        return at, None
+    given = {EffectParameterId(one.effect, name): value for name, value in values.items()}
+    return at, {**problem.neutral([one.effect]), **given}
+
+
+def _refitted(own: Fit, shared: Sequence[CommonEffect], idle: Sequence[int]) -> Fit:
+    """The fit with effects in place of numbers that runs share, and without those of no use.
+
+    Raises:
+        LinAlgError: the simulation diverges.
+    """
+    problem = own.problem
+    gone, values = list(idle), dict(own.point.effects)
+    for one in shared:
+        at, begin = begun(problem, one)
+        gone += at
+        values |= begin or {}
+    numbers, spread = problem.variation.copy(), spread_of(problem, own.noise).copy()
+    numbers[:, gone] = 0.0
+    spread[gone] = 0.0
+    point, noise = Point(own.point.z, values), replace(own.noise, spread=spread)
+    fewer = problem.with_variation(numbers, point, noise)
+    effects = (*own.effects, *(one.effect for one in shared))
+    steps = search_steps(problem)
+    return fit(fewer, effects, point, noise, own.released, rounds=2, iterations=steps)

@@ -131,7 +131,10 @@ def causes_of(problem: Problem) -> tuple[Cause, ...]:
     step = problem.longest_step
     length = problem.longest_run
     effects = [
-        Cause(EffectName(effect.name), each_alone(probes_of(effect, step, length)))
+        Cause(
+            EffectName(effect.name),
+            each_alone(probes_of(effect, step, length, effect.name in problem.hidden_by_drive)),
+        )
         for effect in problem.known.values()
         if effect.diagnosed
     ]
@@ -141,7 +144,7 @@ def causes_of(problem: Problem) -> tuple[Cause, ...]:
 
 
 def probes_of(
-    effect: Effect, step: float = 0.0, length: float = 0.0
+    effect: Effect, step: float = 0.0, length: float = 0.0, between: bool = False
 ) -> tuple[tuple[Probe, ...], ...]:
     """Small and large settings that show what an effect does.
 
@@ -154,6 +157,8 @@ def probes_of(
         step: longest RK4 step (s); settings that are too quick for it are moved towards the large
             ones until they are not.
         length: of the longest run (s).
+        between: whether it is probed at sizes between as well. A lag moves the phase of a drive,
+            which a run's own phase makes up for at one size, and not at another.
     """
     if phase_of(effect):
         return _oscillations(effect, length)
@@ -162,7 +167,7 @@ def probes_of(
     alternatives: list[tuple[Probe, ...]] = []
     for values in product(*(_shape_values(s) for s in shapes)):
         setting = dict(zip([s.name for s in shapes], values, strict=True))
-        for shares in (SHARES, SHARES[-1:]):
+        for shares in [SHARES, *((share,) for share in SHARES[1 if between else -1 :])]:
             candidates = [_alternative(effect, switches, setting, share) for share in shares]
             slow = [c for c in candidates if all(effect.is_followed(p, step) for p in c)]
             if slow and slow[0] not in alternatives:

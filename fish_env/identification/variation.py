@@ -119,6 +119,11 @@ def _gains(shared: Sequence[float]) -> dict[str, float]:
     return {axis: 1.0 + value for axis, value in zip("pqr", shared, strict=True)}
 
 
+def _quicker(shared: Sequence[float]) -> dict[str, float]:
+    (share,) = shared
+    return {"scale": 1.0 + share}
+
+
 def _iron(shared: Sequence[float]) -> dict[str, float]:
     sine, cosine = shared
     return {"amplitude": math.hypot(sine, cosine), "angle": math.atan2(cosine, sine)}
@@ -130,15 +135,24 @@ def _bent(shared: Sequence[float]) -> dict[str, float] | None:
 
 
 COMMON = (
-    _alike("sensor_delay", ("camera_delay", "depth_delay"), ("camera_later", "depth_later")),
+    _alike(
+        "sensor_delay",
+        ("clock_offset", "camera_delay", "depth_delay"),
+        ("delay", "camera_later", "depth_later"),
+    ),
     _alike("marker_offset", [f"marker_{axis}" for axis in "xyz"], "xyz"),
     _alike("attitude_misalignment", [f"mounting_{name}" for name in ANGLES], ANGLES),
     _alike("camera_tilt", ("camera_roll", "camera_pitch"), ("roll", "pitch")),
     CommonEffect("gyro_scale", tuple(f"gyro_gain_{axis}" for axis in "pqr"), _gains),
     CommonEffect("soft_iron", ("compass_sin_2_yaw", "compass_cos_2_yaw"), _iron),
     CommonEffect("refraction", ("camera_scale_per_depth",), _bent),
+    _alike("gyro_bias", [f"gyro_zero_{axis}" for axis in "pqr"], "pqr"),
+    _alike("buoyancy_offset", ("buoyancy",), ("mass",)),
+    _alike("current", ("current_north", "current_east"), ("north", "east")),
+    _alike("battery_sag", ("beat_sag",), ("rate",)),
+    CommonEffect("frequency_scale", ("beat",), _quicker),
 )
-"""What sensors get wrong in all runs alike. Runs keep delays of their inertial unit: that of a
+"""What is wrong in all runs alike. Runs keep delays of their inertial unit: that of a
 filter inside it is no delay of all sensors."""
 USUAL = np.array([variation.usual for variation in EVERY])
 UPRIGHT = ("z", "roll", "pitch", "w", "p", "q")

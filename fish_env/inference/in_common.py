@@ -81,9 +81,9 @@ class Numbers:
         found: list[tuple[float, int]] = []
         for i, one in enumerate(effects):
             at, begin = begun(self.problem, one)
-            if one.effect in self.own.effects or not self.spread[at].all() or begin is None:
+            if one.effect in self.own.effects or not self.spread[at].any() or begin is None:
                 continue
-            fewer = _without(self.spread, at)
+            fewer = _without(self.spread, [k for k in at if self.problem.variations[k].shared])
             alike = self._likelihoods(at)(fewer) - len(at) * float(np.log(WIDE))
             otherwise = min(self._usual(self.spread), self._usual(fewer))
             if alike < otherwise - POLICY.evidence_doubt:
@@ -139,12 +139,13 @@ def _refitted(own: Fit, shared: Sequence[CommonEffect], idle: Sequence[int]) -> 
         LinAlgError: the simulation diverges.
     """
     problem = own.problem
+    numbers, spread = problem.variation.copy(), spread_of(problem, own.noise).copy()
     gone, values = list(idle), dict(own.point.effects)
     for one in shared:
         at, begin = begun(problem, one)
-        gone += at
+        gone += [k for k in at if problem.variations[k].shared]
+        numbers[:, at] -= numbers[:, at].mean(axis=0)
         values |= begin or {}
-    numbers, spread = problem.variation.copy(), spread_of(problem, own.noise).copy()
     numbers[:, gone] = 0.0
     spread[gone] = 0.0
     point, noise = Point(own.point.z, values), replace(own.noise, spread=spread)

@@ -14,7 +14,7 @@ from tests.inference.stated import SIZE, Numbered, White, effect, size_of
 
 RUNS, SAMPLES, THRESHOLD = 6, 120, -8.0
 ASKEW, DRIFT, TRIM = range(3)
-MOUNTING = "mounting"
+MOUNTING, BALLAST = "mounting", "ballast"
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Spreading(White):
 
 
 class Sensed(Numbered):
-    """Runs with three numbers: two of sensors, of which an effect does one, and a trim.
+    """Runs with three numbers, two of sensors and a trim. Effects do one of those, and the trim.
 
     Args:
         askew: (RUNS,) what the first number should be.
@@ -44,12 +44,14 @@ class Sensed(Numbered):
         )
         self.common_effects = (
             CommonEffect(MOUNTING, ("askew",), lambda shared: {SIZE: shared[0]}),
+            CommonEffect(BALLAST, ("trim",), lambda shared: {SIZE: shared[0]}),
         )
         self.drive = Drive(uneven=True)
-        super().__init__((effect(MOUNTING),))
+        super().__init__((effect(MOUNTING), effect(BALLAST)))
 
     def left(self, z, effects):
-        numbers = self.own + np.array([effects[size_of(MOUNTING)], 0.0, 0.0])
+        shared = [effects[size_of(MOUNTING)], 0.0, effects[size_of(BALLAST)]]
+        numbers = self.own + np.array(shared)
         return self.data - np.einsum("rsk,rk->rs", self.x, numbers) - z[0] * self.y
 
     def variation_slopes(self, point, noise, filtered, steps):
@@ -68,6 +70,16 @@ def test_what_all_runs_share_becomes_an_effect():
     assert found.fit.point.effects[size_of(MOUNTING)] == pytest.approx(0.8, abs=0.15)
     assert found.fit.noise.spread[ASKEW] == 0.0
     assert not found.fit.problem.variation[:, ASKEW].any()
+
+
+def test_what_runs_share_of_a_trim_becomes_an_effect_and_the_rest_stays_theirs():
+    own = 3.0 + 0.5 * np.random.default_rng(0).standard_normal(RUNS)
+    found = with_common_errors(explained(Sensed(0.0, own)), THRESHOLD, [].append)
+    assert found.causes == (BALLAST,)
+    assert found.fit.point.effects[size_of(BALLAST)] == pytest.approx(3.0, abs=1.0)
+    assert found.fit.noise.spread[TRIM] == 1.0
+    moved = found.fit.problem.variation[:, TRIM] + found.fit.point.effects[size_of(BALLAST)]
+    assert moved == pytest.approx(own, abs=0.3)
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -117,7 +117,9 @@ def run_variation(own: Fit) -> Spread:
     Args:
         own: the fit; its weighting is held.
     """
-    return fit_spread(own_likelihoods(own)(()), own.problem.variations)
+    variations = own.problem.variations
+    differing = [i for i, variation in enumerate(variations) if not variation.shared]
+    return fit_spread(own_likelihoods(own)(differing), variations)
 
 
 def own_likelihoods(own: Fit) -> Callable[[Collection[int]], Likelihood]:
@@ -127,8 +129,7 @@ def own_likelihoods(own: Fit) -> Callable[[Collection[int]], Likelihood]:
         own: the fit; its weighting is held.
 
     Returns:
-        The likelihood from numbers that runs share too, beside those of which only differences are
-        variation.
+        The likelihood from those numbers whose part that all runs have is a parameter of its own.
     """
     problem, usual = own.problem, np.array([v.usual for v in own.problem.variations])
     free = Free(problem, own.effects, own.released)
@@ -141,7 +142,7 @@ def own_likelihoods(own: Fit) -> Callable[[Collection[int]], Likelihood]:
     at = problem.variation / usual
 
     def likelihood(alike: Collection[int]) -> Likelihood:
-        common = [not v.shared or i in alike for i, v in enumerate(problem.variations)]
+        common = [i in alike for i in range(len(usual))]
         given = (lin.residuals, lin.slopes, slopes, at, lin.run_of, *prior)
         return Likelihood(*given, np.array(common))
 

@@ -132,7 +132,9 @@ def in_parts(current: Explanation, cause: CauseId, report: Report) -> Explanatio
     values = of_effects(own.point.effects, {*own.effects} - {cause})
     values |= {EffectParameterId(e, p): v for e, of in parts.items() for p, v in of.items()}
     start = (effects, Point(own.point.z, values), own.noise, own.released)
-    fitted = reached(partial(fit, own.problem, *start, refit_noise=False, iterations=4))
+    enough = _enough(current, (cause,), POLICY.evidence_doubt)
+    further = partial(fit, refit_noise=False, iterations=4, give_up_above=enough)
+    fitted = reached(partial(further, own.problem, *start))
     return None if fitted is None else Explanation(causes, fitted)
 
 
@@ -197,9 +199,7 @@ def _smaller(
     least: float,
 ) -> Explanation | None:
     own = current.fit
-    begin = without_causes(own, dropped)
-    # The log determinant of all estimates changes too as they move without a cause.
-    enough = own.objective + least + current.narrowed_by(dropped) + POLICY.linear_doubt
+    begin, enough = without_causes(own, dropped), _enough(current, dropped, least)
     smaller = reached(
         lambda: fit(
             runs(begin), begin.effects, begin.point, own.noise, begin.released,
@@ -209,6 +209,20 @@ def _smaller(
     if smaller is None:
         return None
     return Explanation(tuple(c for c in current.causes if c not in dropped), smaller)
+
+
+def _enough(current: Explanation, dropped: Collection[CauseId], least: float) -> float:
+    """Objective above which a fit without causes is of no use.
+
+    The log determinant of all estimates changes too as they move without a cause.
+
+    Args:
+        current: all causes.
+        dropped: those that it goes without.
+        least: growth of the score from which it is of no use.
+    """
+    doubt = current.narrowed_by(dropped) + POLICY.linear_doubt
+    return current.fit.objective + least + doubt
 
 
 def coarse_without(

@@ -119,6 +119,13 @@ def _gains(shared: Sequence[float]) -> dict[str, float]:
     return {axis: 1.0 + value for axis, value in zip("pqr", shared, strict=True)}
 
 
+def _late(shared: Sequence[float]) -> dict[str, float]:
+    clock, camera, depth, inertial = shared
+    of_all = max(min(camera, depth, inertial), 0.0)
+    later = {"camera_later": camera - of_all, "depth_later": depth - of_all}
+    return {"delay": max(clock + of_all, 0.0), **later}
+
+
 def _quicker(shared: Sequence[float]) -> dict[str, float]:
     (share,) = shared
     return {"scale": 1.0 + share}
@@ -135,10 +142,8 @@ def _bent(shared: Sequence[float]) -> dict[str, float] | None:
 
 
 COMMON = (
-    _alike(
-        "sensor_delay",
-        ("clock_offset", "camera_delay", "depth_delay"),
-        ("delay", "camera_later", "depth_later"),
+    CommonEffect(
+        "sensor_delay", ("clock_offset", "camera_delay", "depth_delay"), _late, ("inertial_delay",)
     ),
     _alike("marker_offset", [f"marker_{axis}" for axis in "xyz"], "xyz"),
     _alike("attitude_misalignment", [f"mounting_{name}" for name in ANGLES], ANGLES),
@@ -152,8 +157,8 @@ COMMON = (
     _alike("battery_sag", ("beat_sag",), ("rate",)),
     CommonEffect("frequency_scale", ("beat",), _quicker),
 )
-"""What is wrong in all runs alike. Runs keep delays of their inertial unit: that of a
-filter inside it is no delay of all sensors."""
+"""What is wrong in all runs alike. Runs keep delays of their inertial unit, but for what all devices
+share: a filter inside it delays no other."""
 USUAL = np.array([variation.usual for variation in EVERY])
 UPRIGHT = ("z", "roll", "pitch", "w", "p", "q")
 """Channels that show how a fish floats. A camera above the tank alone sees none of them."""

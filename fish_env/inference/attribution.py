@@ -243,13 +243,8 @@ class Search:
         )  # fmt: skip
 
     def in_common(self, found: Attribution) -> Attribution:
-        """With what runs share as effects, and further effects that show beside these.
-
-        Beside a disturbance of implausible strength runs' numbers stand in for what is missing.
-        """
+        """With what runs share as effects, and further effects that show beside these."""
         before = found.accepted
-        if disturbance_at_limit(before.fit):
-            return found
         current = with_common_errors(before, found.shown.threshold, self.report)
         if current is before:
             return found

@@ -124,8 +124,9 @@ def begun(
         one: the effect.
     """
     names = [variation.name for variation in problem.variations]
-    at = [names.index(name) for name in one.numbers]
-    values = one.values(problem.variation[:, at].mean(axis=0).tolist())
+    means = problem.variation.mean(axis=0)
+    at, beside = ([names.index(name) for name in own] for own in (one.numbers, one.beside))
+    values = one.values(means[[*at, *beside]].tolist())
     if values is None:
         return at, None
     given = {EffectParameterId(one.effect, name): value for name, value in values.items()}

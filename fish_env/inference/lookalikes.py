@@ -3,7 +3,7 @@
 Of short lags the kind hardly shows. In the long steps of a search the right one may not even be
 possible, as no step follows it, and another one stands in for it. So the question is asked again
 in the steps of published estimates; and beside something unknown, where fits tell kinds of lags
-apart no better than by what they make up for, none is named.
+apart no better than by what they make up for, each is an alternative.
 """
 
 from __future__ import annotations
@@ -276,23 +276,31 @@ def _fitted(
     return at_noise(kept, begin, own.noise, steps, enough)
 
 
-def undecided(current: Explanation, shown: Screen, report: Report) -> frozenset[CauseId]:
-    """Lags in whose place one that looks alike explains nearly as much, beside something unknown.
+def undecided(current: Explanation, shown: Screen, report: Report) -> tuple[Explanation, ...]:
+    """The explanation with one of its lags replaced, where that explains nearly as much.
+
+    Beside something unknown, where fits tell kinds of lags apart no better than by what they make
+    up for: all of these are as good.
 
     Args:
         current: causes with their fit.
         shown: causes that are not among them.
-        report: told what is dropped and why.
+        report: told what is being done.
     """
-    found, fitter = set[CauseId](), CoarseFitter(current.fit)
+    own, found, fitter = current.fit, list[Explanation](), CoarseFitter(current.fit)
     pairs = _shown(late(current), shown)
     lack = _lacks(fitter, pairs)
     for cause, signal in pairs:
-        if cause not in found and _replaces(fitter, cause, signal, lack[cause]):
-            other = signal.cause.effect
-            report(f"rejecting {name_of(cause)}: {other} explains nearly as much in its place")
-            found.add(cause)
-    return frozenset(found)
+        other, enough = signal.cause.effect, fitter.base + lack[cause]
+        coarse = swapped(fitter, own, cause, signal, enough)
+        if coarse is None or not coarse.objective < enough:
+            continue
+        report(f"fitting {other}, which explains nearly as much as {name_of(cause)}")
+        fitted = at_noise(own.problem, coarse, own.noise, POLICY.swap_steps)
+        if fitted is not None:
+            causes = tuple(other if c == cause else c for c in current.causes)
+            found.append(Explanation(causes, fitted))
+    return tuple(found)
 
 
 def decided(

@@ -152,6 +152,8 @@ def _limit(problem: Problem, signal: Signal) -> EffectName | None:
 def _told_apart(current: Explanation, first: Sequence[CauseId], shown: Screen) -> Explanation:
     """The explanation without further causes that another effect explains as well.
 
+    Not without those that much depends on: a fit without any of such look-alikes is of no use.
+
     Args:
         current: causes with their fit.
         first: those of them that were found one at a time.
@@ -159,7 +161,10 @@ def _told_apart(current: Explanation, first: Sequence[CauseId], shown: Screen) -
     """
     close = {s.cause for s in substitutes(current, shown) if s.cost < POLICY.evidence_doubt}
     doubtful = close - {*first}
-    return (without(current, doubtful) or current) if doubtful else current
+    smaller = without(current, doubtful) if doubtful else None
+    if smaller is None or smaller.score > current.score + POLICY.out_of_reach:
+        return current
+    return smaller
 
 
 def challenged(

@@ -32,7 +32,6 @@ from fish_env.inference.probes import Cause, causes_of
 from fish_env.inference.problem import Problem
 from fish_env.inference.result import ResidualModel, Result
 from fish_env.inference.screening import screen
-from fish_env.inference.substitution import without
 from fish_env.inference.verdict import EXTENDING, Verdict, decide
 
 Report = Callable[[str], None]
@@ -163,8 +162,8 @@ def partly(
 ) -> tuple[Attribution, Verdict]:
     """The verdict ``partial`` where known causes act beside something unknown.
 
-    It names those that act for certain. Where one of several clocks or beats acts besides, all of
-    these explanations are its alternatives, the accepted one among them.
+    It names those that act for certain. Where one of several clocks, beats or lags acts besides,
+    all of these explanations are its alternatives, the accepted one among them.
 
     Args:
         attribution: what was found.
@@ -175,12 +174,11 @@ def partly(
     """
     found = confirmed(attribution.accepted, left.threshold, report)
     found = sustained(found, rng, report) if found else None
-    if found and disturbance_at_limit(found.fit):
-        doubtful = undecided(found, attribution.shown, report)
-        found = without(found, doubtful) if doubtful else found
-    if found is None or not found.causes:
+    if found is None:
         return attribution, verdict
     found, rivals = decided(found, attribution.shown, report)
+    if disturbance_at_limit(found.fit):
+        rivals = (*rivals, *undecided(found, attribution.shown, report))
     shared = {*found.causes}.intersection(*(other.causes for other in rivals))
     if not shared:
         return attribution, verdict

@@ -63,13 +63,15 @@ class CommonEffect:
     Attributes:
         effect: its name.
         numbers: names of the variations.
-        values: its parameters from what runs share of each number (SI); None where no effect does
-            that. Others stay at neutral.
+        values: its parameters from what runs share of each number (SI), and of those beside; None
+            where no effect does that. Others stay at neutral.
+        beside: names of further variations, which stay: part of them may be the effect's too.
     """
 
     effect: str
     numbers: tuple[str, ...]
     values: Callable[[Sequence[float]], Mapping[str, float] | None]
+    beside: tuple[str, ...] = ()
 
 
 def shown_spread(values: FloatArray, variance: FloatArray) -> FloatArray:

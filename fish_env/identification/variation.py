@@ -157,8 +157,8 @@ COMMON = (
     _alike("battery_sag", ("beat_sag",), ("rate",)),
     CommonEffect("frequency_scale", ("beat",), _quicker),
 )
-"""What is wrong in all runs alike. Runs keep delays of their inertial unit, but for what all devices
-share: a filter inside it delays no other."""
+"""What is wrong in all runs alike. Runs keep delays of their inertial unit, but for what all
+devices share: a filter inside it delays no other."""
 USUAL = np.array([variation.usual for variation in EVERY])
 UPRIGHT = ("z", "roll", "pitch", "w", "p", "q")
 """Channels that show how a fish floats. A camera above the tank alone sees none of them."""

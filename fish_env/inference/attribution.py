@@ -250,8 +250,12 @@ class Search:
             return found
         after = screen(current.fit, self.causes, self.rng)
         gain = found.gain + before.score - current.score
-        begun = replace(found, accepted=current, shown=after, gain=gain, failed=frozenset())
-        return self.together(begun)
+        rivals = rivals_of(current, found.rivals)
+        return self.together(
+            replace(
+                found, accepted=current, rivals=rivals, shown=after, gain=gain, failed=frozenset()
+            )
+        )
 
     def in_step(self, begun: Attribution, best: Explanation) -> Attribution | None:
         """With a cause and what puts the drive in step; None where one cause explains more.

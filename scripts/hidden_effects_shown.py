@@ -82,6 +82,7 @@ def table(fit: Fit, hidden: Values) -> Iterator[str]:
         hidden: parameters by effect.
     """
     own = fit.extrapolated
+    projector = Projector(own)
     seen = screen(own, causes_of(own.problem), np.random.default_rng(0)).by_effect()
     yield "| effect | log p, true size | multiple | absorbed | log p, screen | its settings |"
     yield "| --- | --- | --- | --- | --- | --- |"
@@ -93,15 +94,18 @@ def table(fit: Fit, hidden: Values) -> Iterator[str]:
             continue
         best = seen.get(EffectName(name))
         settings = best.cause.probes[best.probe] if best else ""
-        yield f"| {name} | {_shown(at_values(own, name, values))} | {_log_p(best)} | {settings} |"
+        shown = _shown(at_values(own, projector, name, values))
+        yield f"| {name} | {shown} | {_log_p(best)} | {settings} |"
 
 
-def at_values(fit: Fit, name: str, values: Mapping[str, float]) -> Signal | None:
+def at_values(
+    fit: Fit, projector: Projector, name: str, values: Mapping[str, float]
+) -> Signal | None:
     """The test of an effect at these values of its parameters; others are neutral."""
     neutral = fit.problem.known[name].neutral
     probe = {**neutral, **{key: value for key, value in values.items() if key in neutral}}
     columns = residual_changes(fit, [(name, probe)])
-    return Projector(fit).signal(Cause(EffectName(name), ((probe,),)), 0, columns)
+    return projector.signal(Cause(EffectName(name), ((probe,),)), 0, columns)
 
 
 def _shown(signal: Signal | None) -> str:

@@ -20,6 +20,7 @@ from fish_env.inference.estimate.run_variation import CommonEffect, RunVariation
 from fish_env.inference.hypotheses import EffectParameterId as Shared
 from fish_env.params.packing import RECORD_FIELDS
 from fish_env.sensing.devices import Device, devices_of
+from fish_env.sensing.geometry import ANGLES
 
 USUAL_BEAT, USUAL_SAG = IDENTIFICATION.ordinary_beat_error, 3e-4
 """Ordinary spreads over runs of servos' frequencies, and of what batteries lose each second (1/s).
@@ -53,7 +54,6 @@ BEAT, SAG, START, WAVE = (
     for name in ("beat", "beat_sag", "start_phase", "wave_phase")
 )
 DEGREE = float(np.deg2rad(1.0))
-ANGLES = ("roll", "pitch", "yaw")
 SENSOR_ERRORS = (
     RunVariation("marker_x", "m", 0.01, shared=True),
     RunVariation("marker_y", "m", 0.01, shared=True),
@@ -106,17 +106,15 @@ IN_SAMPLES = np.array(
 EVERY = (*VARIATIONS, *SENSOR_ERRORS)
 
 
-def _alike(effect: str, numbers: Sequence[str], names: Sequence[str]) -> CommonEffect:
-    """An effect whose parameters are what runs share of their numbers, each of one."""
+def _alike(
+    effect: str, numbers: Sequence[str], names: Sequence[str], neutral: float = 0.0
+) -> CommonEffect:
+    """An effect whose parameters depart from neutral by what runs share of one number each."""
 
     def values(shared: Sequence[float]) -> dict[str, float]:
-        return dict(zip(names, shared, strict=True))
+        return {name: neutral + value for name, value in zip(names, shared, strict=True)}
 
     return CommonEffect(effect, tuple(numbers), values)
-
-
-def _gains(shared: Sequence[float]) -> dict[str, float]:
-    return {axis: 1.0 + value for axis, value in zip("pqr", shared, strict=True)}
 
 
 def _late(shared: Sequence[float]) -> dict[str, float]:
@@ -124,11 +122,6 @@ def _late(shared: Sequence[float]) -> dict[str, float]:
     of_all = max(min(camera, depth, inertial), 0.0)
     later = {"camera_later": camera - of_all, "depth_later": depth - of_all}
     return {"delay": max(clock + of_all, 0.0), **later}
-
-
-def _quicker(shared: Sequence[float]) -> dict[str, float]:
-    (share,) = shared
-    return {"scale": 1.0 + share}
 
 
 def _iron(shared: Sequence[float]) -> dict[str, float]:
@@ -148,14 +141,14 @@ COMMON = (
     _alike("marker_offset", [f"marker_{axis}" for axis in "xyz"], "xyz"),
     _alike("attitude_misalignment", [f"mounting_{name}" for name in ANGLES], ANGLES),
     _alike("camera_tilt", ("camera_roll", "camera_pitch"), ("roll", "pitch")),
-    CommonEffect("gyro_scale", tuple(f"gyro_gain_{axis}" for axis in "pqr"), _gains),
+    _alike("gyro_scale", [f"gyro_gain_{axis}" for axis in "pqr"], "pqr", 1.0),
     CommonEffect("soft_iron", ("compass_sin_2_yaw", "compass_cos_2_yaw"), _iron),
     CommonEffect("refraction", ("camera_scale_per_depth",), _bent),
     _alike("gyro_bias", [f"gyro_zero_{axis}" for axis in "pqr"], "pqr"),
     _alike("buoyancy_offset", ("buoyancy",), ("mass",)),
     _alike("current", ("current_north", "current_east"), ("north", "east")),
     _alike("battery_sag", ("beat_sag",), ("rate",)),
-    CommonEffect("frequency_scale", ("beat",), _quicker),
+    _alike("frequency_scale", ("beat",), ("scale",), 1.0),
 )
 """What is wrong in all runs alike. Runs keep delays of their inertial unit, but for what all
 devices share: a filter inside it delays no other."""

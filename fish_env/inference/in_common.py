@@ -1,11 +1,11 @@
 """What runs share of their own numbers: an effect, or nothing.
 
-Where runs differ in everything, each has its own errors of every sensor from the first fit on. That
-is the safe beginning, and too free an end: a sensor that sits askew does so in all runs alike, and
-six runs that each have the same error of their own cost more than one error that all share. Once
-causes are found, numbers that all runs share become an effect, and those that no run needs become
-none. What is left can take up less of the causes that are still hidden. Both are judged by the
-evidence: the numbers are random effects, whose spread counts in it.
+Where runs differ in everything, each has its own errors of every sensor from the first fit on. But
+a sensor that is misaligned is so in all runs alike. Six runs that each have the same error of their
+own have less evidence than one error that all share. Once causes are found, numbers that all runs
+share become an effect, and numbers that no run needs are removed. The remaining ones absorb less of
+the causes that are still hidden. Both are judged by the evidence: the numbers are random effects,
+whose spread counts in it.
 """
 
 from __future__ import annotations
@@ -74,6 +74,7 @@ class Numbers:
         self.spread: FloatArray = spread_of(self.problem, own.noise) / usual
         self._likelihoods = own_likelihoods(own)
         self._usual = self._likelihoods(())
+        self._apart = self._usual(self.spread)
 
     def in_common(self) -> list[CommonEffect]:
         """Effects that are likelier than numbers of runs, and than nothing, the clearest first."""
@@ -85,7 +86,7 @@ class Numbers:
                 continue
             fewer = _without(self.spread, [k for k in at if self.problem.variations[k].shared])
             alike = self._likelihoods(at)(fewer) - len(at) * float(np.log(WIDE))
-            otherwise = min(self._usual(self.spread), self._usual(fewer))
+            otherwise = min(self._apart, self._usual(fewer))
             if alike < otherwise - POLICY.evidence_doubt:
                 found.append((alike, i))
         return [effects[i] for _, i in sorted(found)]
@@ -95,8 +96,7 @@ class Numbers:
 
         What only single runs can have, as their trim, stays.
         """
-        sd, gone = self.spread, list[int]()
-        best = self._usual(sd)
+        sd, best, gone = self.spread, self._apart, list[int]()
         may_go = [i for i in np.flatnonzero(sd).tolist() if self.problem.variations[i].shared]
         while may_go:
             value, i = min((self._usual(_without(sd, [i])), i) for i in may_go)

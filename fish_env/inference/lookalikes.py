@@ -190,7 +190,7 @@ def _within_reach(
     return [
         (cause, signal)
         for cause, signal in pairs
-        if _replaces(fitter, cause, signal, max(POLICY.coarse_fit_leeway, lack[cause]))
+        if _in_place_of(fitter, cause, signal, max(POLICY.coarse_fit_leeway, lack[cause]))
     ]
 
 
@@ -199,11 +199,13 @@ def _lacks(fitter: CoarseFitter, pairs: Sequence[tuple[CauseId, Signal]]) -> dic
     return {cause: what_may_lack(fitter, cause) for cause in dict.fromkeys(c for c, _ in pairs)}
 
 
-def _replaces(fitter: CoarseFitter, cause: CauseId, signal: Signal, lack: float) -> bool:
-    """Whether a look-alike in a cause's place explains as much but for what it may lack."""
+def _in_place_of(
+    fitter: CoarseFitter, cause: CauseId, signal: Signal, lack: float
+) -> CoarseFit | None:
+    """The coarse fit with a look-alike in a cause's place; None if it lacks more than it may."""
     enough = fitter.base + lack
     coarse = swapped(fitter, fitter.fit, cause, signal, enough)
-    return coarse is not None and coarse.objective < enough
+    return coarse if coarse is not None and coarse.objective < enough else None
 
 
 def _asked(
@@ -291,9 +293,8 @@ def undecided(current: Explanation, shown: Screen, report: Report) -> tuple[Expl
     pairs = _shown(late(current), shown)
     lack = _lacks(fitter, pairs)
     for cause, signal in pairs:
-        other, enough = signal.cause.effect, fitter.base + lack[cause]
-        coarse = swapped(fitter, own, cause, signal, enough)
-        if coarse is None or not coarse.objective < enough:
+        other, coarse = signal.cause.effect, _in_place_of(fitter, cause, signal, lack[cause])
+        if coarse is None:
             continue
         report(f"fitting {other}, which explains nearly as much as {name_of(cause)}")
         fitted = at_noise(own.problem, coarse, own.noise, POLICY.swap_steps)

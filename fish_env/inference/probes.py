@@ -164,10 +164,11 @@ def probes_of(
         return _oscillations(effect, length)
     switches = effect.switching
     shapes = [p for p in effect.parameters if p.shapes]
+    further = SHARES[1:] if between else SHARES[-1:]
     alternatives: list[tuple[Probe, ...]] = []
     for values in product(*(_shape_values(s) for s in shapes)):
         setting = dict(zip([s.name for s in shapes], values, strict=True))
-        for shares in [SHARES, *((share,) for share in SHARES[1 if between else -1 :])]:
+        for shares in (SHARES, *((share,) for share in further)):
             candidates = [_alternative(effect, switches, setting, share) for share in shares]
             slow = [c for c in candidates if all(effect.is_followed(p, step) for p in c)]
             if slow and slow[0] not in alternatives:

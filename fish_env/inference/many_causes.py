@@ -58,12 +58,13 @@ def pursue(
         varied = current.varied(beside_misfit=True)
         if varied.score < current.score - POLICY.evidence_doubt:
             current, shown = varied, screen(varied.fit, causes, rng)
-    fewest = 1
+    fewest, hidden = 1, True
     for _ in range(POLICY.most_single_searches):
         if not disturbance_at_limit(current.fit):
             break
         kept = beside(current, shown)
-        more = tried_out(current, kept, report)
+        more = tried_out(current, kept, report) if hidden else None
+        hidden = more is not None or problem.swamped(current.fit.noise)
         more = more or pursued(current, kept, report, least, relaxed_log_p, most=1)
         if more is current:
             fewest = 2

@@ -7,7 +7,7 @@ sum explains the data as well. All sums are formed in the linear model of one fi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -115,18 +115,27 @@ def owed_to_coefficients(fit: Fit) -> dict[ParameterId, float]:
 
 
 def independent(fit: Fit) -> frozenset[EffectName]:
-    """Effects that owe nothing to how far the coefficients are from their priors.
+    """Effects that owe little to how far the coefficients are from their priors.
 
-    No parameter that switches the effect on owes them more than its standard error.
+    Each parameter that switches the effect on owes them no more than its standard error; or
+    together they owe them a small share of what they are, seen from where the effect is off: nearly
+    all of it is there with the coefficients as they were known too.
     """
     own = fit.extrapolated
     owed = owed_to_coefficients(own)
-    error = dict(zip(own.ids, np.sqrt(np.diag(own.covariance)).tolist(), strict=True))
-    return frozenset(
-        name
-        for name in map(EffectName, own.effects)
-        if all(abs(owed[id]) < error[id] for id in off_values(own, name))
-    )
+    return frozenset(name for name in map(EffectName, own.effects) if _owes_little(own, name, owed))
+
+
+def _owes_little(own: Fit, name: EffectName, owed: Mapping[ParameterId, float]) -> bool:
+    off = off_values(own, name)
+    at = [own.ids.index(id) for id in off]
+    debt = np.array([owed[id] for id in off])
+    size = own.estimates[at] - np.array(list(off.values()))
+    covariance = own.covariance[np.ix_(at, at)]
+    if np.all(np.abs(debt) < np.sqrt(np.diag(covariance))):
+        return True
+    debt_squared, squared = (float(v @ np.linalg.solve(covariance, v)) for v in (debt, size))
+    return debt_squared < POLICY.most_owed_to_coefficients**2 * squared
 
 
 def _measured(found: Explanation) -> frozenset[EffectName]:

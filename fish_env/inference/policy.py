@@ -76,6 +76,7 @@ class DecisionPolicy(Numbers):
         implausible_prior_sd: prior standard deviations, or plausible sizes, that are implausible.
         strange_coefficients: p-value of all coefficients under their priors below which no cause is
             believed beside something unknown.
+        most_owed_to_coefficients: share of an effect that it may owe to such coefficients.
         shape_reach: distance from the middle of its plausible range, in lengths of that range,
             beyond which the shape of an effect is implausible.
         lifted_prior_precision: precision left to the prior of a coefficient that is a cause.
@@ -172,6 +173,9 @@ class DecisionPolicy(Numbers):
     implausible_prior_sd: float = number(10.0, 5.0, 50.0, BY_HAND)
     strange_coefficients: float = number(
         1e-4, 1e-12, 0.05, "the vehicle described is so in all but one of ten thousand cases"
+    )
+    most_owed_to_coefficients: float = number(
+        0.1, 0.01, 1.0, "estimates are to be right within a tenth"
     )
     shape_reach: float = number(1.5, 0.5, 20.0, BY_HAND)
     lifted_prior_precision: float = number(1e-4, 0.0, 0.1, BY_HAND)

@@ -3,23 +3,28 @@
 Where runs differ in their drive, a lag puts all of them out of step, each by another amount. The
 disturbance then grows until it follows everything, and no slope under it shows a lag. A fit does:
 from a lag of some size and under a small disturbance its few steps end far below a fit without it.
+
+Once one lag was found, the disturbance is smaller, but a second one hides still: the first lag and
+the runs' own clocks have made up for it, and leave it only together. There a trial goes on from the
+fit with the first lag.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
+from dataclasses import dataclass
+from functools import cached_property, partial
 
 from fish_env.inference.adequacy import beyond_plausible
 from fish_env.inference.estimate.again import following
-from fish_env.inference.estimate.coarse_fit import CoarseFit
+from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.estimate.settle import usual_runs
 from fish_env.inference.explanation import Explanation, fitted_again, reached
-from fish_env.inference.hypotheses import EffectName, EffectParameterId, listed
+from fish_env.inference.hypotheses import EffectName, listed
 from fish_env.inference.parallel import side_by_side
 from fish_env.inference.policy import POLICY
-from fish_env.inference.problem import Point
+from fish_env.inference.problem import Point, Problem
 from fish_env.inference.projection import Signal
 from fish_env.inference.screening import Screen
 from fish_env.inference.search import is_off
@@ -40,27 +45,94 @@ def tried_out(
         report: told what is being done.
     """
     problem = current.fit.problem
-    hidden = [s for s in shown.best() if s.cause.id in problem.hidden_by_drive]
-    swamped = problem.drive.uneven and problem.swamped(current.fit.noise)
-    if not hidden or not swamped:
+    fresh = problem.swamped(current.fit.noise)
+    names = problem.hidden_by_drive
+    hidden = [s for s in shown.best() if s.cause.id in names]
+    if not fresh and not {*names} & {*current.causes}:
+        return None
+    if not hidden or not problem.drive.uneven:
         return None
     report(f"trying {listed(s.cause.id for s in hidden)} one at a time")
-    closest = _promising(current, hidden)
+    trials = Trials(current, fresh)
+    closest = trials.promising(hidden)
     if closest:
         report(f"fitting {listed(closest)}, each alone")
-    whole = [partial(_in_all_runs, current, name, trial) for name, trial in closest.items()]
+    whole = [partial(trials.in_all_runs, name, trial) for name, trial in closest.items()]
     fitted = [more for more in side_by_side(whole) if more]
     best = min(fitted, key=lambda more: more.score, default=current)
     return best if best.score < current.score - POLICY.evidence_doubt else None
 
 
-def _promising(current: Explanation, hidden: Sequence[Signal]) -> dict[EffectName, CoarseFit]:
-    """The few trials to go on from."""
-    problem = current.fit.problem
-    begun = [(s.cause.effect, values) for s in hidden for values in probed(problem, s)]
-    tasks = [partial(_trial, current, *begin) for begin in [("", {}), *begun]]
-    without, *found = side_by_side(tasks)
-    return _closest(current, without, [f for f in found if f])
+@dataclass(frozen=True, eq=False)
+class Trials:
+    """Fits of a few steps with one more effect.
+
+    Attributes:
+        current: causes accepted so far.
+        fresh: whether they begin from a nominal vehicle and under a small disturbance, else from
+            the fit with these causes. Coefficients and runs' own numbers of a fit beside a swamping
+            disturbance have gone far to make up for what is missing. That disturbance would follow
+            everything, tell trials apart by little else than its size, and take longest to find.
+    """
+
+    current: Explanation
+    fresh: bool
+
+    def promising(self, hidden: Sequence[Signal]) -> dict[EffectName, CoarseFit]:
+        """The few trials to go on from."""
+        begun = [begin for signal in hidden for begin in self._begun(signal)]
+        tasks = [partial(self._trial, *begin) for begin in [("", self._few.start), *begun]]
+        without, *found = side_by_side(tasks)
+        return _closest(self.current, without, [f for f in found if f])
+
+    def in_all_runs(self, name: EffectName, trial: CoarseFit) -> Explanation | None:
+        """The explanation with one more effect, from its trial; None where it is of no use."""
+        own = self.current.fit
+        problem, noise = following(own.problem, trial), own.noise
+        if self.fresh:
+            noise = problem.default_noise()
+            problem = usual_runs(problem, trial.point, noise)
+        whole = fitted_again(problem, trial, noise)
+        if whole is None or beyond_plausible(whole, name) or is_off(problem, whole.point, name):
+            return None
+        return Explanation((*self.current.causes, name), whole)
+
+    @cached_property
+    def _few(self) -> Problem:
+        return self.current.fit.problem.subset(POLICY.few_runs)
+
+    def _begun(self, signal: Signal) -> list[tuple[EffectName, Point]]:
+        """An effect with where its trials begin: from all its sizes, or the likeliest of them."""
+        own, name = self.current.fit, signal.cause.effect
+        sizes = probed(own.problem, signal)
+        z = self._few.start.z if self.fresh else own.point.z
+        begin = [Point(z, {**own.point.effects, **values}) for values in sizes]
+        if not self.fresh:
+            effects = (*own.effects, name)
+            likeliest = CoarseFitter(own).promising
+            begin = likeliest(effects, own.released, begin, POLICY.most_close_trials)
+        return [(name, point) for point in begin]
+
+    def _trial(self, name: str, begin: Point) -> CoarseFit | None:
+        """A few steps on a few runs.
+
+        Args:
+            name: effect to add; none if empty.
+            begin: where it begins.
+        """
+        own, few = self.current.fit, self._few
+        effects = (*own.effects, name) if name else own.effects
+        noise = few.default_noise() if self.fresh else own.noise
+        if not name:
+            begin = Point(few.start.z if self.fresh else own.point.z, own.point.effects)
+        runs = usual_runs(few, begin, noise) if self.fresh else few
+        start = (effects, begin, noise, own.released)
+        steps = POLICY.trial_steps
+        found = reached(lambda: fit(runs, *start, refit_noise=False, iterations=steps))
+        if found is None:
+            return None
+        # The fit itself takes much memory, and there are many.
+        return CoarseFit(found.effects, found.released, found.point, found.objective)
 
 
 def _closest(
@@ -81,42 +153,3 @@ def _closest(
     enough = least + POLICY.coarse_fit_behind * (without.objective - least)
     few = list(best.items())[: POLICY.most_close_trials]
     return {name: trial for name, trial in few if trial.objective <= enough}
-
-
-def _in_all_runs(current: Explanation, name: EffectName, trial: CoarseFit) -> Explanation | None:
-    """The explanation with one more effect, from its trial; None where the fit is of no use."""
-    problem = following(current.fit.problem, trial)
-    noise = problem.default_noise()
-    whole = fitted_again(usual_runs(problem, trial.point, noise), trial, noise)
-    if whole is None or beyond_plausible(whole, name) or is_off(problem, whole.point, name):
-        return None
-    return Explanation((*current.causes, name), whole)
-
-
-def _trial(
-    current: Explanation, name: str, values: dict[EffectParameterId, float]
-) -> CoarseFit | None:
-    """A few steps on a few runs, from a nominal vehicle and under a small disturbance.
-
-    Coefficients and runs' own numbers of the present fit have gone far to make up for what is
-    missing. The disturbance stays small: what it would grow to beside what is still missing follows
-    everything, tells trials apart by little else than its size, and takes longest to find.
-
-    Args:
-        current: causes accepted so far.
-        name: effect to add; none if empty.
-        values: where its parameters begin.
-    """
-    own = current.fit
-    few = own.problem.subset(POLICY.few_runs)
-    effects = (*own.effects, name) if name else own.effects
-    begin = Point(few.start.z, {**own.point.effects, **values})
-    noise = few.default_noise()
-    fresh = usual_runs(few, begin, noise)
-    start = (effects, begin, noise, own.released)
-    steps = POLICY.trial_steps
-    found = reached(lambda: fit(fresh, *start, refit_noise=False, iterations=steps))
-    if found is None:
-        return None
-    # The fit itself takes much memory, and there are many.
-    return CoarseFit(found.effects, found.released, found.point, found.objective)

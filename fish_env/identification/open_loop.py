@@ -23,8 +23,8 @@ class Predicting(Protocol):
 
     runs: tuple[RunData, ...]
 
-    def refines_steps(self, effects: Iterable[EffectParameterId]) -> bool:
-        """Whether one of these effect parameters makes the tail's rate jump."""
+    def cuts_steps(self, effects: Iterable[EffectParameterId]) -> bool:
+        """Whether one of these has shorter steps than others: it makes the tail's rate jump."""
         ...
 
     def innovations(
@@ -82,7 +82,7 @@ def in_units_of_noise(
 def errors(problem: Predicting, point: Point, noise: NoiseModel) -> list[FloatArray]:
     """Measured minus predicted of each run from its initial state, (T, C), NaN where missing."""
     effects = {id: np.array([value]) for id, value in point.effects.items()}
-    corners = problem.refines_steps(point.effects)
+    corners = problem.cuts_steps(point.effects)
     still = [without_feedback(run, corners=corners) for run in problem.runs]
     flat = problem.innovations(point.z[:, None], effects, noise, still)[0]
     parts = np.split(flat, np.cumsum([run.measured.size for run in problem.runs])[:-1])

@@ -333,7 +333,7 @@ class SeriesProblem(Problem):
         It begins where its run does, and not ``near`` another one. Where runs differ it keeps in
         any case what :meth:`RunFilter.replay` needs.
         """
-        corners, keep = self.refines_steps(point.effects), keep_slopes or bool(noise.spread.any())
+        corners, keep = self.cuts_steps(point.effects), keep_slopes or bool(noise.spread.any())
         return self.filter_for(point.effects).run(*self.lane(point), noise, keep, corners)
 
     def lasting(self, filtered: Sequence[Filtered]) -> list[Filtered]:
@@ -370,6 +370,12 @@ class SeriesProblem(Problem):
     def refines_steps(self, effects: Iterable[EffectParameterId]) -> bool:
         """Whether one of these effect parameters makes the tail's rate jump."""
         return not self.unrefined and self.is_nonsmooth({*effects_of(effects), *self.model.effects})
+
+    def cuts_steps(self, effects: Iterable[EffectParameterId]) -> bool:
+        """Whether one of these has shorter steps than others: it is refined, or steps are long."""
+        long = any(run.usual_substeps is not None for run in self.runs)
+        names = {*effects_of(effects), *self.model.effects}
+        return self.is_nonsmooth(names) and (long or not self.unrefined)
 
     def is_nonsmooth(self, names: Iterable[str]) -> bool:
         """Whether one of these effects makes the tail's rate jump, whatever the steps."""

@@ -276,6 +276,9 @@ def with_weaker_causes(
 ) -> tuple[Attribution, Adequacy]:
     """One more search where something is known to be missing; kept if nothing then is.
 
+    Beside causes it is kept if it explains more: each cause is tested beside generic forces then.
+    Where no stronger one acts, a weak one stands in for what is missing.
+
     Args:
         attribution: what was found.
         left: adequacy of the accepted explanation.
@@ -291,7 +294,10 @@ def with_weaker_causes(
         return attribution, left
     report("testing the residual")
     after = adequacy(more.accepted.fit, rng, more.tolerated)
-    return (more, after) if after.reached else (attribution, left)
+    before = attribution.accepted
+    more_explained = more.accepted.score < before.score - POLICY.evidence_doubt
+    beside = bool(before.causes) and more_explained and not after.implausible
+    return (more, after) if after.reached or beside else (attribution, left)
 
 
 def with_slow_causes(

@@ -242,6 +242,45 @@ def test_only_corners_ask_for_fine_steps(dataset):
     assert not problem.without_refinement().refines_steps(LIMIT)
 
 
+def test_long_steps_are_cut_where_the_rate_jumps(dataset):
+    long = SeriesProblem(dataset).without_refinement().with_long_steps()
+    assert long.cuts_steps(LIMIT)
+    assert not long.refines_steps(LIMIT)
+    assert not long.cuts_steps(LAG)
+    assert not SeriesProblem(dataset).without_refinement().cuts_steps(LIMIT)
+
+
+class Uncut(SeriesProblem):
+    """A problem whose long steps are long whatever the effects."""
+
+    def cuts_steps(self, effects):
+        return False
+
+
+def along_a_clock(problem):
+    """-2 log likelihood as a run's clock moves through half a sample, a tenth of one each time."""
+    limit = {id: 8.0 for id in LIMIT}
+    point, noise = Point(problem.start.z, limit), noise_of(problem)
+    number = [v.name for v in problem.variations].index("clock_offset")
+    sample = float(np.median(np.diff(problem.dataset.runs[0].time_s)))
+    values = []
+    for share in np.arange(0.0, 0.55, 0.1):
+        own = np.zeros((1, len(problem.variations)))
+        own[0, number] = share * sample
+        moved = problem.with_variation(own, point, noise)
+        values.append(-2.0 * moved.filtered(point, noise)[0].log_likelihood)
+    return np.array(values)
+
+
+def test_long_steps_add_few_bends_to_a_likelihood_along_a_clock(dataset):
+    """Steps that a clock divides otherwise must not look like evidence about the clock."""
+    fine = along_a_clock(SeriesProblem(dataset))
+    problems = [kind(dataset).without_refinement() for kind in (SeriesProblem, Uncut)]
+    long = [along_a_clock(problem.with_long_steps()) for problem in problems]
+    cut, uncut = (np.abs(np.diff(values - fine, 2)).max() for values in long)
+    assert cut < 0.3 * uncut
+
+
 class AnySmallest(SeriesProblem):
     """A problem that takes every lag for one that its steps follow."""
 

@@ -95,6 +95,45 @@ def test_an_effect_that_ends_switched_off_is_no_cause():
     assert told[-1] == f"fitting {LATE}, each alone"
 
 
+def two_lags(far=0.0):
+    """Two lags; a coefficient is far from where it is known to be."""
+    rng = np.random.default_rng(4)
+    x, y, w = rng.standard_normal((3, RUNS, SAMPLES))
+    noise = rng.standard_normal((RUNS, SAMPLES))
+
+    def residuals(z, effects):
+        late, like = effects[size_of(LATE)] ** 2, effects[size_of(OTHER)] ** 2
+        return noise + 40.0 * ((0.25 - late) * x + (0.16 - like) * y + (far - z[0]) * w)
+
+    stated = Stated(residuals, (effect(LATE, lower=0.0), effect(OTHER, lower=0.0)))
+    stated.hidden_by_drive, stated.drive = (LATE, OTHER), Drive(uneven=True)
+    stated.swamped = lambda noise: False
+    return stated
+
+
+def second_beside(stated, first, told):
+    point = replace(stated.start, effects={size_of(name): 0.5 for name in first})
+    own = Explanation(first, fit(stated, first, point))
+    shown = screen(own.fit, causes_of(stated), np.random.default_rng(0))
+    return tried_out(own, shown, told.append)
+
+
+def test_a_second_lag_is_tried_from_the_fit_with_the_first():
+    """A vehicle whose coefficients are far off is where that fit has them, not as described."""
+    told = []
+    found = second_beside(two_lags(far=3.0), (LATE,), told)
+    assert found.causes == (LATE, OTHER)
+    assert found.fit.point.effects[size_of(LATE)] == pytest.approx(0.5, abs=0.05)
+    assert found.fit.point.effects[size_of(OTHER)] == pytest.approx(0.4, abs=0.05)
+    assert any(OTHER in step and LATE not in step for step in told)
+
+
+def test_no_second_lag_is_tried_without_a_first():
+    told = []
+    assert second_beside(two_lags(), (), told) is None
+    assert told == []
+
+
 @pytest.mark.parametrize("settings", [{"uneven": False}, {"swamped": False}])
 def test_nothing_is_tried_where_nothing_hides(settings):
     told = []

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from copy import copy
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -34,9 +33,10 @@ from fish_env.identification.parameters import ALIKE, baseline_of, changes_of, n
 from fish_env.identification.phases import settle_phases
 from fish_env.identification.run_noise import noise_scales
 from fish_env.identification.run_numbers import in_late_rows, renumbered
-from fish_env.identification.runs import FINER, RunData, prepare_run
+from fish_env.identification.runs import prepare_run
 from fish_env.identification.sensor_errors import slopes_of_runs
 from fish_env.identification.sensors import largest_jitter_of, largest_noise
+from fish_env.identification.steps import Stepped
 from fish_env.identification.tail_drive import LATE, TailDrive
 from fish_env.identification.variation import COMMON, EVERY, USUAL, VARIATIONS
 from fish_env.identification.variation_slopes import swum_slopes
@@ -44,14 +44,14 @@ from fish_env.identification.wave_phases import AMPLITUDE, settle_wave_phases
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.hypotheses import EffectParameterId, effect_names, effects_of
 from fish_env.inference.probes import phase_grid
-from fish_env.inference.problem import Point, Problem
+from fish_env.inference.problem import Point
 from fish_env.inference.vehicle import EffectFreedom, freedoms
 from fish_env.model.effect import Effect
 from fish_env.params.io import load_fish
 from fish_env.params.schema import FishParams
 
 
-class SeriesProblem(Problem):
+class SeriesProblem(Stepped):
     """Measured runs of a fish, the model that should explain them, and its freedom.
 
     Args:
@@ -121,18 +121,9 @@ class SeriesProblem(Problem):
         """The same problem on the beginnings of its runs."""
         return self.with_runs([run.until(end_s) for run in self.runs])
 
-    def with_runs(self, runs: Sequence[RunData]) -> SeriesProblem:
-        """The same problem on other runs; this one on its own."""
-        return self if self.runs == tuple(runs) else self._but(runs=tuple(runs), _filters={})
-
     def neutral(self, names: Iterable[str]) -> dict[EffectParameterId, float]:
         """Values of effects as the fish's file has them, neutral where it says nothing."""
         return neutral_values(self.model, self.known, names)
-
-    @property
-    def longest_step(self) -> float:
-        """Longest RK4 step (s) between samples."""
-        return max(float(np.max(np.diff(run.clock) / run.substeps[1:])) for run in self.runs)
 
     @property
     def longest_run(self) -> float:
@@ -339,47 +330,6 @@ class SeriesProblem(Problem):
     def lasting(self, filtered: Sequence[Filtered]) -> list[Filtered]:
         """The filtered runs without the slopes of their filters, a third of what a fit holds."""
         return [replace(run, slopes=None) for run in filtered]
-
-    def without_refinement(self) -> SeriesProblem:
-        """The same problem without finer steps for effects that make the tail's rate jump."""
-        return self._but(unrefined=True)
-
-    def with_refinement(self) -> SeriesProblem:
-        """The same problem in usual steps, finer for effects that make the tail's rate jump."""
-        usual = self.with_runs([run.in_usual_steps() for run in self.runs])
-        return usual._but(unrefined=False) if usual.unrefined else usual
-
-    def is_coarse(self, effects: Iterable[EffectParameterId]) -> bool:
-        """Whether steps are longer than these effect parameters need (see the protocol)."""
-        finer = self.unrefined and self.is_nonsmooth({*effects_of(effects), *self.model.effects})
-        return finer or any(run.usual_substeps is not None for run in self.runs)
-
-    def _but(self, **changes: Any) -> SeriesProblem:
-        other = copy(self)
-        vars(other).update(changes)
-        return other
-
-    def with_long_steps(self) -> SeriesProblem:
-        """The same problem in steps that will do to compare causes, with the same freedoms."""
-        return self.with_runs([run.in_long_steps(self.model.longest_step()) for run in self.runs])
-
-    def refined(self) -> tuple[SeriesProblem, int]:
-        """The same problem in finer steps, to tell what those of motion with corners get wrong."""
-        return self.with_runs([run.in_finer_steps() for run in self.runs]), FINER
-
-    def refines_steps(self, effects: Iterable[EffectParameterId]) -> bool:
-        """Whether one of these effect parameters makes the tail's rate jump."""
-        return not self.unrefined and self.is_nonsmooth({*effects_of(effects), *self.model.effects})
-
-    def cuts_steps(self, effects: Iterable[EffectParameterId]) -> bool:
-        """Whether one of these has shorter steps than others: it is refined, or steps are long."""
-        long = any(run.usual_substeps is not None for run in self.runs)
-        names = {*effects_of(effects), *self.model.effects}
-        return self.is_nonsmooth(names) and (long or not self.unrefined)
-
-    def is_nonsmooth(self, names: Iterable[str]) -> bool:
-        """Whether one of these effects makes the tail's rate jump, whatever the steps."""
-        return any(self.known[name].step_error > 0.0 for name in names)
 
     def lane(self, point: Point) -> tuple[FloatArray, Measurement]:
         """Parameter record (parameters, 1) of a point, and what its sensors do."""

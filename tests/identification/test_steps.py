@@ -259,7 +259,7 @@ class Uncut(SeriesProblem):
 
 def along_a_clock(problem):
     """-2 log likelihood as a run's clock moves through half a sample, a tenth of one each time."""
-    limit = {id: 8.0 for id in LIMIT}
+    limit = dict.fromkeys(LIMIT, 8.0)
     point, noise = Point(problem.start.z, limit), noise_of(problem)
     number = [v.name for v in problem.variations].index("clock_offset")
     sample = float(np.median(np.diff(problem.dataset.runs[0].time_s)))

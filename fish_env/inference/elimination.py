@@ -120,7 +120,7 @@ def surely_acts(fit: Fit, cause: CauseId) -> bool:
     """
     if not isinstance(cause, Coefficient) and not _is_off_at_finite(fit, cause):
         return False
-    return _from_off(fit, off_values(fit, cause)) > POLICY.sure_sd**2
+    return from_off(fit, off_values(fit, cause)) > POLICY.sure_sd**2
 
 
 def foreseen_loss(current: Explanation, cause: CauseId) -> float:
@@ -135,7 +135,7 @@ def foreseen_loss(current: Explanation, cause: CauseId) -> float:
     own = current.fit
     if not isinstance(cause, Coefficient) and not _is_linear(own, cause):
         return 0.0
-    return _from_off(own, off_values(own, cause)) - current.narrowed_by((cause,))
+    return from_off(own, off_values(own, cause)) - current.narrowed_by((cause,))
 
 
 def may_not_act(fit: Fit, cause: CauseId) -> bool:
@@ -144,7 +144,7 @@ def may_not_act(fit: Fit, cause: CauseId) -> bool:
     The region is corrected for coloured residuals.
     """
     off = off_values(fit, cause)
-    return bool(_from_off(fit, off) < chdtri(len(off), POLICY.interval_error))
+    return bool(from_off(fit, off) < chdtri(len(off), POLICY.interval_error))
 
 
 def insignificant(fit: Fit, causes: Sequence[CauseId], threshold: float) -> tuple[CauseId, ...]:
@@ -166,8 +166,8 @@ def insignificant(fit: Fit, causes: Sequence[CauseId], threshold: float) -> tupl
         for name, off in judged.items():
             own = [fit.ids.index(id) for id in off]
             gap = estimates[own] - np.array(list(off.values()))
-            distance = _distance(gap, covariance[np.ix_(own, own)])
-            log_p[name] = float(chi2_log_tail(distance, len(own)))
+            squared = distance(gap, covariance[np.ix_(own, own)])
+            log_p[name] = float(chi2_log_tail(squared, len(own)))
         weakest = max(log_p, key=lambda name: log_p[name])
         if log_p[weakest] < threshold:
             break
@@ -180,14 +180,15 @@ def insignificant(fit: Fit, causes: Sequence[CauseId], threshold: float) -> tupl
     return tuple(dropped)
 
 
-def _from_off(fit: Fit, off: Mapping[ParameterId, float]) -> float:
+def from_off(fit: Fit, off: Mapping[ParameterId, float]) -> float:
     """Squared distance of estimates from where a cause is off, in standard errors."""
     at = [fit.ids.index(id) for id in off]
     gap = fit.estimates[at] - np.array(list(off.values()))
-    return _distance(gap, fit.covariance[np.ix_(at, at)])
+    return distance(gap, fit.covariance[np.ix_(at, at)])
 
 
-def _distance(gap: FloatArray, covariance: FloatArray) -> float:
+def distance(gap: FloatArray, covariance: FloatArray) -> float:
+    """Square of a distance (k,) in standard errors."""
     return float(gap @ np.linalg.solve(covariance, gap))
 
 

@@ -64,6 +64,7 @@ def pursue(
             break
         kept = beside(current, shown)
         more = tried_out(current, kept, report) if hidden else None
+        # Where none shows from the fit itself, none will beside one cause more.
         hidden = more is not None or problem.swamped(current.fit.noise)
         more = more or pursued(current, kept, report, least, relaxed_log_p, most=1)
         if more is current:

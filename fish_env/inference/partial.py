@@ -20,7 +20,7 @@ from fish_env.inference.adequacy import (
     generic_signals,
     implausible_estimates,
 )
-from fish_env.inference.elimination import off_values
+from fish_env.inference.elimination import distance, from_off, off_values
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.free import Free
 from fish_env.inference.estimate.products import inner
@@ -130,12 +130,11 @@ def _owes_little(own: Fit, name: EffectName, owed: Mapping[ParameterId, float]) 
     off = off_values(own, name)
     at = [own.ids.index(id) for id in off]
     debt = np.array([owed[id] for id in off])
-    size = own.estimates[at] - np.array(list(off.values()))
     covariance = own.covariance[np.ix_(at, at)]
     if np.all(np.abs(debt) < np.sqrt(np.diag(covariance))):
         return True
-    debt_squared, squared = (float(v @ np.linalg.solve(covariance, v)) for v in (debt, size))
-    return debt_squared < POLICY.most_owed_to_coefficients**2 * squared
+    share = POLICY.most_owed_to_coefficients
+    return distance(debt, covariance) < share**2 * from_off(own, off)
 
 
 def _measured(found: Explanation) -> frozenset[EffectName]:

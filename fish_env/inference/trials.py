@@ -11,9 +11,10 @@ fit with the first lag.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
+from typing import Any
 
 from fish_env.inference.adequacy import beyond_plausible
 from fish_env.inference.estimate.again import following
@@ -21,7 +22,7 @@ from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.estimate.settle import usual_runs
 from fish_env.inference.explanation import Explanation, fitted_again, reached
-from fish_env.inference.hypotheses import EffectName, listed
+from fish_env.inference.hypotheses import EffectName, EffectParameterId, listed
 from fish_env.inference.parallel import side_by_side
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
@@ -45,12 +46,10 @@ def tried_out(
         report: told what is being done.
     """
     problem = current.fit.problem
-    fresh = problem.swamped(current.fit.noise)
-    names = problem.hidden_by_drive
+    names, fresh = problem.hidden_by_drive, problem.swamped(current.fit.noise)
+    hides = problem.drive.uneven and (fresh or not {*current.causes}.isdisjoint(names))
     hidden = [s for s in shown.best() if s.cause.id in names]
-    if not fresh and not {*names} & {*current.causes}:
-        return None
-    if not hidden or not problem.drive.uneven:
+    if not hides or not hidden:
         return None
     report(f"trying {listed(s.cause.id for s in hidden)} one at a time")
     trials = Trials(current, fresh)
@@ -81,18 +80,15 @@ class Trials:
     def promising(self, hidden: Sequence[Signal]) -> dict[EffectName, CoarseFit]:
         """The few trials to go on from."""
         begun = [begin for signal in hidden for begin in self._begun(signal)]
-        tasks = [partial(self._trial, *begin) for begin in [("", self._few.start), *begun]]
+        tasks = [partial(self._trial, *begin) for begin in [("", self._at({})), *begun]]
         without, *found = side_by_side(tasks)
         return _closest(self.current, without, [f for f in found if f])
 
     def in_all_runs(self, name: EffectName, trial: CoarseFit) -> Explanation | None:
         """The explanation with one more effect, from its trial; None where it is of no use."""
-        own = self.current.fit
-        problem, noise = following(own.problem, trial), own.noise
-        if self.fresh:
-            noise = problem.default_noise()
-            problem = usual_runs(problem, trial.point, noise)
-        whole = fitted_again(problem, trial, noise)
+        problem = following(self.current.fit.problem, trial)
+        runs, noise = self._under(problem, trial.point)
+        whole = fitted_again(runs, trial, noise)
         if whole is None or beyond_plausible(whole, name) or is_off(problem, whole.point, name):
             return None
         return Explanation((*self.current.causes, name), whole)
@@ -101,16 +97,30 @@ class Trials:
     def _few(self) -> Problem:
         return self.current.fit.problem.subset(POLICY.few_runs)
 
+    @cached_property
+    def _fitter(self) -> CoarseFitter:
+        return CoarseFitter(self.current.fit)
+
+    def _at(self, further: Mapping[EffectParameterId, float]) -> Point:
+        """Where a trial begins, with values of a further effect."""
+        own = self.current.fit
+        z = self._few.start.z if self.fresh else own.point.z
+        return Point(z, {**own.point.effects, **further})
+
+    def _under(self, problem: Problem, begin: Point) -> tuple[Problem, Any]:
+        """Runs to begin with, and their noise model."""
+        if not self.fresh:
+            return problem, self.current.fit.noise
+        noise = problem.default_noise()
+        return usual_runs(problem, begin, noise), noise
+
     def _begun(self, signal: Signal) -> list[tuple[EffectName, Point]]:
         """An effect with where its trials begin: from all its sizes, or the likeliest of them."""
         own, name = self.current.fit, signal.cause.effect
-        sizes = probed(own.problem, signal)
-        z = self._few.start.z if self.fresh else own.point.z
-        begin = [Point(z, {**own.point.effects, **values}) for values in sizes]
+        begin = [self._at(values) for values in probed(own.problem, signal)]
         if not self.fresh:
-            effects = (*own.effects, name)
-            likeliest = CoarseFitter(own).promising
-            begin = likeliest(effects, own.released, begin, POLICY.most_close_trials)
+            most = POLICY.most_close_trials
+            begin = self._fitter.promising((*own.effects, name), own.released, begin, most)
         return [(name, point) for point in begin]
 
     def _trial(self, name: str, begin: Point) -> CoarseFit | None:
@@ -120,12 +130,9 @@ class Trials:
             name: effect to add; none if empty.
             begin: where it begins.
         """
-        own, few = self.current.fit, self._few
+        own = self.current.fit
         effects = (*own.effects, name) if name else own.effects
-        noise = few.default_noise() if self.fresh else own.noise
-        if not name:
-            begin = Point(few.start.z if self.fresh else own.point.z, own.point.effects)
-        runs = usual_runs(few, begin, noise) if self.fresh else few
+        runs, noise = self._under(self._few, begin)
         start = (effects, begin, noise, own.released)
         steps = POLICY.trial_steps
         found = reached(lambda: fit(runs, *start, refit_noise=False, iterations=steps))

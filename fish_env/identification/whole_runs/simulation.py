@@ -47,7 +47,7 @@ def simulation_errors(
         record[row] *= kind.pace(mine)
         lanes.append(np.ascontiguousarray(record))
         starts.append(kind.states(run, mine))
-    corners = series.refines_steps(values)
+    corners = series.cuts_steps(values)
     still = [without_feedback(run, corners=corners) for run in series.runs]
     noise = series.default_noise()
     rows = judge.innovations(lanes, sensors, noise, still, pushes, starts=starts)

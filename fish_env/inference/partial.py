@@ -24,7 +24,6 @@ from fish_env.inference.elimination import distance, from_off, off_values
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.free import Free
 from fish_env.inference.estimate.products import inner
-from fish_env.inference.estimate.settle import evaluated
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import (
     CauseId,
@@ -68,7 +67,7 @@ def confirmed(
     Returns:
         The causes that are left with their fit; None where none is.
     """
-    measured = _measured(accepted)
+    measured = surely_measured(accepted)
     if doubtful := _dependent(accepted) - measured:
         left_out = listed(sorted(doubtful, key=name_of))
         report(f"rejecting {left_out}: coefficients contradict their priors")
@@ -137,78 +136,10 @@ def _owes_little(own: Fit, name: EffectName, owed: Mapping[ParameterId, float]) 
     return distance(debt, covariance) < share**2 * from_off(own, off)
 
 
-def _measured(found: Explanation) -> frozenset[EffectName]:
+def surely_measured(found: Explanation) -> frozenset[EffectName]:
     """Causes that were measured without a model, and not by chance."""
     drive = found.fit.problem.drive
     return drive.effects & {*found.causes} if drive.certain else frozenset()
-
-
-def sustained(
-    found: Explanation, rng: np.random.Generator, report: Report = silent
-) -> Explanation | None:
-    """The explanation with those of its causes that improve the simulation of most runs.
-
-    One sample ahead a cause may stand in for the spectrum of what is unknown: it makes whitened
-    residuals smaller and the simulation worse. A cause that acts makes both better: what simulation
-    without feedback loses by its absence, all else following in the linear model, is positive with
-    its 95 % interval over runs. A drive that was measured to be out of step may take longer to show
-    than such a simulation lasts.
-
-    Args:
-        found: causes that act beside something unknown.
-        rng: for intervals of the losses.
-        report: told what is dropped and why.
-
-    Returns:
-        The causes that are left with their fit; None where none is.
-    """
-    measured = _measured(found)
-    while {*found.causes} - measured:
-        others = [name for name in found.causes if name not in measured]
-        losses = _losses(found, others)
-        if not np.isfinite(losses).all():
-            return found
-        least = {name: _least(of, rng) for name, of in zip(others, losses, strict=True)}
-        worst = min(others, key=lambda name: least[name])
-        if least[worst] > 0.0:
-            return found
-        left_out = name_of(worst)
-        report(f"rejecting {left_out}: it does not improve open-loop predictions of most runs")
-        smaller = without_in_step(found, (worst,))
-        if smaller is None:
-            return None
-        found = smaller
-    return found if found.causes else None
-
-
-def _losses(found: Explanation, names: Sequence[CauseId]) -> FloatArray:
-    """What simulation without feedback loses by the absence of each cause (causes, R).
-
-    Squared errors in units of the noise, summed over a run; relative to those with all causes.
-
-    Args:
-        found: the causes with their fit.
-        names: those to leave out, each alone.
-    """
-    own = found.fit.extrapolated
-    settled, filtered = evaluated(own.problem, own.point, own.noise)
-    windows, still, run_of_window = settled.without_feedback(filtered, own.noise)
-    model = StandIns(found, 0.0)
-    points = [own.point, *(model.left_out(name) for name in names)]
-    z = np.column_stack([point.z for point in points])
-    effects = {id: np.array([p.effects[id] for p in points]) for id in own.point.effects}
-    squares = windows.innovations(z, effects, own.noise, still) ** 2
-    run_of = run_of_window[windows.groups()[0]]
-    energy = np.array([np.bincount(run_of, row, own.problem.run_count) for row in squares])
-    return np.asarray((energy[1:] - energy[0]) / np.maximum(energy[0], 1e-300))
-
-
-def _least(losses: FloatArray, rng: np.random.Generator) -> float:
-    """Lower end of the 95 % interval of a mean over runs (R,); the mean of fewer than three."""
-    if len(losses) < POLICY.fewest_runs_for_interval:
-        return float(losses.mean())
-    drawn = losses[rng.integers(0, len(losses), (POLICY.bootstrap_draws, len(losses)))].mean(axis=1)
-    return float(np.quantile(drawn, POLICY.interval_ends[0]))
 
 
 def _blamed(causes: Sequence[CauseId], found: Sequence[Implausible]) -> CauseId | None:

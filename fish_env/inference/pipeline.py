@@ -26,12 +26,13 @@ from fish_env.inference.estimate.fit import FEWER_STEPS, Fit, fit
 from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.gain import gap_closed
 from fish_env.inference.lookalikes import decided, undecided
-from fish_env.inference.partial import Describe, confirmed, sustained
+from fish_env.inference.partial import Describe, confirmed
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause, causes_of
 from fish_env.inference.problem import Problem
 from fish_env.inference.result import ResidualModel, Result
 from fish_env.inference.screening import screen
+from fish_env.inference.simulated import sustained
 from fish_env.inference.verdict import EXTENDING, Verdict, decide
 
 Report = Callable[[str], None]

@@ -77,6 +77,9 @@ class DecisionPolicy(Numbers):
         strange_coefficients: p-value of all coefficients under their priors below which no cause is
             believed beside something unknown.
         most_owed_to_coefficients: share of an effect that it may owe to such coefficients.
+        least_simulated_size: multiple of its estimate that simulation may ask for of a cause beside
+            something unknown, at the upper end of the interval.
+        most_simulated_size: the same at the lower end.
         shape_reach: distance from the middle of its plausible range, in lengths of that range,
             beyond which the shape of an effect is implausible.
         lifted_prior_precision: precision left to the prior of a coefficient that is a cause.
@@ -177,6 +180,8 @@ class DecisionPolicy(Numbers):
     most_owed_to_coefficients: float = number(
         0.1, 0.01, 1.0, "estimates are to be right within a tenth"
     )
+    least_simulated_size: float = number(0.9, 0.5, 1.0, "estimates are to be right within a tenth")
+    most_simulated_size: float = number(2.0, 1.0, 10.0, BY_HAND)
     shape_reach: float = number(1.5, 0.5, 20.0, BY_HAND)
     lifted_prior_precision: float = number(1e-4, 0.0, 0.1, BY_HAND)
     most_blind_share: float = number(0.5, 0.0, 1.0, BY_HAND)

@@ -15,10 +15,10 @@ from fish_env.inference.partial import (
     confirmed,
     independent,
     owed_to_coefficients,
-    sustained,
 )
 from fish_env.inference.pipeline import infer
 from fish_env.inference.problem import Point
+from fish_env.inference.simulated import sustained
 from fish_env.inference.vehicle import Coefficients, Drive
 from tests.inference.boat import sail
 from tests.inference.boat_problem import BoatProblem

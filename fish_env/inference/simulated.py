@@ -1,0 +1,142 @@
+"""Causes beside something unknown, in simulation: which act there as they do one sample ahead.
+
+One sample ahead a cause may stand in for the spectrum of what is unknown. In simulation without
+feedback such an imitation is worth little or the opposite, or many times what it is one sample
+ahead. A cause that acts is worth the same in both. Two estimates of one size that differ for
+certain reject the model: Hausman (1978), "Specification tests in econometrics", Econometrica 46,
+1251.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fish_env.arrays import FloatArray
+from fish_env.inference.estimate.settle import evaluated
+from fish_env.inference.explanation import Explanation
+from fish_env.inference.hypotheses import CauseId, name_of
+from fish_env.inference.partial import StandIns, silent, surely_measured
+from fish_env.inference.policy import POLICY
+from fish_env.inference.substitution import without_in_step
+
+
+@dataclass(frozen=True)
+class SimulatedSize:
+    """The size of a cause in simulation, as a multiple of its estimate.
+
+    Attributes:
+        size: 1 where simulation asks for the estimate, 0 where it asks for no such cause.
+        low: lower end of the 95 % interval over runs.
+        high: upper end.
+    """
+
+    size: float
+    low: float
+    high: float
+
+    @property
+    def contradiction(self) -> float:
+        """How far the interval is from all sizes of a cause that acts; negative inside."""
+        least, most = POLICY.least_simulated_size, POLICY.most_simulated_size
+        return max(-self.low, least - self.high, self.low - most)
+
+    @property
+    def words(self) -> str:
+        """The size with its interval."""
+        return f"{self.size:.2g} times its estimate ({self.low:.2g} to {self.high:.2g})"
+
+
+def sustained(
+    found: Explanation, rng: np.random.Generator, report: Callable[[str], None] = silent
+) -> Explanation | None:
+    """The explanation with those of its causes whose size simulation confirms.
+
+    The interval of the size that simulation asks for is positive, and contains sizes near the
+    estimate. A drive that was measured to be out of step may take longer to show than such a
+    simulation lasts.
+
+    Args:
+        found: causes that act beside something unknown.
+        rng: for intervals over runs.
+        report: told what is dropped and why.
+
+    Returns:
+        The causes that are left with their fit; None where none is.
+    """
+    measured = surely_measured(found)
+    while others := [name for name in found.causes if name not in measured]:
+        sizes = simulated_sizes(found, others, rng)
+        if sizes is None:
+            return found
+        worst = max(others, key=lambda name: sizes[name].contradiction)
+        if sizes[worst].contradiction < 0.0:
+            return found
+        report(f"rejecting {name_of(worst)}: simulation asks for {sizes[worst].words}")
+        smaller = without_in_step(found, (worst,))
+        if smaller is None:
+            return None
+        found = smaller
+    return found if found.causes else None
+
+
+def simulated_sizes(
+    found: Explanation, names: Sequence[CauseId], rng: np.random.Generator
+) -> dict[CauseId, SimulatedSize] | None:
+    """What size of each cause simulation asks for; None where a simulation with all diverges.
+
+    The regression of what a simulation without the cause leaves on what the cause changes, all
+    other parameters following it in the linear model. A run counts by what its simulation with all
+    causes leaves: one that is badly predicted says little about any cause.
+
+    Args:
+        found: the causes with their fit.
+        names: those asked for.
+        rng: for intervals over runs.
+    """
+    left, changed = _regressed(found, names)
+    if not (np.isfinite(left).all() and np.isfinite(changed).all()):
+        return None
+    return {name: _size(a, b, rng) for name, a, b in zip(names, left, changed, strict=True)}
+
+
+def _size(left: FloatArray, changed: FloatArray, rng: np.random.Generator) -> SimulatedSize:
+    """A ratio of sums over runs, from its terms (R,); of fewer than three runs without interval."""
+    if not changed.sum() > 0.0:
+        return SimulatedSize(0.0, 0.0, 0.0)
+    size, runs = float(left.sum() / changed.sum()), len(left)
+    if runs < POLICY.fewest_runs_for_interval:
+        return SimulatedSize(size, size, size)
+    drawn = rng.integers(0, runs, (POLICY.bootstrap_draws, runs))
+    sums = np.maximum(changed[drawn].sum(axis=1), np.finfo(float).tiny)
+    low, high = np.quantile(left[drawn].sum(axis=1) / sums, POLICY.interval_ends)
+    return SimulatedSize(size, float(low), float(high))
+
+
+def _regressed(found: Explanation, names: Sequence[CauseId]) -> tuple[FloatArray, FloatArray]:
+    """Products of what is left without each cause and what it changes, and squares of the latter.
+
+    Each (causes, R), in units of the squares that a run leaves with all causes.
+
+    Args:
+        found: the causes with their fit.
+        names: those to leave out, each alone.
+    """
+    own = found.fit.extrapolated
+    settled, filtered = evaluated(own.problem, own.point, own.noise)
+    windows, still, run_of_window = settled.without_feedback(filtered, own.noise)
+    model = StandIns(found, 0.0)
+    points = [own.point, *(model.left_out(name) for name in names)]
+    z = np.column_stack([point.z for point in points])
+    effects = {id: np.array([p.effects[id] for p in points]) for id in own.point.effects}
+    residuals = windows.innovations(z, effects, own.noise, still)
+    run_of, runs = run_of_window[windows.groups()[0]], own.problem.run_count
+    changes = residuals[1:] - residuals[0]
+
+    def by_run(products: FloatArray) -> FloatArray:
+        return np.array([np.bincount(run_of, row, runs) for row in products])
+
+    unit = np.maximum(by_run(residuals[:1] ** 2), np.finfo(float).tiny)
+    return by_run(residuals[1:] * changes) / unit, by_run(changes**2) / unit

@@ -81,14 +81,14 @@ def confirmed(
         if weakest is not None:
             words = "; ".join(one.words for one in found)
             report(f"rejecting {name_of(weakest)}: its estimate is implausible ({words})")
+            rejected = [weakest]
         else:
-            log_p = StandIns(accepted, threshold).log_p()
-            log_p = {name: value for name, value in log_p.items() if name not in measured}
-            weakest = max(log_p, key=lambda name: log_p[name])
-            if log_p[weakest] < threshold:
-                return accepted
-            report(f"rejecting {name_of(weakest)}: generic forces explain as much")
-        smaller = without_in_step(accepted, (weakest,))
+            rejected = StandIns(accepted, threshold).replaced(others)
+            for name in rejected:
+                report(f"rejecting {name_of(name)}: generic forces explain as much")
+        if not rejected:
+            return accepted
+        smaller = without_in_step(accepted, rejected)
         if smaller is None:
             return None
         accepted = smaller
@@ -150,16 +150,16 @@ def _blamed(causes: Sequence[CauseId], found: Sequence[Implausible]) -> CauseId 
 
 @dataclass(frozen=True, eq=False)
 class Removed:
-    """A cause taken out of the linear model.
+    """One or more causes taken out of the linear model.
 
     Attributes:
         loss: by how much -2 log likelihood grows.
-        shift: (k,) of its parameters.
+        shift: (k,) of their parameters.
         own: (k,) numbers of these among all free ones.
         rest: numbers of the others.
         along: (rest, k) how the others follow.
-        freed: (k, k) inverse information about its parameters that forces gain by its absence.
-        inflation: of its variance by coloured residuals.
+        freed: (k, k) inverse information about these that forces gain by their absence.
+        inflation: of a variance by coloured residuals.
     """
 
     loss: float
@@ -171,7 +171,7 @@ class Removed:
     inflation: float
 
     def seen(self, pull: FloatArray) -> FloatArray:
-        """(k, m) product of what only the cause changes with m signals of this pull (n, m)."""
+        """(k, m) product of what only the causes change with m signals of this pull (n, m)."""
         return np.asarray(pull[self.own] - self.along.T @ pull[self.rest])
 
 
@@ -187,21 +187,44 @@ class StandIns:
         self.fit, self.causes, self.threshold = found.fit.extrapolated, found.causes, threshold
         self.projector = Projector(self.fit)
 
-    def log_p(self) -> dict[CauseId, float]:
+    def replaced(self, judged: Sequence[CauseId]) -> list[CauseId]:
+        """Causes that forces may stand in for: the weakest, then others without it.
+
+        Args:
+            judged: causes in question.
+        """
+        found: list[CauseId] = []
+        while len(found) < len(judged):
+            log_p = self.log_p(found)
+            weakest = max((n for n in judged if n in log_p), key=lambda name: log_p[name])
+            if log_p[weakest] < self.threshold:
+                break
+            found.append(weakest)
+        return found
+
+    def log_p(self, without: Sequence[CauseId] = ()) -> dict[CauseId, float]:
         """Log p-value of what each cause explains that no sum of forces makes good.
 
         A sum of more forces than the cause has parameters pays for each of them what a force has to
         explain to be believed: of two descriptions that explain as much the shorter one counts.
         Source: minimum description length (Rissanen, 1978), Automatica 14, 465.
-        """
-        return {name: self._log_p(self.removed(name)) for name in self.causes}
 
-    def _log_p(self, removed: Removed) -> float:
-        beside, few = self._explained(None)
+        Args:
+            without: causes that are out of the model before.
+        """
+        before = self.removed(*without) if without else None
+        stay = [name for name in self.causes if name not in without]
+        return {name: self._log_p(before, self.removed(*without, name)) for name in stay}
+
+    def _log_p(self, before: Removed | None, removed: Removed) -> float:
+        beside, few = self._explained(before)
         instead, many = self._explained(removed)
-        longer = max(many - few - len(removed.own), 0)
-        gap = removed.loss + beside - instead - 2.0 * self.threshold * longer
-        return float(chi2_log_tail(max(gap, 0.0) / removed.inflation, len(removed.own)))
+        loss, count = removed.loss, len(removed.own)
+        if before is not None:
+            loss, count = loss - before.loss, count - len(before.own)
+        longer = max(many - few - count, 0)
+        gap = loss + beside - instead - 2.0 * self.threshold * longer
+        return float(chi2_log_tail(max(gap, 0.0) / removed.inflation, count))
 
     def left_out(self, name: CauseId) -> Point:
         """Where a cause does nothing, and all other parameters follow in the linear model."""
@@ -214,28 +237,30 @@ class StandIns:
         off = {} if isinstance(name, Coefficient) else own.problem.neutral([name])
         return Point(point.z, {**point.effects, **off})
 
-    def removed(self, name: CauseId) -> Removed:
-        """A cause taken out.
+    def removed(self, *names: CauseId) -> Removed:
+        """Causes taken out together.
 
-        A coefficient gets its prior back, and may move as far as that lets it.
+        A coefficient gets its prior back, and may move as far as that lets it. The inflation is
+        that of the last one.
         """
-        off = off_values(self.fit, name)
+        off = {id: value for name in names for id, value in off_values(self.fit, name).items()}
         own = np.array([self.fit.ids.index(id) for id in off])
-        shift = np.array(list(off.values())) - self.fit.estimates[own]
+        gap = np.array(list(off.values())) - self.fit.estimates[own]
         hessian = self.projector.hessian
         rest = np.setdiff1d(np.arange(len(hessian)), own)
         across = hessian[np.ix_(rest, own)]
         along = np.linalg.solve(hessian[np.ix_(rest, rest)], across)
         left = hessian[np.ix_(own, own)] - across.T @ along
-        freed = np.linalg.inv(left)
-        loss = float(shift @ left @ shift)
-        if isinstance(name, Coefficient):
-            z, held = float(self.fit.point.z[own[0]]), float(left[0, 0])
-            shift = np.array([-z / (1.0 + held)])
-            loss = z * z * held / (1.0 + held)
-            freed = freed - 1.0 / (1.0 + held)
-        inflation = self.fit.inflation(own)
-        return Removed(loss, shift, own, rest, along, freed, inflation)
+        moves = np.array([isinstance(id, Coefficient) for id in off])
+        shift, freed = np.where(moves, 0.0, gap), np.linalg.inv(left)
+        z = self.fit.point.z[own[moves]]
+        if moves.any():
+            held = left[np.ix_(moves, moves)] + np.eye(len(z))
+            shift[moves] = -np.linalg.solve(held, z + left[np.ix_(moves, ~moves)] @ shift[~moves])
+            freed[np.ix_(moves, moves)] -= np.linalg.inv(held)
+        loss = float(shift @ left @ shift + np.sum((z + shift[moves]) ** 2))
+        last = [self.fit.ids.index(id) for id in off_values(self.fit, names[-1])]
+        return Removed(loss, shift, own, rest, along, freed, self.fit.inflation(last))
 
     @cached_property
     def _pool(self) -> list[Signal]:

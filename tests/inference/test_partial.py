@@ -85,6 +85,29 @@ def test_a_removed_cause_costs_what_a_fit_without_it_loses():
     assert removed.loss == pytest.approx(without.objective - right.objective, rel=0.1)
 
 
+def test_causes_removed_together_cost_what_a_fit_without_them_loses():
+    boat = BoatProblem(sail(np.random.default_rng(7), FITTED, {NORTH: 0.05, BIAS: 0.01}))
+    right = fit(boat, ("current", "rudder_bias"))
+    removed = StandIns(Explanation(("current", "rudder_bias"), right), THRESHOLD).removed
+    without = fit(boat, (), noise=right.noise, refit_noise=False, iterations=10)
+    lost = without.objective - right.objective
+    assert removed("current", "rudder_bias").loss == pytest.approx(lost, rel=0.1)
+    assert removed("rudder_bias", "current").loss == pytest.approx(lost, rel=0.1)
+    assert removed("current").loss < lost
+
+
+def test_a_cause_is_judged_beside_what_was_rejected_before_it():
+    """In the linear model of one fit as in a fit of its own."""
+    boat = BoatProblem(sail(np.random.default_rng(7), FITTED, {NORTH: 0.15, EAST: -0.2}))
+    both = Explanation(("current", "rudder_bias"), fit(boat, ("current", "rudder_bias")))
+    forces = StandIns(both, THRESHOLD)
+    assert forces.replaced(both.causes) == ["rudder_bias"]
+    again = fit(boat, ("current",), noise=both.fit.noise, refit_noise=False, iterations=10)
+    alone = Explanation(("current",), again)
+    after = forces.log_p(("rudder_bias",))
+    assert after == pytest.approx(StandIns(alone, THRESHOLD).log_p(), rel=0.2)
+
+
 @pytest.mark.parametrize("seed", [4, 5, 6])
 def test_a_cause_that_improves_no_simulation_is_dropped(seed):
     """No rudder is askew: the current is all that simulations get better by."""

@@ -97,7 +97,8 @@ class SeriesProblem(Stepped):
         )
         self.baseline = baseline_of(dataset, self.fish, paths)
         self.effects = tuple(effects)
-        self.unrefined, self.drive = False, TailDrive()
+        self.unrefined = self.cut = False
+        self.drive = TailDrive()
         self._filters: dict[frozenset[str], RunFilter] = {}
         if unknown := [name for name in self.effects if name not in self.known]:
             raise EffectError(f"unknown effects {unknown}; known: {', '.join(self.known)}")

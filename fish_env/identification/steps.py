@@ -22,12 +22,14 @@ class Stepped(Problem):
 
     Attributes:
         unrefined: whether effects that make the tail's rate jump have the steps of all others.
+        cut: whether long steps are cut also without such effects.
     """
 
     runs: tuple[RunData, ...]
     known: Mapping[str, Effect]
     model: ExtendedModel
     unrefined: bool
+    cut: bool
 
     def with_runs(self: S, runs: Sequence[RunData]) -> S:
         """The same problem on other runs; this one on its own."""
@@ -70,7 +72,14 @@ class Stepped(Problem):
 
     def cuts_steps(self, effects: Iterable[EffectParameterId]) -> bool:
         """Whether one of these has shorter steps than others: it is refined, or steps are long."""
-        return self._jumps(effects) and (self._long or not self.unrefined)
+        if self._long:
+            return self.cut or self._jumps(effects)
+        return self.refines_steps(effects)
+
+    def in_steps_of(self: S, names: Iterable[str]) -> S:
+        """The same problem in the steps that it has with these effects (see the protocol)."""
+        jumps = self.is_nonsmooth({*names, *self.model.effects})
+        return self._but(cut=True) if jumps and self._long and not self.cut else self
 
     def _jumps(self, effects: Iterable[EffectParameterId]) -> bool:
         return self.is_nonsmooth({*effects_of(effects), *self.model.effects})

@@ -13,7 +13,7 @@ from fish_env.arrays import FloatArray, IntArray
 from fish_env.inference.adequacy import disturbance_at_limit
 from fish_env.inference.estimate.again import search_steps, with_run_variation
 from fish_env.inference.estimate.coarse_fit import CoarseFit
-from fish_env.inference.estimate.fit import Fit, fit
+from fish_env.inference.estimate.fit import FEWER_STEPS, Fit, fit
 from fish_env.inference.estimate.information import information, prior_precision
 from fish_env.inference.hypotheses import CauseId, EffectParameterId
 from fish_env.inference.in_place import in_step_without, without_causes
@@ -164,6 +164,26 @@ def reached(make: Callable[[], T]) -> T | None:
         return make()
     except np.linalg.LinAlgError:
         return None
+
+
+def in_steps_of(problem: Problem, current: Explanation) -> Explanation:
+    """An explanation as fits with other effects are made: in the steps of their problem.
+
+    A drive whose rate jumps is simulated in finer ones, and longer ones cost more than many a cause
+    gains.
+
+    Args:
+        problem: that of the other fits.
+        current: the explanation.
+    """
+    own, values = current.fit, current.fit.point.effects
+    steps = [(p.refines_steps(values), p.cuts_steps(values)) for p in (own.problem, problem)]
+    as_long = own.problem.longest_step == problem.longest_step
+    if steps[0] == steps[1] and (as_long or own.looks_alike(problem)):
+        return current
+    start = (own.effects, own.point, own.noise, own.released)
+    again = reached(lambda: fit(problem, *start, rounds=2, iterations=FEWER_STEPS))
+    return current if again is None else Explanation(current.causes, again)
 
 
 def fitted_again(problem: Problem, at: CoarseFit | Fit, noise: Any, rounds: int = 2) -> Fit | None:

@@ -379,6 +379,17 @@ class Problem(Protocol):
         """Whether one of these effect parameters has finer steps, since it makes a rate jump."""
         return False
 
+    def cuts_steps(self, effects: Iterable[EffectParameterId]) -> bool:
+        """Whether steps are shorter than usual in a search, since a rate jumps or once jumped."""
+        return False
+
+    def in_steps_of(self, names: Iterable[str]) -> Problem:
+        """The same problem in the steps that it has with these effects, also without them.
+
+        What is compared is simulated in the same steps: finer ones gain more than many a cause.
+        """
+        return self
+
     def is_nonsmooth(self, names: Iterable[str]) -> bool:
         """Whether one of these effects makes the motion's rate jump, whatever the steps."""
         return False

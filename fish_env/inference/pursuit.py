@@ -21,7 +21,7 @@ from fish_env.inference.elimination import allowed_loss, insignificant, off_valu
 from fish_env.inference.estimate.again import to_search
 from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
 from fish_env.inference.estimate.fit import FEWER_STEPS, Fit, fit, objective_at
-from fish_env.inference.explanation import Explanation, reached
+from fish_env.inference.explanation import Explanation, in_steps_of, reached
 from fish_env.inference.hypotheses import CauseId, Coefficient, EffectName, listed
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
@@ -175,6 +175,7 @@ def _needed(
     if coarse is None:
         return current
     problem = to_search(current.fit.problem.without_refinement(), coarse)
+    problem = problem.in_steps_of(coarse.effects)
     fitted = _fitted(problem, current, coarse)
     if fitted is None:
         return current
@@ -193,23 +194,8 @@ def _needed(
         # The linear model does not hold as far as the values at which they are off.
         report(f"fitting again with {listed(name for name in idle if name not in wild)}")
         found = whole.varied(beside_misfit=True, dropped=wild)
-    better = found.score < _in_steps_of(problem, current).score - POLICY.evidence_doubt
+    better = found.score < in_steps_of(problem, current).score - POLICY.evidence_doubt
     return found if better and not implausible_estimates(found.fit) else current
-
-
-def _in_steps_of(problem: Problem, current: Explanation) -> Explanation:
-    """An explanation as fits with further effects are made: in the steps of their problem.
-
-    A drive whose rate jumps is simulated in finer ones, and longer ones cost more than many a cause
-    gains.
-    """
-    own, before, values = current.fit, current.fit.problem, current.fit.point.effects
-    as_fine = before.refines_steps(values) == problem.refines_steps(values)
-    if as_fine and (before.longest_step == problem.longest_step or own.looks_alike(problem)):
-        return current
-    start = (own.effects, own.point, own.noise, own.released)
-    again = reached(lambda: fit(problem, *start, rounds=2, iterations=FEWER_STEPS))
-    return current if again is None else Explanation(current.causes, again)
 
 
 def _confusable(current: Explanation, cause: CauseId) -> tuple[str, ...]:

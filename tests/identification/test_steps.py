@@ -250,6 +250,17 @@ def test_long_steps_are_cut_where_the_rate_jumps(dataset):
     assert not SeriesProblem(dataset).without_refinement().cuts_steps(LIMIT)
 
 
+def test_long_steps_stay_cut_once_the_rate_has_jumped(dataset):
+    long = SeriesProblem(dataset).without_refinement().with_long_steps()
+    cut = long.in_steps_of(["servo_rate_limit"])
+    assert cut.cuts_steps(LAG)
+    assert long.in_steps_of(["servo_lag"]) is long
+    assert cut.in_steps_of(["servo_rate_limit"]) is cut
+    usual = SeriesProblem(dataset)
+    assert usual.in_steps_of(["servo_rate_limit"]) is usual
+    assert not cut.with_refinement().cuts_steps(LAG)
+
+
 class Uncut(SeriesProblem):
     """A problem whose long steps are long whatever the effects."""
 

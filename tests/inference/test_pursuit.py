@@ -15,6 +15,7 @@ from fish_env.inference.explanation import Explanation
 from fish_env.inference.many_causes import beside, challenged, each_in_turn, pursue
 from fish_env.inference.pipeline import infer
 from fish_env.inference.probes import causes_of
+from fish_env.inference.problem import Point
 from fish_env.inference.projection import Projector
 from fish_env.inference.pursuit import picked, pursued, substitutes
 from fish_env.inference.screening import Screen, screen
@@ -270,6 +271,34 @@ def test_a_further_cause_is_judged_in_the_steps_that_it_is_fitted_in():
     assert Explanation(("jump", "other"), coarse).score > current.score + 6.0
     shown = screen(current.fit, causes_of(fine), np.random.default_rng(0))
     assert pursued(current, shown, silent).causes == ("jump", "other")
+
+
+class Cut(Stated):
+    """An effect that cuts all steps, and hardly does anything else."""
+
+    def __init__(self, cut=False, cuts=True):
+        def residuals(z, effects):
+            jump, other = effects[size_of("jump")], effects[size_of("other")]
+            missed = 0.0 if cut or any(np.ravel(jump)) else 8.0
+            return np.tile([0.01 * jump, other - 30.0, float(z.sum()), missed], (3, 1))
+
+        super().__init__(residuals, [effect("jump", 40.0), effect("other", 40.0)])
+        self.cut, self.cuts = cut, cuts
+
+    def in_steps_of(self, names):
+        return Cut(cut=True) if "jump" in names and self.cuts else self
+
+    def cuts_steps(self, effects):
+        return self.cut or any(id.effect == "jump" for id in effects)
+
+
+@pytest.mark.parametrize("cuts", [True, False])
+def test_finer_steps_are_no_evidence_for_the_effect_that_asks_for_them(cuts):
+    """Shown to fail where a fit without the effect goes back to long steps."""
+    start = Point(np.zeros(1), {size_of("jump"): 1.0, size_of("other"): 30.0})
+    own = fit(Cut(cuts=cuts), ("jump", "other"), start, refit_noise=False)
+    kept, _ = backward_elimination(Explanation(("jump", "other"), own))
+    assert (kept.causes == ("other",)) == cuts
 
 
 def with_its_limit(declared: bool) -> Stated:

@@ -184,6 +184,7 @@ def fit(
         report: told what is being done.
     """
     names = problem.effects if effects is None else tuple(effects)
+    problem = problem.in_steps_of(names)
     free = Free(problem, names, released)
     given = start or problem.start
     values = {**problem.beginning(names), **given.effects}

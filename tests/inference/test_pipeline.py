@@ -67,6 +67,21 @@ def test_a_weaker_cause_is_kept_if_it_leaves_nothing(wave, unknown, kept):
     assert (found is before) == (left is LEFT) == (not kept)
 
 
+@pytest.mark.parametrize(("wave", "kept"), [(6.0, ("hull_compression", "wave")), (0.0, None)])
+def test_what_explains_more_beside_a_cause_is_kept_though_something_is_missing(wave, kept):
+    targets = {**dict.fromkeys(NAMES, 0.0), "hull_compression": 8.0, "wave": wave, UNKNOWN: 8.0}
+    runs = {name: np.full(3, size) for name, size in targets.items()}
+    problem = Pushed(apart(runs), [effect(name, 100.0) for name in targets])
+    causes = [cause for cause in causes_of(problem) if cause.id != UNKNOWN]
+    first = [cause for cause in causes if cause.id == "hull_compression"]
+    rng = np.random.default_rng(0)
+    before = attribute(problem, fit(problem), first, rng)
+    assert before.accepted.causes == ("hull_compression",)
+    found, left = with_weaker_causes(before, LEFT, causes, rng, lambda step: None)
+    assert not left.reached
+    assert found is before if kept is None else found.accepted.causes == kept
+
+
 @dataclass(frozen=True)
 class Foretelling:
     """A model of what is left that gains so much on runs it has not seen."""

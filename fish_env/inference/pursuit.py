@@ -194,8 +194,11 @@ def _needed(
         # The linear model does not hold as far as the values at which they are off.
         report(f"fitting again with {listed(name for name in idle if name not in wild)}")
         found = whole.varied(beside_misfit=True, dropped=wild)
-    better = found.score < in_steps_of(problem, current).score - POLICY.evidence_doubt
-    return found if better and not implausible_estimates(found.fit) else current
+    same = in_steps_of(problem, current)
+    if found.score < same.score - POLICY.evidence_doubt and not implausible_estimates(found.fit):
+        return found
+    # Long steps may get more wrong than what is missing does.
+    return same if same.score < current.score - POLICY.evidence_doubt else current
 
 
 def _confusable(current: Explanation, cause: CauseId) -> tuple[str, ...]:

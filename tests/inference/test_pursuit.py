@@ -274,19 +274,19 @@ def test_a_further_cause_is_judged_in_the_steps_that_it_is_fitted_in():
 
 
 class Cut(Stated):
-    """An effect that cuts all steps, and hardly does anything else."""
+    """An effect that cuts all steps, and is worth little besides."""
 
-    def __init__(self, cut=False, cuts=True):
+    def __init__(self, size=0.0, cut=False, cuts=True):
         def residuals(z, effects):
             jump, other = effects[size_of("jump")], effects[size_of("other")]
             missed = 0.0 if cut or any(np.ravel(jump)) else 8.0
-            return np.tile([0.01 * jump, other - 30.0, float(z.sum()), missed], (3, 1))
+            return np.tile([jump - size, other - 30.0, float(z.sum()), missed], (3, 1))
 
-        super().__init__(residuals, [effect("jump", 40.0), effect("other", 40.0)])
-        self.cut, self.cuts = cut, cuts
+        super().__init__(residuals, [effect("jump", 1e4), effect("other", 40.0)])
+        self.size, self.cut, self.cuts = size, cut, cuts
 
     def in_steps_of(self, names):
-        return Cut(cut=True) if "jump" in names and self.cuts else self
+        return Cut(self.size, cut=True) if "jump" in names and self.cuts else self
 
     def cuts_steps(self, effects):
         return self.cut or any(id.effect == "jump" for id in effects)
@@ -299,6 +299,16 @@ def test_finer_steps_are_no_evidence_for_the_effect_that_asks_for_them(cuts):
     own = fit(Cut(cuts=cuts), ("jump", "other"), start, refit_noise=False)
     kept, _ = backward_elimination(Explanation(("jump", "other"), own))
     assert (kept.causes == ("other",)) == cuts
+
+
+def test_finer_steps_that_explain_more_are_kept_without_the_effect():
+    long = Cut(size=2.6)
+    current = Explanation(("other",), fit(long, ("other",), refit_noise=False))
+    shown = screen(current.fit, causes_of(long), np.random.default_rng(0))
+    found = pursued(current, shown, silent)
+    assert found.causes == ("other",)
+    assert found.fit.problem.cut
+    assert found.score < current.score - 100.0
 
 
 def with_its_limit(declared: bool) -> Stated:

@@ -96,6 +96,30 @@ def test_causes_removed_together_cost_what_a_fit_without_them_loses():
     assert removed("current").loss < lost
 
 
+@pytest.mark.parametrize("reverse", [False, True])
+def test_a_coefficient_removed_with_an_effect_gets_its_prior_back(reverse):
+    """As the whole quadratic model has it, with the prior in place and the effect held off."""
+    boat = BoatProblem(sail(np.random.default_rng(7), FITTED, {NORTH: 0.15, EAST: -0.2}))
+    drag = boat.baseline.ids[0]
+    own = fit(boat, ("current",), released=(drag,))
+    names = (drag, "current")[:: -1 if reverse else 1]
+    forces = StandIns(Explanation((drag, "current"), own), THRESHOLD)
+    removed = forces.removed(*names)
+
+    held = [own.ids.index(id) for id in (NORTH, EAST)]
+    at = [i for i in range(len(own.ids)) if i not in held]
+    hessian, z = forces.projector.hessian.copy(), own.point.z[0]
+    hessian[0, 0] += 1.0
+    step = np.zeros(len(own.ids))
+    step[held] = -own.estimates[held]
+    pull = hessian[np.ix_(at, held)] @ step[held]
+    pull[0] += z
+    step[at] = -np.linalg.solve(hessian[np.ix_(at, at)], pull)
+    lost = step @ hessian @ step + 2.0 * z * step[0] + z**2
+    np.testing.assert_allclose(removed.shift, step[removed.own], rtol=1e-6)
+    assert removed.loss == pytest.approx(lost, rel=1e-6)
+
+
 def test_a_cause_is_judged_beside_what_was_rejected_before_it():
     """In the linear model of one fit as in a fit of its own."""
     boat = BoatProblem(sail(np.random.default_rng(7), FITTED, {NORTH: 0.15, EAST: -0.2}))

@@ -56,7 +56,7 @@ class Stepped(Problem):
 
     def is_coarse(self, effects: Iterable[EffectParameterId]) -> bool:
         """Whether steps are longer than these effect parameters need (see the protocol)."""
-        return self._long or (self.unrefined and self._jumps(effects))
+        return self._long or (self.unrefined and self._jumps(effects_of(effects)))
 
     def with_long_steps(self: S) -> S:
         """The same problem in steps that will do to compare causes, with the same freedoms."""
@@ -68,21 +68,21 @@ class Stepped(Problem):
 
     def refines_steps(self, effects: Iterable[EffectParameterId]) -> bool:
         """Whether one of these effect parameters makes the tail's rate jump."""
-        return self._jumps(effects) and not self.unrefined
+        return self._jumps(effects_of(effects)) and not self.unrefined
 
     def cuts_steps(self, effects: Iterable[EffectParameterId]) -> bool:
-        """Whether one of these has shorter steps than others: it is refined, or steps are long."""
+        """Whether steps are shorter than others: long ones are cut, usual ones refined."""
         if self._long:
-            return self.cut or self._jumps(effects)
+            return self.cut or self._jumps(effects_of(effects))
         return self.refines_steps(effects)
 
     def in_steps_of(self: S, names: Iterable[str]) -> S:
         """The same problem in the steps that it has with these effects (see the protocol)."""
-        jumps = self.is_nonsmooth({*names, *self.model.effects})
-        return self._but(cut=True) if jumps and self._long and not self.cut else self
+        cuts = self._long and not self.cut and self._jumps(names)
+        return self._but(cut=True) if cuts else self
 
-    def _jumps(self, effects: Iterable[EffectParameterId]) -> bool:
-        return self.is_nonsmooth({*effects_of(effects), *self.model.effects})
+    def _jumps(self, names: Iterable[str]) -> bool:
+        return self.is_nonsmooth({*names, *self.model.effects})
 
     @property
     def _long(self) -> bool:

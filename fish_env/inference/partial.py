@@ -159,7 +159,6 @@ class Removed:
         rest: numbers of the others.
         along: (rest, k) how the others follow.
         freed: (k, k) inverse information about these that forces gain by their absence.
-        inflation: of a variance by coloured residuals.
     """
 
     loss: float
@@ -168,7 +167,6 @@ class Removed:
     rest: FloatArray
     along: FloatArray
     freed: FloatArray
-    inflation: float
 
     def seen(self, pull: FloatArray) -> FloatArray:
         """(k, m) product of what only the causes change with m signals of this pull (n, m)."""
@@ -213,18 +211,24 @@ class StandIns:
             without: causes that are out of the model before.
         """
         before = self.removed(*without) if without else None
-        stay = [name for name in self.causes if name not in without]
-        return {name: self._log_p(before, self.removed(*without, name)) for name in stay}
-
-    def _log_p(self, before: Removed | None, removed: Removed) -> float:
+        lost = before.loss if before else 0.0
         beside, few = self._explained(before)
-        instead, many = self._explained(removed)
-        loss, count = removed.loss, len(removed.own)
-        if before is not None:
-            loss, count = loss - before.loss, count - len(before.own)
-        longer = max(many - few - count, 0)
-        gap = loss + beside - instead - 2.0 * self.threshold * longer
-        return float(chi2_log_tail(max(gap, 0.0) / removed.inflation, count))
+        log_p = {}
+        for name in self.causes:
+            if name in without:
+                continue
+            own = self._numbers(name)
+            removed = self.removed(*without, name)
+            instead, many = self._explained(removed)
+            longer = max(many - few - len(own), 0)
+            gap = removed.loss - lost + beside - instead - 2.0 * self.threshold * longer
+            squared = max(gap, 0.0) / self.fit.inflation(own)
+            log_p[name] = float(chi2_log_tail(squared, len(own)))
+        return log_p
+
+    def _numbers(self, name: CauseId) -> list[int]:
+        """Numbers, among all free parameters, of those that switch a cause on."""
+        return [self.fit.ids.index(id) for id in off_values(self.fit, name)]
 
     def left_out(self, name: CauseId) -> Point:
         """Where a cause does nothing, and all other parameters follow in the linear model."""
@@ -240,8 +244,7 @@ class StandIns:
     def removed(self, *names: CauseId) -> Removed:
         """Causes taken out together.
 
-        A coefficient gets its prior back, and may move as far as that lets it. The inflation is
-        that of the last one.
+        A coefficient gets its prior back, and may move as far as that lets it.
         """
         off = {id: value for name in names for id, value in off_values(self.fit, name).items()}
         own = np.array([self.fit.ids.index(id) for id in off])
@@ -259,8 +262,7 @@ class StandIns:
             shift[moves] = -np.linalg.solve(held, z + left[np.ix_(moves, ~moves)] @ shift[~moves])
             freed[np.ix_(moves, moves)] -= np.linalg.inv(held)
         loss = float(shift @ left @ shift + np.sum((z + shift[moves]) ** 2))
-        last = [self.fit.ids.index(id) for id in off_values(self.fit, names[-1])]
-        return Removed(loss, shift, own, rest, along, freed, self.fit.inflation(last))
+        return Removed(loss, shift, own, rest, along, freed)
 
     @cached_property
     def _pool(self) -> list[Signal]:

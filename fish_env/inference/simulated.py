@@ -9,7 +9,7 @@ certain reject the model: Hausman (1978), "Specification tests in econometrics",
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +18,7 @@ from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.settle import evaluated
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import CauseId, name_of
-from fish_env.inference.partial import StandIns, silent, surely_measured
+from fish_env.inference.partial import Report, StandIns, silent, surely_measured
 from fish_env.inference.policy import POLICY
 from fish_env.inference.substitution import without_in_step
 
@@ -50,7 +50,7 @@ class SimulatedSize:
 
 
 def sustained(
-    found: Explanation, rng: np.random.Generator, report: Callable[[str], None] = silent
+    found: Explanation, rng: np.random.Generator, report: Report = silent
 ) -> Explanation | None:
     """The explanation with those of its causes whose size simulation confirms.
 
@@ -87,9 +87,9 @@ def simulated_sizes(
 ) -> dict[CauseId, SimulatedSize] | None:
     """What size of each cause simulation asks for; None where a simulation with all diverges.
 
-    The regression of what a simulation without the cause leaves on what the cause changes, all
-    other parameters following it in the linear model. A run counts by what its simulation with all
-    causes leaves: one that is badly predicted says little about any cause.
+    The regression of the residuals of a simulation without the cause on what the cause changes, all
+    other parameters following it in the linear model. Runs are weighted by the residuals with all
+    causes: one that is badly predicted says little about any cause.
 
     Args:
         found: the causes with their fit.
@@ -116,9 +116,9 @@ def _size(left: FloatArray, changed: FloatArray, rng: np.random.Generator) -> Si
 
 
 def _regressed(found: Explanation, names: Sequence[CauseId]) -> tuple[FloatArray, FloatArray]:
-    """Products of what is left without each cause and what it changes, and squares of the latter.
+    """Products of the residuals without each cause and what it changes, and squares of the latter.
 
-    Each (causes, R), in units of the squares that a run leaves with all causes.
+    Each (causes, R), in units of a run's sum of squared residuals with all causes.
 
     Args:
         found: the causes with their fit.

@@ -37,7 +37,7 @@ from fish_env.identification.runs import prepare_run
 from fish_env.identification.sensor_errors import slopes_of_runs
 from fish_env.identification.sensors import largest_jitter_of, largest_noise
 from fish_env.identification.steps import Stepped
-from fish_env.identification.tail_drive import LATE, TailDrive
+from fish_env.identification.tail_drive import LATE, LATE_SENSORS, TailDrive
 from fish_env.identification.variation import COMMON, EVERY, USUAL, VARIATIONS
 from fish_env.identification.variation_slopes import swum_slopes
 from fish_env.identification.wave_phases import AMPLITUDE, settle_wave_phases
@@ -68,6 +68,7 @@ class SeriesProblem(Stepped):
     known: dict[str, Effect]
     drive: TailDrive
     hidden_by_drive = LATE
+    late_sensors = LATE_SENSORS
     out_of_step = effect_names("frequency_scale", "battery_sag", "clock_scale", "clock_skew")
     interchangeable = ALIKE
     variations, common_effects = EVERY, COMMON

@@ -16,6 +16,8 @@ LATE = effect_names(
     "servo_lag", "servo_delay", "servo_rate_limit", "tail_flexibility", "wake_memory"
 )
 """Effects that make the tail or its force late."""
+LATE_SENSORS = effect_names("sensor_delay", "imu_lowpass")
+"""Effects that make what is measured late."""
 BESIDE = (-6e-3, -3e-3, 0.0, 3e-3, 6e-3)
 """Departures from the measured beat that a fit begins from: less than a third of a cycle in a run
 of a minute."""

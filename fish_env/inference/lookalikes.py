@@ -1,5 +1,7 @@
 """Which of effects that look alike it is: of those that make a drive late, or put it out of step.
 
+What makes the measurements late looks like a late drive.
+
 Of short lags the kind hardly shows. In the long steps of a search the right one may not even be
 possible, as no step follows it, and another one stands in for it. So the question is asked again
 in the steps of published estimates; and beside something unknown, where fits tell kinds of lags
@@ -9,14 +11,13 @@ apart no better than by what they make up for, each is an alternative.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from fish_env.inference.elimination import surely_acts
 from fish_env.inference.estimate.again import finished
-from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
+from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter, where_ended
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.hypotheses import (
@@ -29,6 +30,7 @@ from fish_env.inference.hypotheses import (
 from fish_env.inference.in_place import (
     in_step,
     moved_to_runs,
+    replaced,
     surprising_runs,
     with_lookalike,
     without_causes,
@@ -47,13 +49,14 @@ Pair = tuple[EffectName, EffectName]
 
 
 def late(current: Explanation) -> list[Pair]:
-    """What makes a drive late, each with what else may: short lags differ little but in name.
+    """What makes a drive or its measurements late, each with what else may.
 
-    The linear model is of no help. It begins from sizes at which the one follows another course
-    than the other.
+    Short lags differ little but in name. The linear model is of no help. It begins from sizes at
+    which the one follows another course than the other.
     """
-    hidden = current.fit.problem.hidden_by_drive
-    return pairs_alike(current, hidden, hidden)
+    problem = current.fit.problem
+    names = (*problem.hidden_by_drive, *problem.late_sensors)
+    return pairs_alike(current, names, names)
 
 
 def rates(current: Explanation) -> list[Pair]:
@@ -104,7 +107,8 @@ def asked_of_lags(
         runs = runs.with_refinement()
     else:
         pairs = _within_reach(current.fit, pairs)
-    best, rivals = _asked(runs, current, pairs, POLICY.swap_steps, report)
+    leeway = POLICY.coarse_fit_leeway
+    best, rivals = _asked(runs, current, pairs, POLICY.swap_steps, leeway, report)
     if best is not current:
         best = Explanation(best.causes, finished(best.fit))
     return best, rivals
@@ -121,7 +125,8 @@ def asked_of_rates(
     pairs = _shown(rates(current), shown)
     if pairs:
         current = _on_equal_terms(current)
-    return _asked(current.fit.problem, current, pairs, POLICY.rate_steps, report)
+    leeway = POLICY.evidence_doubt + POLICY.linear_doubt
+    return _asked(current.fit.problem, current, pairs, POLICY.rate_steps, leeway, report)
 
 
 def _without_what_runs_explain(current: Explanation, report: Report) -> Explanation:
@@ -213,6 +218,7 @@ def _asked(
     current: Explanation,
     pairs: Sequence[tuple[CauseId, Signal]],
     steps: int,
+    leeway: float,
     report: Report,
 ) -> tuple[Explanation, tuple[Explanation, ...]]:
     """The best of an explanation and those with look-alikes in it, and those as good.
@@ -222,14 +228,16 @@ def _asked(
         current: causes with their fit; where it was made in other steps it does not compete.
         pairs: causes, each with the signal of what looks like it.
         steps: most Gauss-Newton steps of each fit.
+        leeway: by how much the objective of a rival may be larger. Of residuals with a colour the
+            evidence tells less than their objectives do.
         report: told what is being done.
     """
     own, found = current.fit, list[Explanation]()
     coarse = runs is not own.problem
-    enough = np.inf if coarse else own.objective + POLICY.evidence_doubt + POLICY.linear_doubt
-    closest = _closest(runs, current, pairs, steps, report)
+    enough = np.inf if coarse else own.objective + leeway
+    closest = _closest(runs, current, pairs, steps, leeway, report)
     for cause, other, begin in closest[: POLICY.most_lookalikes]:
-        causes = tuple(other if c == cause else c for c in current.causes)
+        causes = _with(other, current, cause)
         report(f"fitting {listed(causes, ' and ')}")
         whole = _fitted(runs, own, cause, begin, steps, enough)
         if whole is not None and whole.objective < enough:
@@ -247,22 +255,39 @@ def _closest(
     current: Explanation,
     pairs: Sequence[tuple[CauseId, Signal]],
     steps: int,
+    leeway: float,
     report: Report,
 ) -> list[tuple[CauseId, EffectName, CoarseFit]]:
-    """Causes, each with a look-alike that fits a few runs as well and its fit, best first."""
+    """Causes, each with a look-alike that a few runs cannot tell from it and its fit, best first.
+
+    See :func:`_asked`.
+    """
     own, few = current.fit, runs.subset(POLICY.few_runs)
     usual = at_noise(few, own, own.noise, steps) if pairs else None
-    least, found = usual.objective if usual else np.inf, []
+    tried = [Explanation(current.causes, usual)] if usual else []
+    least, names = (
+        usual.objective if usual else np.inf,
+        dict[Explanation, tuple[CauseId, EffectName]](),
+    )
     for cause, signal in pairs:
-        report(f"trying {signal.cause.effect} instead of {name_of(cause)}")
-        begin = with_lookalike(own, cause, signal)
-        tried = _fitted(few, own, cause, begin, steps, least + POLICY.evidence_doubt)
-        if tried is not None:
-            begin = replace(begin, point=tried.point, objective=tried.objective)
-            found.append((cause, signal.cause.effect, begin))
-            least = min(least, tried.objective)
-    close = [one for one in found if one[2].objective < least + POLICY.evidence_doubt]
-    return sorted(close, key=lambda one: one[2].objective)
+        other = signal.cause.effect
+        report(f"trying {other} instead of {name_of(cause)}")
+        fitted = _fitted(few, own, cause, with_lookalike(own, cause, signal), steps, least + leeway)
+        if fitted is None:
+            continue
+        least = min(least, fitted.objective)
+        swap = Explanation(_with(other, current, cause), fitted)
+        names[swap] = cause, other
+        # Fits take much memory.
+        tried = [e for e in (*tried, swap) if e.fit.objective <= least + leeway]
+    tried.sort(key=lambda e: e.fit.objective)
+    close = [e for e in tried if as_likely(tried[0], e)]
+    return [(*names[e], where_ended(e.fit)) for e in close if e in names]
+
+
+def _with(other: EffectName, current: Explanation, cause: CauseId) -> tuple[CauseId, ...]:
+    """Causes of an explanation with another effect in the place of one of them."""
+    return tuple(other if c == cause else c for c in current.causes)
 
 
 def _fitted(
@@ -276,6 +301,49 @@ def _fitted(
     if kept is None:
         return None
     return at_noise(kept, begin, own.noise, steps, enough)
+
+
+def still_alike(
+    found: Explanation, before: Explanation, rivals: Sequence[Explanation], report: Report
+) -> tuple[Explanation, ...]:
+    """Those of an explanation's rivals that have another lag, beside the causes it still has.
+
+    Args:
+        found: the explanation, perhaps without some of its causes.
+        before: the explanation with all of them.
+        rivals: what could not be told from that.
+        report: told what is being done.
+    """
+    alike, pairs = list[Explanation](), late(found)
+    for rival in rivals:
+        swap = _swap(before, rival)
+        if swap in pairs:
+            other = rival if found is before else _beside_fewer(found, *swap, rival, report)
+            if other and as_likely(found, other):
+                alike.append(other)
+    return tuple(alike)
+
+
+def _swap(before: Explanation, rival: Explanation) -> tuple[CauseId, CauseId] | None:
+    """The cause and what has its place, if two explanations differ in one of their causes."""
+    if len(before.causes) != len(rival.causes):
+        return None
+    swaps = [(a, b) for a, b in zip(before.causes, rival.causes, strict=True) if a != b]
+    return swaps[0] if len(swaps) == 1 else None
+
+
+def _beside_fewer(
+    found: Explanation, cause: CauseId, other: EffectName, rival: Explanation, report: Report
+) -> Explanation | None:
+    """An explanation with another effect in the place of a cause, at its values in a rival."""
+    own = found.fit
+    report(f"fitting {other} instead of {name_of(cause)}")
+    effects, kept = replaced(own, cause, other)
+    values = of_effects(rival.fit.point.effects, {other})
+    begin = CoarseFit(effects, own.released, Point(own.point.z, {**kept, **values}), np.inf)
+    enough = own.objective + POLICY.coarse_fit_leeway
+    fitted = _fitted(own.problem, own, cause, begin, POLICY.swap_steps, enough)
+    return None if fitted is None else Explanation(_with(other, found, cause), fitted)
 
 
 def undecided(current: Explanation, shown: Screen, report: Report) -> tuple[Explanation, ...]:
@@ -299,8 +367,7 @@ def undecided(current: Explanation, shown: Screen, report: Report) -> tuple[Expl
         report(f"fitting {other}, which explains nearly as much as {name_of(cause)}")
         fitted = at_noise(own.problem, coarse, own.noise, POLICY.swap_steps)
         if fitted is not None:
-            causes = tuple(other if c == cause else c for c in current.causes)
-            found.append(Explanation(causes, fitted))
+            found.append(Explanation(_with(other, current, cause), fitted))
     return tuple(found)
 
 

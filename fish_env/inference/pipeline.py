@@ -25,7 +25,7 @@ from fish_env.inference.estimate.again import finished, refined, to_publish, to_
 from fish_env.inference.estimate.fit import FEWER_STEPS, Fit, fit
 from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.gain import gap_closed
-from fish_env.inference.lookalikes import decided, undecided
+from fish_env.inference.lookalikes import decided, still_alike, undecided
 from fish_env.inference.partial import Describe, confirmed
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause, causes_of
@@ -177,7 +177,9 @@ def partly(
     found = sustained(found, rng, report) if found else None
     if found is None:
         return attribution, verdict
-    found, rivals = decided(found, attribution.shown, report)
+    found, rates = decided(found, attribution.shown, report)
+    lags = still_alike(found, attribution.accepted, attribution.rivals, report)
+    rivals = (*rates, *lags)
     if disturbance_at_limit(found.fit):
         rivals = (*rivals, *undecided(found, attribution.shown, report))
     shared = {*found.causes}.intersection(*(other.causes for other in rivals))

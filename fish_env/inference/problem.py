@@ -52,6 +52,7 @@ class Problem(Protocol):
         baseline: coefficients with their priors.
         effects: names of effects that are free from the start.
         hidden_by_drive: effects that put a drive out of step, and that a disturbance may hide.
+        late_sensors: effects that make what is measured late.
         longest_step: longest simulation step (s).
         longest_run: length of the longest run (s).
         run_count: number of runs.
@@ -68,6 +69,7 @@ class Problem(Protocol):
     baseline: Coefficients
     effects: tuple[str, ...] = ()
     hidden_by_drive: tuple[EffectName, ...] = ()
+    late_sensors: tuple[EffectName, ...] = ()
     out_of_step: tuple[EffectName, ...] = ()
     interchangeable: tuple[frozenset[Coefficient], ...] = ()
     variations: tuple[RunVariation, ...] = ()

@@ -18,7 +18,7 @@ from typing import Any
 
 from fish_env.inference.adequacy import beyond_plausible
 from fish_env.inference.estimate.again import following
-from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
+from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter, where_ended
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.estimate.settle import usual_runs
 from fish_env.inference.explanation import Explanation, fitted_again, reached
@@ -138,8 +138,7 @@ class Trials:
         found = reached(lambda: fit(runs, *start, refit_noise=False, iterations=steps))
         if found is None:
             return None
-        # The fit itself takes much memory, and there are many.
-        return CoarseFit(found.effects, found.released, found.point, found.objective)
+        return where_ended(found)  # the fit itself takes much memory, and there are many
 
 
 def _closest(

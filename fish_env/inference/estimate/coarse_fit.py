@@ -47,6 +47,11 @@ class CoarseFit:
     objective: float
 
 
+def where_ended(fit: Fit) -> CoarseFit:
+    """Where a fit ended, without what it takes memory for."""
+    return CoarseFit(fit.effects, fit.released, fit.point, fit.objective)
+
+
 class CoarseFitter:
     """Coarse fits on a few runs of a fit, with the gains of its filter.
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.explanation import Explanation
@@ -11,6 +12,7 @@ from fish_env.inference.lookalikes import (
     decided,
     late,
     rates,
+    still_alike,
     undecided,
 )
 from fish_env.inference.probes import causes_of
@@ -186,3 +188,68 @@ def test_explanations_of_fewer_causes_are_rivals_and_not_the_same():
     both = Explanation((LAG, LIMIT), fit(stated, [LAG, LIMIT]))
     one = Explanation((LAG,), fit(stated, [LAG]))
     assert rivals_of(both, [one]) == (one,)
+
+
+def coloured(share):
+    """Runs in which a lag acts, beside residuals that stay for long."""
+    rng = np.random.default_rng(2)
+    x, own, y, white = rng.standard_normal((4, RUNS, SAMPLES))
+    noise = lfilter([1.0], [1.0, -0.9], white, axis=1)
+    x, own = (lfilter([1.0], [1.0, -0.9], one, axis=1) for one in (x, own))
+    like = share * x + np.sqrt(1.0 - share**2) * own
+
+    def residuals(z, effects):
+        left = (0.5 - effects[size_of(LAG)]) * x - effects[size_of(LIMIT)] * like
+        return noise + 5.0 * left - z[0] * y
+
+    known = (effect(LAG, confusable_with=(LIMIT,)), effect(LIMIT, confusable_with=(LAG,)))
+    stated = Stated(residuals, known)
+    stated.hidden_by_drive, stated.drive = (LAG, LIMIT), Drive(uneven=True)
+    return stated
+
+
+def test_residuals_of_one_colour_do_not_tell_lags_apart():
+    """Were they white, the evidence would be decisive: it differs by 27."""
+    stated = coloured(0.99)
+    scores = [Explanation((name,), fit(stated, [name])).score for name in (LAG, LIMIT)]
+    assert scores[1] - scores[0] > 20.0
+    best, alike = asked_of_lags(*explained(stated, LAG), [].append)
+    assert (best.causes, [e.causes for e in alike]) == ((LAG,), [(LIMIT,)])
+
+
+def test_a_late_drive_is_compared_with_late_sensors():
+    stated = problem(1.0 - 1e-6)
+    stated.hidden_by_drive, stated.late_sensors = (LAG,), (LIMIT,)
+    best, alike = asked_of_lags(*explained(stated, LAG), [].append)
+    assert {best.causes, *(e.causes for e in alike)} == {(LAG,), (LIMIT,)}
+
+
+def beside_another(share):
+    """A problem with a further effect, and the explanations of two lags, each beside that."""
+    stated = problem(share)
+    plain = stated.residuals
+    other = np.random.default_rng(5).standard_normal((RUNS, SAMPLES))
+    stated.residuals = lambda z, effects: plain(z, effects) - effects[size_of("other")] * other
+    stated.known = {**stated.known, "other": effect("other")}
+    return [Explanation(names, fit(stated, names)) for names in ((LAG, "other"), (LIMIT, "other"))]
+
+
+@pytest.mark.parametrize(("share", "alike"), [(1.0 - 1e-6, [(LIMIT,)]), (0.9, [])])
+def test_a_rival_lag_is_asked_again_beside_fewer_causes(share, alike):
+    before, rival = beside_another(share)
+    fewer = Explanation((LAG,), fit(before.fit.problem, [LAG]))
+    assert [e.causes for e in still_alike(fewer, before, [rival], [].append)] == alike
+
+
+def test_a_rival_lag_stays_one_beside_the_same_causes():
+    before, rival = beside_another(1.0 - 1e-6)
+    told = []
+    assert still_alike(before, before, [rival], told.append) == (rival,)
+    assert not told
+
+
+def test_what_differs_in_more_than_a_lag_is_no_rival_lag():
+    before, rival = beside_another(1.0 - 1e-6)
+    alone = Explanation((LIMIT,), fit(before.fit.problem, [LIMIT]))
+    crossed = Explanation(("other", LIMIT), rival.fit)
+    assert still_alike(before, before, [alone, crossed], [].append) == ()

@@ -38,7 +38,7 @@ from fish_env.inference.in_place import (
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
 from fish_env.inference.projection import Signal
-from fish_env.inference.rivals import as_likely, rivals_of
+from fish_env.inference.rivals import alike, as_likely, rivals_of
 from fish_env.inference.screening import Screen
 from fish_env.inference.search import at_noise
 from fish_env.inference.substitution import swapped, what_may_lack
@@ -258,31 +258,23 @@ def _closest(
     leeway: float,
     report: Report,
 ) -> list[tuple[CauseId, EffectName, CoarseFit]]:
-    """Causes, each with a look-alike that a few runs cannot tell from it and its fit, best first.
+    """Causes, each with a look-alike that explains as much in a few runs and its fit, best first.
 
     See :func:`_asked`.
     """
     own, few = current.fit, runs.subset(POLICY.few_runs)
     usual = at_noise(few, own, own.noise, steps) if pairs else None
-    tried = [Explanation(current.causes, usual)] if usual else []
-    least, names = (
-        usual.objective if usual else np.inf,
-        dict[Explanation, tuple[CauseId, EffectName]](),
-    )
+    least = usual.objective if usual else np.inf
+    behind, found = leeway * few.run_count / runs.run_count, []
     for cause, signal in pairs:
         other = signal.cause.effect
         report(f"trying {other} instead of {name_of(cause)}")
-        fitted = _fitted(few, own, cause, with_lookalike(own, cause, signal), steps, least + leeway)
-        if fitted is None:
-            continue
-        least = min(least, fitted.objective)
-        swap = Explanation(_with(other, current, cause), fitted)
-        names[swap] = cause, other
-        # Fits take much memory.
-        tried = [e for e in (*tried, swap) if e.fit.objective <= least + leeway]
-    tried.sort(key=lambda e: e.fit.objective)
-    close = [e for e in tried if as_likely(tried[0], e)]
-    return [(*names[e], where_ended(e.fit)) for e in close if e in names]
+        tried = _fitted(few, own, cause, with_lookalike(own, cause, signal), steps, least + behind)
+        if tried is not None:
+            found.append((cause, other, where_ended(tried)))
+            least = min(least, tried.objective)
+    close = [one for one in found if one[2].objective < least + behind]
+    return sorted(close, key=lambda one: one[2].objective)
 
 
 def _with(other: EffectName, current: Explanation, cause: CauseId) -> tuple[CauseId, ...]:
@@ -314,14 +306,16 @@ def still_alike(
         rivals: what could not be told from that.
         report: told what is being done.
     """
-    alike, pairs = list[Explanation](), late(found)
+    still, pairs = list[Explanation](), late(found)
     for rival in rivals:
         swap = _swap(before, rival)
-        if swap in pairs:
-            other = rival if found is before else _beside_fewer(found, *swap, rival, report)
-            if other and as_likely(found, other):
-                alike.append(other)
-    return tuple(alike)
+        if swap not in pairs:
+            continue
+        if found is before:
+            still.append(rival)
+        elif (other := _beside_fewer(found, *swap, rival, report)) and alike(found, other):
+            still.append(other)
+    return tuple(still)
 
 
 def _swap(before: Explanation, rival: Explanation) -> tuple[CauseId, CauseId] | None:

@@ -25,7 +25,7 @@ from fish_env.inference.estimate.free import (
 from fish_env.inference.estimate.gauss_newton import Linearise, Quadratic, descend
 from fish_env.inference.estimate.information import gradient, information, leverage, prior_precision
 from fish_env.inference.estimate.joint import descend_jointly
-from fish_env.inference.estimate.rounds import Reached, last, noise_gain, noise_of
+from fish_env.inference.estimate.rounds import Reached, last, noise_of
 from fish_env.inference.estimate.run_variation import Marginal
 from fish_env.inference.estimate.slopes import Slopes
 from fish_env.inference.evaluation import Evaluation
@@ -223,8 +223,6 @@ def fit(
         noise = noise_of(slopes, problem, vector, filtered, round_ > 0)
         if reached.noise.is_close(noise, POLICY.same_noise):
             break
-        if noise_gain(problem, free.unpack(vector), noise, filtered) < POLICY.evidence_doubt:
-            break  # it says little that parameters were not told before
     if refit_noise:
         reached = reached or Reached(problem, vector, None, np.inf)
         problem, vector, slopes, filtered, value, marginal = last(reached, free, noise, filtered)

@@ -14,7 +14,7 @@ from fish_env.inference.estimate.run_variation import Marginal
 from fish_env.inference.estimate.settle import predicted_variation
 from fish_env.inference.estimate.slopes import Slopes
 from fish_env.inference.evaluation import Evaluation
-from fish_env.inference.problem import Point, Problem
+from fish_env.inference.problem import Problem
 
 
 class Reached(NamedTuple):
@@ -91,21 +91,6 @@ def noise_of(
     followed = partial(_leverage, slopes, problem, vector, filtered)
     point = slopes.free.unpack(vector)
     return problem.fitted_noise(point, slopes.noise, final, filtered, followed)
-
-
-def noise_gain(problem: Problem, point: Point, noise: Any, filtered: Sequence[Evaluation]) -> float:
-    """What -2 log likelihood falls by under another noise model, at the same point.
-
-    Args:
-        problem: the problem.
-        point: where it was evaluated.
-        noise: the other noise model.
-        filtered: the evaluation under the noise model before.
-    """
-    again = problem.filtered(point, noise, filtered)
-    return 2.0 * sum(
-        b.log_likelihood - a.log_likelihood for a, b in zip(filtered, again, strict=True)
-    )
 
 
 def _leverage(

@@ -6,10 +6,14 @@ import ctypes
 import sys
 from functools import cache
 
-M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3
+M_TRIM_THRESHOLD, M_TOP_PAD, M_MMAP_THRESHOLD = -1, -2, -3
 """Options of glibc's ``mallopt``, as <malloc.h> numbers them."""
-LARGE = 2**20
-"""Size of an array (bytes) from which on it has memory of its own."""
+LARGE = 2**16
+"""Size of an array (bytes) from which on it has memory of its own: less than the residuals of a run
+of half a minute take."""
+SPARE = LARGE // 2
+"""By how much more than needed the memory for small arrays grows (bytes): a large one that fitted
+there would keep it from shrinking."""
 
 
 @cache
@@ -28,4 +32,5 @@ def give_back_large_arrays() -> bool:
         mallopt = ctypes.CDLL(None).mallopt
     except (OSError, AttributeError):
         return False
-    return bool(mallopt(M_MMAP_THRESHOLD, LARGE)) and bool(mallopt(M_TRIM_THRESHOLD, LARGE))
+    options = {M_MMAP_THRESHOLD: LARGE, M_TRIM_THRESHOLD: LARGE, M_TOP_PAD: SPARE}
+    return all([mallopt(option, size) for option, size in options.items()])

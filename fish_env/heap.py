@@ -33,4 +33,4 @@ def give_back_large_arrays() -> bool:
     except (OSError, AttributeError):
         return False
     options = {M_MMAP_THRESHOLD: LARGE, M_TRIM_THRESHOLD: LARGE, M_TOP_PAD: SPARE}
-    return all([mallopt(option, size) for option, size in options.items()])
+    return all(mallopt(option, size) for option, size in options.items())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,13 +23,15 @@ from fish_env.inference.starts import probed
 from fish_env.inference.substitution import in_parts, limit_at, limit_of, substituted, without
 from fish_env.inference.trials import tried_out
 
+Report = Callable[[str], None]
+
 
 def pursue(
     current: Explanation,
     shown: Screen,
     causes: Sequence[Cause],
     rng: np.random.Generator,
-    report: Callable[[str], None],
+    report: Report,
     least: float,
     relaxed_log_p: float,
 ) -> tuple[Explanation, Screen, list[tuple[CauseId, CauseId]]]:
@@ -49,50 +52,104 @@ def pursue(
         The explanation, its screen, and causes that took the place of another effect on the way,
         each with that effect.
     """
-    problem = current.fit.problem
-    if not shortlisted(problem, shown, 1, least, relaxed_log_p):
+    if not shortlisted(current.fit.problem, shown, 1, least, relaxed_log_p):
         return current, shown, []
-    begun, replaced = current, []
-    current, shown = _simplified(current, shown, causes, rng, report)
+    pursuit = Pursuit(causes, rng, report, least, relaxed_log_p)
+    first = current.causes
+    current, shown = pursuit.simplified(current, shown)
     if disturbance_at_limit(current.fit):
         varied = current.varied(beside_misfit=True)
         if varied.score < current.score - POLICY.evidence_doubt:
-            current, shown = varied, screen(varied.fit, causes, rng)
-    fewest, hidden = 1, True
-    for _ in range(POLICY.most_single_searches):
-        if not disturbance_at_limit(current.fit):
-            break
-        kept = beside(current, shown)
-        more = tried_out(current, kept, report) if hidden else None
-        # Where none shows from the fit itself, none will beside one cause more.
-        hidden = more is not None or problem.swamped(current.fit.noise)
-        more = more or pursued(current, kept, report, least, relaxed_log_p, most=1)
-        if more is current:
-            fewest = 2
-            break
-        more, shown = _simplified(more, screen(more.fit, causes, rng), causes, rng, report)
-        current = _against_likes(more, shown, report)
-        if current is not more:
-            replaced += [p for p in zip(current.causes, more.causes, strict=True) if p[0] != p[1]]
-            shown = screen(current.fit, causes, rng)
-    for _ in range(POLICY.pursuits):
-        kept = beside(current, shown)
-        more = pursued(current, kept, report, least, relaxed_log_p, fewest=fewest)
-        if more is current:
-            break
-        fewest = 1
-        current, shown = more, screen(more.fit, causes, rng)
-        current, shown = _simplified(current, shown, causes, rng, report)
-        if disturbance_at_limit(current.fit):
-            # Much is still unknown, and what would be picked next stands in for it.
-            current = _told_apart(current, begun.causes, shown)
-            break
+            current, shown = varied, pursuit.screened(varied)
+    current, shown, replaced, none_alone = pursuit.one_at_a_time(current, shown)
+    current, shown = pursuit.many_at_a_time(current, shown, first, 2 if none_alone else 1)
     return current, shown, replaced
 
 
-def _against_likes(
-    current: Explanation, shown: Screen, report: Callable[[str], None]
-) -> Explanation:
+@dataclass(frozen=True, eq=False)
+class Pursuit:
+    """How further causes are found; the attributes are arguments of :func:`pursue`."""
+
+    causes: Sequence[Cause]
+    rng: np.random.Generator
+    report: Report
+    least: float
+    relaxed_log_p: float
+
+    def screened(self, current: Explanation) -> Screen:
+        """All causes against an explanation."""
+        return screen(current.fit, self.causes, self.rng)
+
+    def one_at_a_time(
+        self, current: Explanation, shown: Screen
+    ) -> tuple[Explanation, Screen, list[tuple[CauseId, CauseId]], bool]:
+        """Causes beside a disturbance of implausible strength, while there is one.
+
+        Returns:
+            The explanation, its screen, causes that took the place of another effect, each with
+            that effect, and whether at last no cause alone was of use.
+        """
+        replaced: list[tuple[CauseId, CauseId]] = []
+        hidden = True
+        for _ in range(POLICY.most_single_searches):
+            if not disturbance_at_limit(current.fit):
+                break
+            more = tried_out(current, beside(current, shown), self.report) if hidden else None
+            # Where none shows from the fit itself, none will beside one cause more.
+            hidden = more is not None or current.fit.problem.swamped(current.fit.noise)
+            more = more or self._pursued(current, shown, most=1)
+            if more is current:
+                return current, shown, replaced, True
+            more, shown = self.simplified(more, self.screened(more))
+            current = _against_likes(more, shown, self.report)
+            if current is not more:
+                pairs = zip(current.causes, more.causes, strict=True)
+                replaced += [pair for pair in pairs if pair[0] != pair[1]]
+                shown = self.screened(current)
+        return current, shown, replaced, False
+
+    def many_at_a_time(
+        self, current: Explanation, shown: Screen, first: Sequence[CauseId], fewest: int
+    ) -> tuple[Explanation, Screen]:
+        """Causes that are needed together, as long as there are more.
+
+        Args:
+            current: causes found so far.
+            shown: all causes against it.
+            first: those of them that were found before the others.
+            fewest: causes that have to show at first.
+        """
+        for _ in range(POLICY.pursuits):
+            more = self._pursued(current, shown, fewest=fewest)
+            if more is current:
+                break
+            fewest = 1
+            current, shown = self.simplified(more, self.screened(more))
+            if disturbance_at_limit(current.fit):
+                # Much is still unknown, and what would be picked next stands in for it.
+                return _told_apart(current, first, shown), shown
+        return current, shown
+
+    def _pursued(self, current: Explanation, shown: Screen, **limits: int) -> Explanation:
+        kept = beside(current, shown)
+        return pursued(current, kept, self.report, self.least, self.relaxed_log_p, **limits)
+
+    def simplified(self, current: Explanation, shown: Screen) -> tuple[Explanation, Screen]:
+        """The explanation, and its screen, with effects that act as a simpler one does replaced.
+
+        What is found first makes up for part of what is missing. An effect that has another one as
+        its limit is found in the other's place then, and comes near the limit as more is explained.
+        """
+        for cause in current.causes:
+            if not limit_of(current.fit, cause):
+                continue
+            simpler = in_parts(current, cause, self.report)
+            if simpler and simpler.score < current.score + POLICY.evidence_doubt:
+                return simpler, self.screened(simpler)
+        return current, shown
+
+
+def _against_likes(current: Explanation, shown: Screen, report: Report) -> Explanation:
     """The explanation after effects known to look like its last cause were tried in its place.
 
     Beside a large misfit the linear model tells little. Fits do, once what the runs differ in has
@@ -105,27 +162,6 @@ def _against_likes(
     alike = [s for s in substitutes(current, shown) if s.cause == last and s.name in known]
     pairs = [(last, signals[s.name]) for s in alike[: POLICY.most_lookalikes]]
     return substituted(current, pairs, 1, report, beside_misfit=True)[0]
-
-
-def _simplified(
-    current: Explanation,
-    shown: Screen,
-    causes: Sequence[Cause],
-    rng: np.random.Generator,
-    report: Callable[[str], None],
-) -> tuple[Explanation, Screen]:
-    """The explanation, and its screen, with effects that act as a simpler one does replaced by it.
-
-    What is found first makes up for part of what is missing. An effect that has another one as its
-    limit is found in the other's place then, and comes near the limit as more is explained.
-    """
-    for cause in current.causes:
-        if not limit_of(current.fit, cause):
-            continue
-        simpler = in_parts(current, cause, report)
-        if simpler and simpler.score < current.score + POLICY.evidence_doubt:
-            return simpler, screen(simpler.fit, causes, rng)
-    return current, shown
 
 
 def beside(current: Explanation, shown: Screen) -> Screen:
@@ -173,7 +209,7 @@ def challenged(
     current: Explanation,
     shown: Screen,
     rivals: Sequence[Explanation],
-    report: Callable[[str], None],
+    report: Report,
     replaced: Sequence[tuple[CauseId, CauseId]] = (),
 ) -> tuple[Explanation, tuple[Explanation, ...]]:
     """The explanation after the effects closest to its causes were tried in their place.

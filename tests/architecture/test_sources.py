@@ -8,7 +8,9 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-MAX_LINES = 400
+MAX_LINES, MAX_FUNCTION = 400, 60
+SHORT = ("inference", "rigidbody", "identification", "diagnosis")
+"""Folders whose functions each hold one step of the inference. Templates are compiled whole."""
 CODE = ("agents", "configs", "examples", "fish_env", "scripts", "tests")
 SOURCES = sorted(file for folder in CODE for file in (ROOT / folder).rglob("*.py"))
 PUBLIC = [
@@ -53,6 +55,32 @@ def public(tree: ast.Module | ast.ClassDef, prefix: str) -> Iterator[tuple[str, 
 @pytest.mark.parametrize("file", SOURCES, ids=name)
 def test_a_file_has_at_most_400_lines(file):
     assert len(file.read_text(encoding="utf-8").splitlines()) <= MAX_LINES
+
+
+def long_functions(source: str) -> list[str]:
+    """Names of functions of more lines than one step of a computation needs."""
+    nodes = ast.walk(ast.parse(source))
+    functions = [n for n in nodes if isinstance(n, ast.FunctionDef | ast.AsyncFunctionDef)]
+    return [f.name for f in functions if (f.end_lineno or 0) - f.lineno >= MAX_FUNCTION]
+
+
+INFERRING = [
+    file
+    for folder in SHORT
+    for file in sorted((ROOT / "fish_env" / folder).rglob("*.py"))
+    if not file.stem.endswith("_template")
+]
+
+
+@pytest.mark.parametrize("file", INFERRING, ids=name)
+def test_a_function_of_the_inference_has_at_most_60_lines(file):
+    assert long_functions(file.read_text(encoding="utf-8")) == []
+
+
+def test_the_length_check_notices_a_long_function():
+    body = "    x = 1\n" * MAX_FUNCTION
+    assert long_functions("def f():\n" + body) == ["f"]
+    assert long_functions("def f():\n" + body[: -len("    x = 1\n")]) == []
 
 
 @pytest.mark.parametrize("file", PUBLIC, ids=name)

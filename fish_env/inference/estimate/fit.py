@@ -190,31 +190,46 @@ def fit(
     values = {**problem.beginning(names), **given.effects}
     vector = free.bounds.clip(free.pack(Point(given.z, values)))
     noise = noise or problem.default_noise()
+    limits = (iterations, tolerance, give_up_above)
+    if refit_noise:
+        found = _in_turns(problem, free, vector, noise, limits, rounds, report)
+        problem, vector, slopes, filtered, value, marginal = found
+    else:
+        report("fitting parameters")
+        problem, slopes = problem.settled(free.unpack(vector), noise), Slopes(free, noise)
+        problem, vector, value, filtered, marginal = _descended(problem, slopes, vector, limits, ())
+    return _finish(problem, slopes, names, vector, value, filtered, marginal)
+
+
+def _in_turns(
+    problem: Problem,
+    free: Free,
+    vector: FloatArray,
+    noise: Any,
+    limits: tuple[int, float, float],
+    rounds: int,
+    report: Callable[[str], None],
+) -> tuple[Problem, FloatArray, Slopes, Sequence[Evaluation], float, Marginal | None]:
+    """Parameters and noise, each fitted beside the other.
+
+    The limits of a round are most steps, the tolerance, and the objective to give up at.
+    """
     filtered: Sequence[Evaluation] = ()
-    marginal: Marginal | None = None
     reached: Reached | None = None
-    for round_ in range(rounds if refit_noise else 1):
+    for round_ in range(rounds):
         report(f"fitting parameters, round {round_ + 1}")
-        limits = (iterations, tolerance, give_up_above)
+        slopes = Slopes(free, noise)
         try:
             begun = problem.settled(free.unpack(vector), noise)
-            slopes = Slopes(free, noise)
             if spread_of(begun, noise).any():
                 filtered = ()  # of other noise, and large
-                problem, vector, value, filtered, marginal = descend_jointly(
-                    begun, slopes, vector, *limits
-                )
-            else:
-                vector, value, filtered = gauss_newton(
-                    begun, slopes, vector, *limits, near=filtered
-                )
-                problem = begun
+            problem, vector, value, filtered, _ = _descended(
+                begun, slopes, vector, limits, filtered
+            )
         except np.linalg.LinAlgError:
             if reached is None:
                 raise
             value = np.inf  # a filter that follows the data less is not stable beside this model
-        if not refit_noise:
-            break
         if reached is not None and not value < reached.value:
             problem, vector, noise, filtered = *reached[:3], ()
             break
@@ -223,10 +238,24 @@ def fit(
         noise = noise_of(slopes, problem, vector, filtered, round_ > 0)
         if reached.noise.is_close(noise, POLICY.same_noise):
             break
-    if refit_noise:
-        reached = reached or Reached(problem, vector, None, np.inf)
-        problem, vector, slopes, filtered, value, marginal = last(reached, free, noise, filtered)
-    return _finish(problem, slopes, names, vector, value, filtered, marginal)
+    return last(reached or Reached(problem, vector, None, np.inf), free, noise, filtered)
+
+
+def _descended(
+    problem: Problem,
+    slopes: Slopes,
+    vector: FloatArray,
+    limits: tuple[int, float, float],
+    near: Sequence[Evaluation],
+) -> tuple[Problem, FloatArray, float, Sequence[Evaluation], Marginal | None]:
+    """Gauss-Newton steps by the shared parameters, and by the runs' own numbers where they differ.
+
+    As :func:`~fish_env.inference.estimate.joint.descend_jointly` returns it.
+    """
+    if spread_of(problem, slopes.noise).any():
+        return descend_jointly(problem, slopes, vector, *limits)
+    vector, value, filtered = gauss_newton(problem, slopes, vector, *limits, near=near)
+    return problem, vector, value, filtered, None
 
 
 def gauss_newton(

@@ -62,13 +62,7 @@ def descend_jointly(
     Raises:
         LinAlgError: the simulation diverges where the steps begin.
     """
-    free, noise = slopes.free, slopes.noise
-    at = evaluated(problem, free, vector, noise)
-    if not np.isfinite(at.value):
-        at = _without_lost_numbers(at, free, noise)
-    if not np.isfinite(at.value):
-        raise np.linalg.LinAlgError("the simulation diverges at the start of the fit")
-    at = _agreed(at, free, noise)
+    at = _begun(problem, slopes.free, vector, slopes.noise)
     left, exact, first, kept = iterations, True, 0, 1.0
     model: Model | None = None
     while left:
@@ -79,7 +73,7 @@ def descend_jointly(
             break
         better, used = None, first
         if predicted >= tolerance**2:
-            better, used = _better(model, noise, at, first)
+            better, used = _better(model, slopes.noise, at, first)
         gained = 0.0 if better is None else at.value - better.value
         at = better or at
         del better  # an evaluation takes much memory
@@ -97,6 +91,20 @@ def descend_jointly(
         marginal = slopes.marginal(at.problem, at.vector, at.filtered)
     assert marginal is not None
     return at.problem, at.vector, at.marginal_value(marginal), at.filtered, marginal
+
+
+def _begun(problem: Problem, free: Free, vector: FloatArray, noise: Any) -> Joint:
+    """Where steps begin.
+
+    Raises:
+        LinAlgError: the simulation diverges there.
+    """
+    at = evaluated(problem, free, vector, noise)
+    if not np.isfinite(at.value):
+        at = _without_lost_numbers(at, free, noise)
+    if not np.isfinite(at.value):
+        raise np.linalg.LinAlgError("the simulation diverges at the start of the fit")
+    return _agreed(at, free, noise)
 
 
 def _without_lost_numbers(at: Joint, free: Free, noise: Any) -> Joint:

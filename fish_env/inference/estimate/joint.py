@@ -66,7 +66,9 @@ def descend_jointly(
     left, exact, first, kept = iterations, True, 0, 1.0
     model: Model | None = None
     while left:
-        model = Model(slopes, at, None if exact else model)
+        near = None if exact or model is None else model.own
+        model = None  # it takes much memory, and goes before the next is worked out
+        model = Model(slopes, at, near)
         predicted = at.value - model.foreseen(*model.step(0.0))
         # What promised more than it kept will do so again.
         if at.value - left * kept * predicted > give_up_above:

@@ -91,11 +91,11 @@ class Model:
     Args:
         slopes: the shared parameters, the noise model, and the slopes on the way.
         at: the point.
-        near: a model whose slopes by own numbers and coefficients are near enough; None to work
-            out all of them.
+        near: slopes by own numbers that are near enough, as those by coefficients at the same
+            point then are; None to work out all of them.
     """
 
-    def __init__(self, slopes: Slopes, at: Joint, near: Model | None) -> None:
+    def __init__(self, slopes: Slopes, at: Joint, near: Marginal | None) -> None:
         problem, free, noise = at.problem, slopes.free, slopes.noise
         self.free, self.at, self.exact = free, at, near is None
         self.bounds = free.bounds.beside(at.vector)
@@ -108,7 +108,7 @@ class Model:
         if near is None:
             own = slopes.marginal(problem, at.vector, at.filtered)
         else:
-            moved = replace(near.own, at=problem.variation[:, self.active] / self.spread)
+            moved = replace(near, at=problem.variation[:, self.active] / self.spread)
             own = slopes.alike(moved, problem, self.lin)
         assert own is not None
         self.own: Marginal = own

@@ -11,7 +11,11 @@ import numpy as np
 from fish_env.inference.adequacy import disturbance_at_limit, implausible_estimates
 from fish_env.inference.drive import beside_drive, drifting, measured, under_relaxed_noise
 from fish_env.inference.effort import FULL, Effort
-from fish_env.inference.elimination import backward_elimination, without_idle
+from fish_env.inference.elimination import (
+    backward_elimination,
+    without_idle,
+    without_ordinary_coefficients,
+)
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import CauseId, Coefficient
@@ -28,7 +32,12 @@ from fish_env.inference.ranking import Ranked, ranking_of
 from fish_env.inference.rivals import agreed, explained_away, rivals_of, tied
 from fish_env.inference.screening import Screen, screen
 from fish_env.inference.search import refits, restart_from_winner
-from fish_env.inference.shortlist import like, newly_shown, shortlisted
+from fish_env.inference.shortlist import (
+    like,
+    newly_shown,
+    shortlisted,
+    threshold_of_coefficients,
+)
 from fish_env.inference.trials import tried_out
 
 
@@ -149,20 +158,31 @@ def extended(
         return begun  # settled before
     if effort.retries:
         found = search.in_common(found)
-    return settled(found, effort.retries, report)
+    return settled(found, effort.retries, report, relaxed_log_p)
 
 
-def settled(found: Attribution, thoroughly: bool, report: Callable[[str], None]) -> Attribution:
+def settled(
+    found: Attribution,
+    thoroughly: bool,
+    report: Callable[[str], None],
+    relaxed_log_p: float = 0.0,
+) -> Attribution:
     """The attribution without causes that are not needed, its estimates fitted to the end.
 
     Args:
         found: what the search has found.
         thoroughly: whether estimates are to be published.
         report: told what is being done.
+        relaxed_log_p: added to the log p-value that makes a coefficient significant.
     """
+
+    def threshold(others: int) -> float:
+        return threshold_of_coefficients(found.shown, others) + relaxed_log_p
+
     if found.accepted.causes:
         report("removing unnecessary causes")
-    current, unnecessary = backward_elimination(found.accepted)
+    current = without_ordinary_coefficients(found.accepted, threshold, report)
+    current, unnecessary = backward_elimination(current)
     failed = found.failed if current.causes == found.accepted.causes else frozenset()
     alike: tuple[Explanation, ...] = ()
     # What else is missing moves estimates by more than a few steps more would.

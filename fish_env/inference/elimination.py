@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 from scipy.special import chdtri
@@ -17,6 +18,7 @@ from fish_env.inference.hypotheses import (
     EffectName,
     EffectParameterId,
     ParameterId,
+    name_of,
 )
 from fish_env.inference.policy import POLICY
 from fish_env.inference.rivals import rivals_of
@@ -97,6 +99,46 @@ def without_idle(found: Explanation) -> Explanation:
     least = POLICY.evidence_doubt + sum(allowed_loss(found.fit, cause) for cause in idle)
     smaller = without(found, idle, least) if idle else None
     return smaller if smaller and smaller.score < found.score + least else found
+
+
+def without_ordinary_coefficients(
+    current: Explanation, threshold: Callable[[int], float], report: Callable[[str], None]
+) -> Explanation:
+    """The explanation without coefficients that need not be wrong beside its effects.
+
+    What was missing when a coefficient was accepted pulled at it. Beside all causes its departure,
+    in the spread of its prior and of its estimate, has to be as significant as that of any cause.
+    It stays where the fit without it loses more than the linear model foresees.
+
+    Args:
+        current: causes with their fit.
+        threshold: log p-value to pass, for a number of other coefficients.
+        report: told what is being done.
+    """
+    while lifted := [name for name in current.causes if isinstance(name, Coefficient)]:
+        weakest, enough = max(lifted, key=partial(agrees, current.fit)), threshold(len(lifted) - 1)
+        alone = len(lifted) == len(current.causes)
+        if alone or agrees(current.fit, weakest) < enough:
+            break
+        report(f"fitting without {name_of(weakest)}, which may be as it was known to be")
+        foreseen = allowed_loss(current.fit, weakest, float(np.exp(enough)))
+        smaller = without(current, (weakest,))
+        if smaller is None or smaller.score > current.score + POLICY.evidence_doubt + foreseen:
+            break
+        current = smaller
+    return current
+
+
+def agrees(fit: Fit, cause: Coefficient) -> float:
+    """Log p-value of an estimate whose prior is lifted, if the coefficient is as its prior says.
+
+    The spread is that of the prior and of the estimate, corrected for coloured residuals.
+    """
+    baseline, number = fit.problem.baseline, fit.ids.index(cause)
+    known = baseline.ids.index(cause)
+    variance = baseline.sd[known] ** 2 + fit.covariance[number, number]
+    off = float(fit.estimates[number] - baseline.mean[known])
+    return float(chi2_log_tail(off**2 / variance, 1))
 
 
 def allowed_loss(fit: Fit, cause: CauseId, level: float = POLICY.interval_error) -> float:

@@ -40,7 +40,7 @@ def shortlisted(
         s for s in strong if s.cause.is_effect and s.log_p < screen.threshold + relaxed_log_p
     ]
     lifted = [s for s in strong if not s.cause.is_effect]
-    enough = _threshold_of_coefficients(screen, found) + relaxed_log_p
+    enough = threshold_of_coefficients(screen, found) + relaxed_log_p
     coefficients = [s for s in lifted if s.log_p < enough]
     first = problem.known[effects[0].cause.effect] if effects else None
     alike = set(first.confusable_with) if first else set()
@@ -52,12 +52,16 @@ def shortlisted(
     ]
 
 
-def _threshold_of_coefficients(screen: Screen, found: int) -> float:
+def threshold_of_coefficients(screen: Screen, found: int) -> float:
     """Log p-value that makes a coefficient significant.
 
     The first has to stand out among all causes. A parameter file that is wrong in one place is
     often wrong in several, so the next ones are judged among coefficients alone, and the share of
     false names is bounded (Benjamini and Hochberg, 1995).
+
+    Args:
+        screen: all causes against the present explanation.
+        found: coefficients in it.
     """
     if not found:
         return screen.threshold

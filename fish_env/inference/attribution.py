@@ -16,6 +16,7 @@ from fish_env.inference.elimination import (
     without_idle,
     without_ordinary_coefficients,
 )
+from fish_env.inference.estimate.again import finished
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import CauseId, Coefficient
@@ -188,6 +189,10 @@ def settled(
     # What else is missing moves estimates by more than a few steps more would.
     if current.causes and thoroughly and not disturbance_at_limit(current.fit):
         current, alike = published(current, found.shown, report)
+        before = current
+        current = without_ordinary_coefficients(current, threshold, report)
+        if current is not before:
+            current = Explanation(current.causes, finished(current.fit))
     rivals = (*found.rivals, *unnecessary, *alike)
     if thoroughly and rivals:
         rivals = tuple(side_by_side([partial(without_idle, e) for e in rivals]))

@@ -176,10 +176,7 @@ def settled(
         report: told what is being done.
         relaxed_log_p: added to the log p-value that makes a coefficient significant.
     """
-
-    def threshold(others: int) -> float:
-        return threshold_of_coefficients(found.shown, others) + relaxed_log_p
-
+    threshold = partial(threshold_of_coefficients, found.shown, relaxed_log_p=relaxed_log_p)
     if found.accepted.causes:
         report("removing unnecessary causes")
     current = without_ordinary_coefficients(found.accepted, threshold, report)

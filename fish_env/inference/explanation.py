@@ -99,6 +99,10 @@ class Explanation:
         worse = Explanation(self.causes, found).score > self.score + POLICY.evidence_doubt
         return self.fit if worse else found
 
+    def causes_with(self, other: CauseId, cause: CauseId) -> tuple[CauseId, ...]:
+        """The causes with another one in the place of one of them."""
+        return tuple(other if c == cause else c for c in self.causes)
+
     def extrapolated(self) -> Explanation:
         """The same causes, with estimates as ever finer steps put them."""
         return Explanation(self.causes, self.fit.extrapolated)
@@ -156,6 +160,11 @@ def known_before(explanation: Explanation) -> FloatArray:
     known[[problem.baseline.ids.index(one) for one in own.released]] = POLICY.prior_reach_sd**-2
     known[len(problem.baseline) :] = [12.0 / (high - low) ** 2 for low, high in ranges]
     return known
+
+
+def exchanged(before: Explanation, after: Explanation) -> list[tuple[CauseId, CauseId]]:
+    """Causes of an explanation that another one lacks, each with what has its place there."""
+    return [(a, b) for a, b in zip(before.causes, after.causes, strict=False) if a != b]
 
 
 def reached(make: Callable[[], T]) -> T | None:

@@ -19,7 +19,7 @@ from fish_env.inference.elimination import surely_acts
 from fish_env.inference.estimate.again import finished
 from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter, where_ended
 from fish_env.inference.estimate.fit import Fit
-from fish_env.inference.explanation import Explanation, reached
+from fish_env.inference.explanation import Explanation, exchanged, reached
 from fish_env.inference.hypotheses import (
     CauseId,
     EffectName,
@@ -237,7 +237,7 @@ def _asked(
     enough = np.inf if coarse else own.objective + leeway
     closest = _closest(runs, current, pairs, steps, leeway, report)
     for cause, other, begin in closest[: POLICY.most_lookalikes]:
-        causes = _with(other, current, cause)
+        causes = current.causes_with(other, cause)
         report(f"fitting {listed(causes, ' and ')}")
         whole = _fitted(runs, own, cause, begin, steps, enough)
         if whole is not None and whole.objective < enough:
@@ -275,11 +275,6 @@ def _closest(
             least = min(least, tried.objective)
     close = [one for one in found if one[2].objective < least + behind]
     return sorted(close, key=lambda one: one[2].objective)
-
-
-def _with(other: EffectName, current: Explanation, cause: CauseId) -> tuple[CauseId, ...]:
-    """Causes of an explanation with another effect in the place of one of them."""
-    return tuple(other if c == cause else c for c in current.causes)
 
 
 def _fitted(
@@ -322,7 +317,7 @@ def _swap(before: Explanation, rival: Explanation) -> tuple[CauseId, CauseId] | 
     """The cause and what has its place, if two explanations differ in one of their causes."""
     if len(before.causes) != len(rival.causes):
         return None
-    swaps = [(a, b) for a, b in zip(before.causes, rival.causes, strict=True) if a != b]
+    swaps = exchanged(before, rival)
     return swaps[0] if len(swaps) == 1 else None
 
 
@@ -337,7 +332,7 @@ def _beside_fewer(
     begin = CoarseFit(effects, own.released, Point(own.point.z, {**kept, **values}), np.inf)
     enough = own.objective + POLICY.coarse_fit_leeway
     fitted = _fitted(own.problem, own, cause, begin, POLICY.swap_steps, enough)
-    return None if fitted is None else Explanation(_with(other, found, cause), fitted)
+    return None if fitted is None else Explanation(found.causes_with(other, cause), fitted)
 
 
 def undecided(current: Explanation, shown: Screen, report: Report) -> tuple[Explanation, ...]:
@@ -361,7 +356,7 @@ def undecided(current: Explanation, shown: Screen, report: Report) -> tuple[Expl
         report(f"fitting {other}, which explains nearly as much as {name_of(cause)}")
         fitted = at_noise(own.problem, coarse, own.noise, POLICY.swap_steps)
         if fitted is not None:
-            found.append(Explanation(_with(other, current, cause), fitted))
+            found.append(Explanation(current.causes_with(other, cause), fitted))
     return tuple(found)
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from fish_env.inference.adequacy import disturbance_at_limit
-from fish_env.inference.explanation import Explanation
+from fish_env.inference.explanation import Explanation, exchanged
 from fish_env.inference.hypotheses import CauseId, Coefficient, EffectName
 from fish_env.inference.lookalikes import late, pairs_alike
 from fish_env.inference.policy import POLICY
@@ -18,12 +18,11 @@ from fish_env.inference.projection import Signal
 from fish_env.inference.pursuit import pursued, substitutes
 from fish_env.inference.rivals import rivals_of
 from fish_env.inference.screening import Screen, screen
+from fish_env.inference.search import Report
 from fish_env.inference.shortlist import shortlisted
 from fish_env.inference.starts import probed
 from fish_env.inference.substitution import in_parts, limit_at, limit_of, substituted, without
 from fish_env.inference.trials import tried_out
-
-Report = Callable[[str], None]
 
 
 def pursue(
@@ -103,8 +102,7 @@ class Pursuit:
             more, shown = self.simplified(more, self.screened(more))
             current = _against_likes(more, shown, self.report)
             if current is not more:
-                pairs = zip(current.causes, more.causes, strict=True)
-                replaced += [pair for pair in pairs if pair[0] != pair[1]]
+                replaced += exchanged(current, more)
                 shown = self.screened(current)
         return current, shown, replaced, False
 
@@ -230,8 +228,7 @@ def challenged(
     known = current.fit.problem.known  # a coefficient takes no effect's place
     signals = shown.by_effect()
     close = _close(current, shown)
-    pairs_of = (zip(current.causes, e.causes, strict=False) for e in rivals)
-    earlier = [(a, b) for pairs in pairs_of for a, b in pairs if a != b]
+    earlier = [pair for e in rivals for pair in exchanged(current, e)]
     kinds = [*_of_drive(current), *late(current)]
     tried = [*replaced, *[*earlier, *each_in_turn(close)][: POLICY.most_substitutes]]
     # Where each run has a drive of its own, these are asked of estimates to be published.

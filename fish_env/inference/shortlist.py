@@ -40,7 +40,7 @@ def shortlisted(
         s for s in strong if s.cause.is_effect and s.log_p < screen.threshold + relaxed_log_p
     ]
     lifted = [s for s in strong if not s.cause.is_effect]
-    enough = threshold_of_coefficients(screen, found) + relaxed_log_p
+    enough = threshold_of_coefficients(screen, found, relaxed_log_p)
     coefficients = [s for s in lifted if s.log_p < enough]
     first = problem.known[effects[0].cause.effect] if effects else None
     alike = set(first.confusable_with) if first else set()
@@ -52,7 +52,7 @@ def shortlisted(
     ]
 
 
-def threshold_of_coefficients(screen: Screen, found: int) -> float:
+def threshold_of_coefficients(screen: Screen, found: int, relaxed_log_p: float = 0.0) -> float:
     """Log p-value that makes a coefficient significant.
 
     The first has to stand out among all causes. A parameter file that is wrong in one place is
@@ -62,11 +62,13 @@ def threshold_of_coefficients(screen: Screen, found: int) -> float:
     Args:
         screen: all causes against the present explanation.
         found: coefficients in it.
+        relaxed_log_p: added to it.
     """
     if not found:
-        return screen.threshold
+        return screen.threshold + relaxed_log_p
     count = sum(not s.cause.is_effect for s in screen.signals) + found
-    return max(screen.threshold, float(np.log(screen.level * (found + 1) / count)))
+    among_alike = float(np.log(screen.level * (found + 1) / count))
+    return max(screen.threshold, among_alike) + relaxed_log_p
 
 
 def newly_shown(after: Screen, chosen: Sequence[Signal]) -> list[Signal]:

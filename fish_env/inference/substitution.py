@@ -59,7 +59,7 @@ def substituted(
     found: list[tuple[float, tuple[CauseId, ...], CoarseFit]] = []
     for name, signal in pairs:
         report(f"trying {signal.cause.effect} instead of {name_of(name)}")
-        causes = tuple(signal.cause.id if c == name else c for c in current.causes)
+        causes = current.causes_with(signal.cause.id, name)
         enough = fitter.base + leeway[name]
         coarse = swapped(fitter, own, name, signal, enough)
         if coarse is None or coarse.objective >= enough:

@@ -26,6 +26,14 @@ RUNS, SAMPLES = 4, 60
 LAG, LIMIT = "lag", "limit"
 
 
+def of_lags(residuals):
+    """A problem with two lags that are known to look alike."""
+    known = (effect(LAG, confusable_with=(LIMIT,)), effect(LIMIT, confusable_with=(LAG,)))
+    stated = Stated(residuals, known)
+    stated.hidden_by_drive, stated.drive = (LAG, LIMIT), Drive(uneven=True)
+    return stated
+
+
 def problem(share, lag=0.5, limit=0.0):
     """Runs in which one of two lags acts, or both.
 
@@ -43,10 +51,7 @@ def problem(share, lag=0.5, limit=0.0):
         left = (lag - effects[size_of(LAG)]) * x + (limit - effects[size_of(LIMIT)]) * like
         return noise + 20.0 * left - z[0] * y
 
-    known = (effect(LAG, confusable_with=(LIMIT,)), effect(LIMIT, confusable_with=(LAG,)))
-    stated = Stated(residuals, known)
-    stated.hidden_by_drive, stated.drive = (LAG, LIMIT), Drive(uneven=True)
-    return stated
+    return of_lags(residuals)
 
 
 def of_rates(share, **sizes):
@@ -202,10 +207,7 @@ def coloured(share):
         left = (0.5 - effects[size_of(LAG)]) * x - effects[size_of(LIMIT)] * like
         return noise + 5.0 * left - z[0] * y
 
-    known = (effect(LAG, confusable_with=(LIMIT,)), effect(LIMIT, confusable_with=(LAG,)))
-    stated = Stated(residuals, known)
-    stated.hidden_by_drive, stated.drive = (LAG, LIMIT), Drive(uneven=True)
-    return stated
+    return of_lags(residuals)
 
 
 def test_residuals_of_one_colour_do_not_tell_lags_apart():

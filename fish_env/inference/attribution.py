@@ -14,7 +14,7 @@ from fish_env.inference.effort import FULL, Effort
 from fish_env.inference.elimination import (
     backward_elimination,
     without_idle,
-    without_ordinary_coefficients,
+    without_insignificant,
 )
 from fish_env.inference.estimate.again import finished
 from fish_env.inference.estimate.fit import Fit
@@ -179,7 +179,7 @@ def settled(
     threshold = partial(threshold_of_coefficients, found.shown, relaxed_log_p=relaxed_log_p)
     if found.accepted.causes:
         report("removing unnecessary causes")
-    current = without_ordinary_coefficients(found.accepted, threshold, report)
+    current = without_insignificant(found.accepted, threshold, report)
     current, unnecessary = backward_elimination(current)
     failed = found.failed if current.causes == found.accepted.causes else frozenset()
     alike: tuple[Explanation, ...] = ()
@@ -187,7 +187,7 @@ def settled(
     if current.causes and thoroughly and not disturbance_at_limit(current.fit):
         current, alike = published(current, found.shown, report)
         before = current
-        current = without_ordinary_coefficients(current, threshold, report)
+        current = without_insignificant(current, threshold, report)
         if current is not before:
             current = Explanation(current.causes, finished(current.fit))
     rivals = (*found.rivals, *unnecessary, *alike)

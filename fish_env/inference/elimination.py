@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
-from functools import partial
 
 import numpy as np
 from scipy.special import chdtri
@@ -101,32 +100,45 @@ def without_idle(found: Explanation) -> Explanation:
     return smaller if smaller and smaller.score < found.score + least else found
 
 
-def without_ordinary_coefficients(
+def without_insignificant(
     current: Explanation, threshold: Callable[[int], float], report: Callable[[str], None]
 ) -> Explanation:
-    """The explanation without coefficients that need not be wrong beside its effects.
+    """The explanation without causes that are not significant beside the others.
 
-    What was missing when a coefficient was accepted pulled at it. Beside all causes its departure,
-    in the spread of its prior and of its estimate, has to be as significant as that of any cause.
-    It stays where the fit without it loses more than the linear model foresees.
+    What was missing when a cause was accepted pulled at it. Beside all others it has to be as
+    significant as it had to be then. It stays where the fit without it loses more than the linear
+    model foresees, and where it is the only one: that was judged by the search.
 
     Args:
         current: causes with their fit.
-        threshold: log p-value to pass, for a number of other coefficients.
+        threshold: log p-value to pass, for a number of coefficients beside the cause; that of an
+            effect is the one beside none.
         report: told what is being done.
     """
-    while lifted := [name for name in current.causes if isinstance(name, Coefficient)]:
-        weakest, enough = max(lifted, key=partial(agrees, current.fit)), threshold(len(lifted) - 1)
-        alone = len(lifted) == len(current.causes)
-        if alone or agrees(current.fit, weakest) < enough:
+    needed: set[CauseId] = set()
+    while len(current.causes) > 1 and (judged := [c for c in current.causes if c not in needed]):
+        lifted = sum(isinstance(name, Coefficient) for name in current.causes)
+        enough = {c: threshold(lifted - 1 if isinstance(c, Coefficient) else 0) for c in judged}
+        over = {cause: significance(current.fit, cause) - enough[cause] for cause in judged}
+        weakest = max(judged, key=lambda cause: over[cause])
+        if over[weakest] < 0.0:
             break
-        report(f"fitting without {name_of(weakest)}, which may be as it was known to be")
-        foreseen = allowed_loss(current.fit, weakest, float(np.exp(enough)))
+        report(f"fitting without {name_of(weakest)}, which is not significant any more")
+        foreseen = allowed_loss(current.fit, weakest, float(np.exp(enough[weakest])))
         smaller = without(current, (weakest,))
         if smaller is None or smaller.score > current.score + POLICY.evidence_doubt + foreseen:
-            break
-        current = smaller
+            needed.add(weakest)
+        else:
+            current = smaller
     return current
+
+
+def significance(fit: Fit, cause: CauseId) -> float:
+    """Log p-value of a cause beside the others, corrected for coloured residuals."""
+    if isinstance(cause, Coefficient):
+        return agrees(fit, cause)
+    off = off_values(fit, cause)
+    return float(chi2_log_tail(from_off(fit, off), len(off)))
 
 
 def agrees(fit: Fit, cause: Coefficient) -> float:

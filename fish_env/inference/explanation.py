@@ -11,16 +11,19 @@ import numpy as np
 
 from fish_env.arrays import FloatArray, IntArray
 from fish_env.inference.adequacy import disturbance_at_limit
+from fish_env.inference.effects import EffectParameter
 from fish_env.inference.estimate.again import search_steps, with_run_variation
 from fish_env.inference.estimate.coarse_fit import CoarseFit
 from fish_env.inference.estimate.fit import FEWER_STEPS, Fit, fit
 from fish_env.inference.estimate.information import information, prior_precision
-from fish_env.inference.hypotheses import CauseId, EffectParameterId
+from fish_env.inference.hypotheses import CauseId, EffectName, EffectParameterId
 from fish_env.inference.in_place import in_step_without, without_causes
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Problem
 
 T = TypeVar("T")
+LEAST_PRECISION = 1e-12
+"""Of what does nothing, where nothing was known of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,11 +158,28 @@ def known_before(explanation: Explanation) -> FloatArray:
     """
     own = explanation.fit
     problem = own.problem
-    ranges = [p.plausible for name in own.effects for p in problem.known[name].parameters]
-    known = prior_precision(problem.baseline, len(ranges), ())
+    further = [
+        _plausible_precision(p, own.point.effects[EffectParameterId(EffectName(name), p.name)])
+        for name in own.effects
+        for p in problem.known[name].parameters
+    ]
+    known = prior_precision(problem.baseline, len(further), ())
     known[[problem.baseline.ids.index(one) for one in own.released]] = POLICY.prior_reach_sd**-2
-    known[len(problem.baseline) :] = [12.0 / (high - low) ** 2 for low, high in ranges]
+    known[len(problem.baseline) :] = further
     return known
+
+
+def _plausible_precision(parameter: EffectParameter, value: float) -> float:
+    """Precision of what was known of an effect's parameter, near a value.
+
+    What is off at infinity acts by its inverse, and any plausible inverse is as likely. In units of
+    the parameter that is the less precise, the closer it is to doing nothing.
+    """
+    low, high = parameter.plausible
+    if np.isfinite(parameter.neutral):
+        return float(12.0 / (high - low) ** 2)
+    inverse = 12.0 / (1.0 / low - 1.0 / high) ** 2
+    return float(max(inverse / value**4, LEAST_PRECISION))
 
 
 def exchanged(before: Explanation, after: Explanation) -> list[tuple[CauseId, CauseId]]:

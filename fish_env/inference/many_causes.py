@@ -16,7 +16,7 @@ from fish_env.inference.probes import Cause
 from fish_env.inference.problem import Problem
 from fish_env.inference.projection import Signal
 from fish_env.inference.pursuit import pursued, substitutes
-from fish_env.inference.rivals import rivals_of
+from fish_env.inference.rivals import ranked, rivals_of
 from fish_env.inference.screening import Screen, screen
 from fish_env.inference.search import Report
 from fish_env.inference.shortlist import shortlisted
@@ -237,7 +237,7 @@ def challenged(
     pairs = [(c, signals[n]) for c, n in dict.fromkeys(tried) if n in signals and c in known]
     best, *others = substituted(current, pairs, POLICY.most_challenges, report)
     apart = [in_parts(best, cause, report) for cause in best.causes]
-    best, *others = sorted([best, *others, *filter(None, apart)], key=lambda e: e.score)
+    best, *others = ranked([best, *others, *filter(None, apart)])
     return best, rivals_of(best, others)
 
 

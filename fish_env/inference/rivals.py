@@ -28,6 +28,20 @@ def rivals_of(best: Explanation, others: Iterable[Explanation]) -> tuple[Explana
     )
 
 
+def ranked(found: Iterable[Explanation]) -> list[Explanation]:
+    """Explanations, best first.
+
+    Of those that the evidence cannot tell from the best, one with plausible estimates leads: where
+    an estimate is implausible, something similar acts instead.
+    """
+    best, *others = sorted(found, key=lambda e: e.score)
+    if implausible_estimates(best.fit):
+        sober = [e for e in others if not implausible_estimates(e.fit) and as_likely(best, e)]
+        if sober:
+            return [sober[0], best, *(e for e in others if e is not sober[0])]
+    return [best, *others]
+
+
 def tied(best: Explanation, other: Explanation) -> bool:
     """Whether the evidence for two explanations is the same, whatever the colour of the residuals.
 

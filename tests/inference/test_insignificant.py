@@ -1,10 +1,10 @@
-"""A coefficient is wrong if it departs by more than its prior and the search let one expect."""
+"""Beside the others, a cause has to be as significant as the search asked for."""
 
 import numpy as np
 import pytest
 from scipy.stats import norm
 
-from fish_env.inference.elimination import agrees, without_ordinary_coefficients
+from fish_env.inference.elimination import agrees, significance, without_insignificant
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import Coefficient
@@ -41,7 +41,7 @@ def explained(off, does=lambda c: c, causes=(LAG, WRONG)):
 def test_a_coefficient_beside_effects_stays_if_its_prior_excludes_it(off, left):
     told = []
     current = explained(off)
-    found = without_ordinary_coefficients(current, lambda others: THRESHOLD, told.append)
+    found = without_insignificant(current, lambda others: THRESHOLD, told.append)
     assert found.causes == left
     assert bool(told) == (found is not current)
     assert found.fit.point.z[0] == pytest.approx(off, abs=0.3)  # also within its prior
@@ -56,9 +56,25 @@ def test_the_p_value_counts_the_prior_and_the_error():
     assert agrees(current.fit, WRONG) == pytest.approx(np.log(2.0 * norm.sf(sds)))
 
 
+@pytest.mark.parametrize(("size", "left"), [(0.2, ("lag",)), (0.5, ("lag", "weak"))])
+def test_an_effect_beside_others_has_to_be_significant(size, left):
+    """A standard error of 0.065: that is 3.1 of them, which an interval excludes, and 7.7."""
+    rng = np.random.default_rng(7)
+    x, y, noise = rng.standard_normal((3, RUNS, SAMPLES))
+
+    def residuals(z, effects):
+        lag, weak = (effects.get(size_of(name), 0.0) for name in (LAG, "weak"))
+        return noise + 20.0 * (0.5 - lag) * x + (size - weak) * y
+
+    stated = Stated(residuals, [effect(LAG), effect("weak")])
+    current = Explanation((LAG, "weak"), fit(stated, (LAG, "weak")))
+    assert significance(current.fit, "weak") < np.log(0.05)
+    assert without_insignificant(current, lambda others: THRESHOLD, [].append).causes == left
+
+
 def test_without_effects_a_coefficient_is_judged_by_the_search_alone():
     current = explained(3.0, causes=(WRONG,))
-    assert without_ordinary_coefficients(current, lambda others: THRESHOLD, [].append) is current
+    assert without_insignificant(current, lambda others: THRESHOLD, [].append) is current
 
 
 def test_a_coefficient_that_a_fit_needs_stays():
@@ -66,5 +82,5 @@ def test_a_coefficient_that_a_fit_needs_stays():
     current = explained(9.0, lambda c: 0.02 * c + 20.0 * min(c - 6.0, 0.0))
     assert agrees(current.fit, WRONG) > THRESHOLD
     told = []
-    assert without_ordinary_coefficients(current, lambda others: THRESHOLD, told.append) is current
+    assert without_insignificant(current, lambda others: THRESHOLD, told.append) is current
     assert told

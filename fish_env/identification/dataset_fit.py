@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -29,6 +29,7 @@ from fish_env.identification.objectives import (
 )
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.hypotheses import Coefficient
+from fish_env.inference.progress import Report, silent
 from fish_env.params.io import load_fish, save_fish
 from fish_env.params.schema import FishParams
 from fish_env.version import versioned
@@ -148,7 +149,7 @@ def fit_dataset(
     effects: Sequence[str] = (),
     leave_out: str | None = None,
     paths: Sequence[str] | None = None,
-    report: Callable[[str], None] = lambda step: None,
+    report: Report = silent,
 ) -> DatasetFit:
     """Fit coefficients and effects of a fish to a dataset.
 

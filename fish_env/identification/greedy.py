@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
 
@@ -19,6 +19,7 @@ from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.explanation import reached
 from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point, Problem
+from fish_env.inference.progress import Report, silent
 
 COARSE_STEPS = 4
 
@@ -44,7 +45,7 @@ def add_effects(
     objective: Objective,
     base: Fit,
     groups: dict[str, list[int]],
-    report: Callable[[str], None] = lambda step: None,
+    report: Report = silent,
     candidates: Sequence[str] | None = None,
 ) -> tuple[Fit, tuple[RunErrors, ...], tuple[EffectStep, ...]]:
     """Add effects to a fit while one predicts groups left out better.
@@ -97,9 +98,7 @@ def with_effects(found: Fit, names: Sequence[str]) -> Problem:
     return other
 
 
-def _leaders(
-    base: Fit, names: Sequence[str], report: Callable[[str], None]
-) -> list[tuple[str, Point]]:
+def _leaders(base: Fit, names: Sequence[str], report: Report) -> list[tuple[str, Point]]:
     """The effects that a coarse fit gains most by, with where that fit ended."""
     found = []
     for name in names:

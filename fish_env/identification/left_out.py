@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,7 @@ from fish_env.identification.objectives import Errors, Objective, refit
 from fish_env.identification.tables.problem import TableProblem
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.problem import Problem
+from fish_env.inference.progress import Report, silent
 
 COLUMNS = ("condition", "run", *COMMANDS)
 
@@ -86,7 +87,7 @@ def left_out_errors(
     objective: Objective,
     whole: Fit,
     groups: dict[str, list[int]],
-    report: Callable[[str], None] = lambda step: None,
+    report: Report = silent,
 ) -> tuple[RunErrors, ...]:
     """Errors of every run by a fit to the runs of all other groups.
 

@@ -6,7 +6,7 @@ how far the fit is off on runs it was not fitted to.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
@@ -26,10 +26,10 @@ from fish_env.identification.writing import identified_fish
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.estimate.settle import evaluated
 from fish_env.inference.problem import Point, Problem
+from fish_env.inference.progress import Report
 from fish_env.params.io import load_fish
 from fish_env.params.schema import FishParams
 
-Report = Callable[[str], None]
 Errors = dict[str, float]
 """Quantity -> mean absolute error of a run, SI."""
 STEPS = 4

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -27,6 +27,7 @@ from fish_env.inference.policy import POLICY
 from fish_env.inference.preconditions import Precondition, preconditions
 from fish_env.inference.probes import Cause
 from fish_env.inference.problem import Problem
+from fish_env.inference.progress import Report, silent
 from fish_env.inference.projection import Signal
 from fish_env.inference.publication import published
 from fish_env.inference.ranking import Ranked, ranking_of
@@ -85,7 +86,7 @@ def attribute(
     causes: Sequence[Cause],
     rng: np.random.Generator,
     effort: Effort = FULL,
-    report: Callable[[str], None] = lambda step: None,
+    report: Report = silent,
 ) -> Attribution:
     """Add causes while one is significant, keep all that explain the data alike.
 
@@ -107,7 +108,7 @@ def _begun(
     causes: Sequence[Cause],
     rng: np.random.Generator,
     effort: Effort,
-    report: Callable[[str], None],
+    report: Report,
 ) -> Attribution:
     """What the baseline says, without a cause."""
     nothing = Explanation((), baseline)
@@ -128,7 +129,7 @@ def extended(
     causes: Sequence[Cause],
     rng: np.random.Generator,
     effort: Effort = FULL,
-    report: Callable[[str], None] = lambda step: None,
+    report: Report = silent,
     relaxed_log_p: float = 0.0,
 ) -> Attribution:
     """An attribution with more causes, if more are significant.
@@ -165,7 +166,7 @@ def extended(
 def settled(
     found: Attribution,
     thoroughly: bool,
-    report: Callable[[str], None],
+    report: Report,
     relaxed_log_p: float = 0.0,
 ) -> Attribution:
     """The attribution without causes that are not needed, its estimates fitted to the end.
@@ -213,7 +214,7 @@ class Search:
     causes: Sequence[Cause]
     rng: np.random.Generator
     effort: Effort
-    report: Callable[[str], None]
+    report: Report
     relaxed_log_p: float
 
     def measured(self, begun: Attribution) -> Attribution:

@@ -8,7 +8,7 @@ beside it what puts the drive in step again. All that is compared in the end is 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -24,6 +24,7 @@ from fish_env.inference.hypotheses import EffectName
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause
 from fish_env.inference.problem import Point
+from fish_env.inference.progress import Report
 from fish_env.inference.projection import Signal
 from fish_env.inference.screening import Screen, screen
 from fish_env.inference.search import refits
@@ -46,7 +47,7 @@ class Followed:
     base: Explanation
 
 
-def measured(nothing: Explanation, report: Callable[[str], None]) -> Explanation | None:
+def measured(nothing: Explanation, report: Report) -> Explanation | None:
     """The effects that were measured to put the drive in step, fitted.
 
     Args:
@@ -83,7 +84,7 @@ def beside_drive(
     causes: Sequence[Cause],
     rng: np.random.Generator,
     effort: Effort,
-    report: Callable[[str], None],
+    report: Report,
 ) -> Followed | None:
     """A cause with what puts the drive in step, if they explain more than the best single cause.
 
@@ -121,7 +122,7 @@ def beside_drive(
     return Followed(found, tried, base) if found.score < best.score else None
 
 
-def _relaxed(baseline: Fit, objective: float, report: Callable[[str], None]) -> Explanation | None:
+def _relaxed(baseline: Fit, objective: float, report: Report) -> Explanation | None:
     """The baseline under relaxed noise; None where that explains less than an objective says."""
     noise = baseline.problem.relaxed_noise(baseline.noise)
     if noise is None:
@@ -139,7 +140,7 @@ def _with_drive(
     causes: Sequence[Cause],
     rng: np.random.Generator,
     effort: Effort,
-    report: Callable[[str], None],
+    report: Report,
 ) -> list[Explanation]:
     """Fits with a cause and one effect that puts the drive in step, best first."""
     problem = begun.fit.problem

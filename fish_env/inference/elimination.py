@@ -20,6 +20,7 @@ from fish_env.inference.hypotheses import (
     name_of,
 )
 from fish_env.inference.policy import POLICY
+from fish_env.inference.progress import Report
 from fish_env.inference.rivals import rivals_of
 from fish_env.inference.substitution import coarse_without, without
 from fish_env.inference.tails import chi2_log_tail
@@ -101,7 +102,7 @@ def without_idle(found: Explanation) -> Explanation:
 
 
 def without_insignificant(
-    current: Explanation, threshold: Callable[[int], float], report: Callable[[str], None]
+    current: Explanation, threshold: Callable[[int], float], report: Report
 ) -> Explanation:
     """The explanation without causes that are not significant beside the others.
 
@@ -119,7 +120,7 @@ def without_insignificant(
     while len(current.causes) > 1 and (judged := [c for c in current.causes if c not in needed]):
         lifted = sum(isinstance(name, Coefficient) for name in current.causes)
         enough = {c: threshold(lifted - 1 if isinstance(c, Coefficient) else 0) for c in judged}
-        over = {cause: significance(current.fit, cause) - enough[cause] for cause in judged}
+        over = {cause: log_p_of(current.fit, cause) - enough[cause] for cause in judged}
         weakest = max(judged, key=lambda cause: over[cause])
         if over[weakest] < 0.0:
             break
@@ -133,15 +134,15 @@ def without_insignificant(
     return current
 
 
-def significance(fit: Fit, cause: CauseId) -> float:
+def log_p_of(fit: Fit, cause: CauseId) -> float:
     """Log p-value of a cause beside the others, corrected for coloured residuals."""
     if isinstance(cause, Coefficient):
-        return agrees(fit, cause)
+        return log_p_of_departure(fit, cause)
     off = off_values(fit, cause)
     return float(chi2_log_tail(from_off(fit, off), len(off)))
 
 
-def agrees(fit: Fit, cause: Coefficient) -> float:
+def log_p_of_departure(fit: Fit, cause: Coefficient) -> float:
     """Log p-value of an estimate whose prior is lifted, if the coefficient is as its prior says.
 
     The spread is that of the prior and of the estimate, corrected for coloured residuals.

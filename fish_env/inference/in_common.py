@@ -10,7 +10,7 @@ whose spread counts in it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -27,8 +27,7 @@ from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.hypotheses import EffectName, EffectParameterId, listed
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
-
-Report = Callable[[str], None]
+from fish_env.inference.progress import Report
 
 
 def with_common_errors(current: Explanation, threshold: float, report: Report) -> Explanation:

@@ -10,7 +10,7 @@ apart no better than by what they make up for, each is an alternative.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
@@ -37,13 +37,13 @@ from fish_env.inference.in_place import (
 )
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
+from fish_env.inference.progress import Report
 from fish_env.inference.projection import Signal
 from fish_env.inference.rivals import alike, as_likely, rivals_of
 from fish_env.inference.screening import Screen
 from fish_env.inference.search import at_noise
 from fish_env.inference.substitution import swapped, what_may_lack
 
-Report = Callable[[str], None]
 Pair = tuple[EffectName, EffectName]
 """A cause, and what looks like it."""
 

@@ -14,11 +14,11 @@ from fish_env.inference.lookalikes import late, pairs_alike
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause
 from fish_env.inference.problem import Problem
+from fish_env.inference.progress import Report
 from fish_env.inference.projection import Signal
 from fish_env.inference.pursuit import pursued, substitutes
 from fish_env.inference.rivals import ranked, rivals_of
 from fish_env.inference.screening import Screen, screen
-from fish_env.inference.search import Report
 from fish_env.inference.shortlist import shortlisted
 from fish_env.inference.starts import probed
 from fish_env.inference.substitution import in_parts, limit_at, limit_of, substituted, without

@@ -35,6 +35,7 @@ from fish_env.inference.hypotheses import (
 )
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
+from fish_env.inference.progress import Report, silent
 from fish_env.inference.projection import Projector, Signal
 from fish_env.inference.result import ResidualModel
 from fish_env.inference.substitution import without_in_step
@@ -42,11 +43,6 @@ from fish_env.inference.tails import chi2_log_tail
 
 Describe = Callable[[Fit, float, Problem | None], ResidualModel | None]
 """Models what a fit leaves: the fit, the log p-value that a term has to pass, runs to judge on."""
-Report = Callable[[str], None]
-
-
-def silent(step: str) -> None:
-    """Tells nobody."""
 
 
 def confirmed(

@@ -6,7 +6,7 @@ knows what moves, or what was measured.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -30,12 +30,11 @@ from fish_env.inference.partial import Describe, confirmed
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause, causes_of
 from fish_env.inference.problem import Problem
+from fish_env.inference.progress import Report, silent
 from fish_env.inference.result import ResidualModel, Result
 from fish_env.inference.screening import screen
 from fish_env.inference.simulated import sustained
 from fish_env.inference.verdict import EXTENDING, Verdict, decide
-
-Report = Callable[[str], None]
 
 
 def infer(
@@ -43,7 +42,7 @@ def infer(
     held_out: Problem | None = None,
     seed: int = 0,
     effort: Effort = FULL,
-    report: Report = lambda step: None,
+    report: Report = silent,
     describe: Describe | None = None,
 ) -> Result:
     """Find what a model lacks that should explain measured runs.
@@ -91,7 +90,7 @@ def investigate(
     causes: Sequence[Cause],
     rng: np.random.Generator,
     effort: Effort = FULL,
-    report: Report = lambda step: None,
+    report: Report = silent,
     held_out: Problem | None = None,
     describe: Describe | None = None,
 ) -> Result:

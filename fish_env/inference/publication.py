@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 
 from fish_env.inference.elimination import backward_elimination
 from fish_env.inference.estimate.again import to_publish
 from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.lookalikes import asked_of_lags, asked_of_rates
+from fish_env.inference.progress import Report
 from fish_env.inference.screening import Screen
 
 
 def published(
-    current: Explanation, shown: Screen, report: Callable[[str], None]
+    current: Explanation, shown: Screen, report: Report
 ) -> tuple[Explanation, tuple[Explanation, ...]]:
     """The explanation with converged estimates, and those with a look-alike that do as well.
 
@@ -33,9 +33,7 @@ def published(
     return best, (*rates, *lags) if best is current else lags
 
 
-def _converged(
-    current: Explanation, report: Callable[[str], None], judged: bool = False
-) -> Explanation:
+def _converged(current: Explanation, report: Report, judged: bool = False) -> Explanation:
     """The explanation with converged estimates, and without causes that these do not need.
 
     Args:

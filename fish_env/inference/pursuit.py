@@ -9,7 +9,7 @@ selection in a linear model (orthogonal matching pursuit; Pati, Rezaiifar and Kr
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -25,11 +25,10 @@ from fish_env.inference.explanation import Explanation, in_steps_of, reached
 from fish_env.inference.hypotheses import CauseId, Coefficient, EffectName, listed
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
+from fish_env.inference.progress import Report
 from fish_env.inference.projection import Projector, Signal
 from fish_env.inference.screening import Screen, zoomed
 from fish_env.inference.starts import linear_estimate, probed, starts
-
-Report = Callable[[str], None]
 
 
 @dataclass(frozen=True, eq=False)

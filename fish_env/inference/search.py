@@ -19,10 +19,10 @@ from fish_env.inference.hypotheses import CauseId, Coefficient, EffectParameterI
 from fish_env.inference.parallel import side_by_side
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
+from fish_env.inference.progress import Report
 from fish_env.inference.projection import Signal
 from fish_env.inference.starts import starts
 
-Report = Callable[[str], None]
 NamedCoarseFit = tuple[CauseId, CoarseFit]
 """With the cause that it has added."""
 Way = Callable[[float, Signal], list[NamedCoarseFit]]

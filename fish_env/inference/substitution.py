@@ -24,8 +24,9 @@ from fish_env.inference.in_place import in_step_without, replaced, without_cause
 from fish_env.inference.parallel import side_by_side
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
+from fish_env.inference.progress import Report
 from fish_env.inference.projection import Signal
-from fish_env.inference.search import Report, at_noise, is_off
+from fish_env.inference.search import at_noise, is_off
 from fish_env.inference.starts import baselines, probed
 
 Values = Mapping[EffectParameterId, float]

@@ -11,7 +11,7 @@ fit with the first lag.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any
@@ -26,15 +26,14 @@ from fish_env.inference.hypotheses import EffectName, EffectParameterId, listed
 from fish_env.inference.parallel import side_by_side
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
+from fish_env.inference.progress import Report
 from fish_env.inference.projection import Signal
 from fish_env.inference.screening import Screen
 from fish_env.inference.search import is_off
 from fish_env.inference.starts import probed
 
 
-def tried_out(
-    current: Explanation, shown: Screen, report: Callable[[str], None]
-) -> Explanation | None:
+def tried_out(current: Explanation, shown: Screen, report: Report) -> Explanation | None:
     """The explanation with the hidden effect that explains most; None where none explains more.
 
     Lags of different kinds explain nearly alike. Those whose few steps end close to the best are

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from fish_env.inference.elimination import agrees, significance, without_insignificant
+from fish_env.inference.elimination import log_p_of, log_p_of_departure, without_insignificant
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import Coefficient
@@ -53,7 +53,7 @@ def test_the_p_value_counts_the_prior_and_the_error():
     variance = baseline.sd[0] ** 2 + current.fit.covariance[number, number]
     sds = current.fit.estimates[number] / np.sqrt(variance)
     assert 2.5 < sds < 3.1
-    assert agrees(current.fit, WRONG) == pytest.approx(np.log(2.0 * norm.sf(sds)))
+    assert log_p_of_departure(current.fit, WRONG) == pytest.approx(np.log(2.0 * norm.sf(sds)))
 
 
 @pytest.mark.parametrize(("size", "left"), [(0.2, ("lag",)), (0.5, ("lag", "weak"))])
@@ -68,7 +68,7 @@ def test_an_effect_beside_others_has_to_be_significant(size, left):
 
     stated = Stated(residuals, [effect(LAG), effect("weak")])
     current = Explanation((LAG, "weak"), fit(stated, (LAG, "weak")))
-    assert significance(current.fit, "weak") < np.log(0.05)
+    assert log_p_of(current.fit, "weak") < np.log(0.05)
     assert without_insignificant(current, lambda others: THRESHOLD, [].append).causes == left
 
 
@@ -80,7 +80,7 @@ def test_without_effects_a_coefficient_is_judged_by_the_search_alone():
 def test_a_coefficient_that_a_fit_needs_stays():
     """Its estimate tells little where it hardly acts; its prior would take it to where it does."""
     current = explained(9.0, lambda c: 0.02 * c + 20.0 * min(c - 6.0, 0.0))
-    assert agrees(current.fit, WRONG) > THRESHOLD
+    assert log_p_of_departure(current.fit, WRONG) > THRESHOLD
     told = []
     assert without_insignificant(current, lambda others: THRESHOLD, told.append) is current
     assert told

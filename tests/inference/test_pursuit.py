@@ -16,6 +16,7 @@ from fish_env.inference.many_causes import beside, challenged, each_in_turn, pur
 from fish_env.inference.pipeline import infer
 from fish_env.inference.probes import causes_of
 from fish_env.inference.problem import Point
+from fish_env.inference.progress import silent
 from fish_env.inference.projection import Projector
 from fish_env.inference.pursuit import picked, pursued, substitutes
 from fish_env.inference.screening import Screen, screen
@@ -29,10 +30,6 @@ from tests.inference.test_boat import BIAS, EAST, FITTED, NORTH, WALK
 HIDDEN = {BIAS: 0.03, NORTH: 0.05, EAST: -0.1}
 NAMES = {"rudder_bias", "current"}
 NO_MORE = -20.0
-
-
-def silent(step: str) -> None:
-    """Reports go nowhere."""
 
 
 @cache

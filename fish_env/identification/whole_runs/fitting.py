@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from fish_env.identification.whole_runs.noise import DRIFTS
@@ -13,6 +13,7 @@ from fish_env.identification.whole_runs.problem import FREQUENCY_SCALE, WholeRun
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
+from fish_env.inference.progress import Report, silent
 
 FIRST_STEPS, STEPS = 15, 40
 """Most Gauss-Newton steps under forgiving weights, and under those that count."""
@@ -25,7 +26,7 @@ SHARE = 0.15
 def fit_whole_runs(
     problem: WholeRunProblem,
     start: Point | None = None,
-    report: Callable[[str], None] = lambda step: None,
+    report: Report = silent,
     steps: int = STEPS,
     refit_noise: bool = True,
 ) -> Fit:
@@ -54,7 +55,7 @@ def fit_whole_runs(
     return fit(again, names, found.point, noise, iterations=steps, rounds=2)
 
 
-def _near(problem: WholeRunProblem, report: Callable[[str], None]) -> tuple[WholeRunProblem, Point]:
+def _near(problem: WholeRunProblem, report: Report) -> tuple[WholeRunProblem, Point]:
     """A start close to the estimates, and the problem with the runs' own numbers there."""
     drifting = [
         replace(problem.default_noise(), speed_sd=speed, rate_sd=rate, memory_s=memory)

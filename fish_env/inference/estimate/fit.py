@@ -32,6 +32,7 @@ from fish_env.inference.evaluation import Evaluation
 from fish_env.inference.hypotheses import Coefficient, ParameterId
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
+from fish_env.inference.progress import Report, silent
 
 SAME = 0.01
 """Root mean square of the difference between whitened residuals below which they are the same."""
@@ -165,7 +166,7 @@ def fit(
     tolerance: float = 0.3,
     rounds: int = 4,
     give_up_above: float = np.inf,
-    report: Callable[[str], None] = lambda step: None,
+    report: Report = silent,
 ) -> Fit:
     """Estimate baseline coefficients and effect parameters.
 
@@ -208,7 +209,7 @@ def _in_turns(
     noise: Any,
     limits: tuple[int, float, float],
     rounds: int,
-    report: Callable[[str], None],
+    report: Report,
 ) -> tuple[Problem, FloatArray, Slopes, Sequence[Evaluation], float, Marginal | None]:
     """Parameters and noise, each fitted beside the other.
 

@@ -107,8 +107,9 @@ def without_insignificant(
     """The explanation without causes that are not significant beside the others.
 
     What was missing when a cause was accepted pulled at it. Beside all others it has to be as
-    significant as it had to be then. It stays where the fit without it loses more than the linear
-    model foresees, and where it is the only one: that was judged by the search.
+    significant as it had to be then, and to explain more than the steps get wrong. It stays where
+    the fit without it loses more than the linear model foresees, or than the steps get wrong, and
+    where it is the only one: that was judged by the search.
 
     Args:
         current: causes with their fit.
@@ -117,17 +118,21 @@ def without_insignificant(
         report: told what is being done.
     """
     needed: set[CauseId] = set()
-    while len(current.causes) > 1 and (judged := [c for c in current.causes if c not in needed]):
+    rough = current.fit.step_error
+    while len(current.causes) > 1:
+        own, judged = current.fit, [c for c in current.causes if c not in needed]
         lifted = sum(isinstance(name, Coefficient) for name in current.causes)
         enough = {c: threshold(lifted - 1 if isinstance(c, Coefficient) else 0) for c in judged}
-        over = {cause: log_p_of(current.fit, cause) - enough[cause] for cause in judged}
-        weakest = max(judged, key=lambda cause: over[cause])
-        if over[weakest] < 0.0:
+        over = {c: log_p_of(own, c) - enough[c] for c in judged}
+        weak = [c for c in judged if over[c] >= 0.0 or from_off(own, off_values(own, c)) < rough]
+        if not weak:
             break
+        weakest = max(weak, key=lambda cause: over[cause])
         report(f"fitting without {name_of(weakest)}, which is not significant any more")
-        foreseen = allowed_loss(current.fit, weakest, float(np.exp(enough[weakest])))
+        foreseen = allowed_loss(own, weakest, float(np.exp(enough[weakest])))
         smaller = without(current, (weakest,))
-        if smaller is None or smaller.score > current.score + POLICY.evidence_doubt + foreseen:
+        most = current.score + POLICY.evidence_doubt + max(foreseen, rough)
+        if smaller is None or smaller.score > most:
             needed.add(weakest)
         else:
             current = smaller

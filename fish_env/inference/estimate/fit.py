@@ -139,6 +139,24 @@ class Fit:
             return self
         return _extrapolated(self)
 
+    @cached_property
+    def step_error(self) -> float:
+        """How far steps may put -2 log likelihood off, where the motion's rate jumps; else zero.
+
+        As the difference to finer steps, of runs whose errors are independent of each other. Where
+        a corner lies in its step makes the likelihood rough: it has as many minima as there are
+        steps, and which of them a fit ends in changes the evidence by about as much.
+        """
+        if not self.problem.refines_steps(self.point.effects):
+            return 0.0
+        try:
+            finer = self.problem.refined()[0].filtered(self.point, self.noise)
+        except np.linalg.LinAlgError:
+            return np.inf
+        pairs = zip(self.filtered, finer, strict=True)
+        off = [2.0 * (usual.log_likelihood - fine.log_likelihood) for usual, fine in pairs]
+        return float(np.linalg.norm(off))
+
     def marginalised(self, residuals: FloatArray) -> FloatArray:
         """Residuals (D,) with what the runs differ in integrated out."""
         marginal = self.linearised.marginal

@@ -21,6 +21,7 @@ from fish_env.model.composed import (
     N_STATES,
     PAR,
     SUM,
+    TAIL_MEMORIES,
     TAIL_RATES,
     TAIL_ROWS,
     TIME,
@@ -123,6 +124,34 @@ def share_told(width, history):
 
 
 @kernel
+def turn_memories(work, width, error):
+    """Apply the error of the phase to what a tail with corners remembers of itself and its command.
+
+    Each is where it would be that much later in the beat. Were they left behind, the tail would
+    have to catch up with its command at every sample, at its largest rate.
+    """
+    for j in range(TAIL_MEMORIES.shape[0]):
+        row, settled = TAIL_MEMORIES[j]
+        for k in range(width):
+            turning = work[(DX + PHASE) * width + k]
+            if (turning > 0.0) & (error[PHASE_COLUMN, k] != 0.0):
+                later = error[PHASE_COLUMN, k] / turning
+                most = MOST_SWING * work[(U + 1) * width + k] * turning
+                told_rate = work[(X0 + row + 2) * width + k]
+                gained, step = work[(X0 + row + 3) * width + k], work[(X0 + row + 4) * width + k]
+                follows = gained == 0.0
+                rate = told_rate if follows else told_rate + 2.0 * gained / step
+                slope = work[(DX + settled) * width + k] if follows else 0.0
+                bent = min(max(slope, -most * turning), most * turning)
+                told = min(max(told_rate, -most), most)
+                work[(X0 + row) * width + k] += later * (
+                    min(max(rate, -most), most) + 0.5 * later * bent
+                )
+                work[(X0 + row + 1) * width + k] += later * (told + 0.5 * later * bent)
+                work[(X0 + row + 2) * width + k] += later * bent
+
+
+@kernel
 def turn_tail(work, width, error, late, history):
     """Apply the error of the phase, to the phase and to what follows it.
 
@@ -142,6 +171,7 @@ def turn_tail(work, width, error, late, history):
                 most *= turning if TAIL_RATES[j] else 1.0
                 per_phase = min(max(work[(DX + row) * width + k] / turning, -most), most)
                 work[(X0 + row) * width + k] += per_phase * error[PHASE_COLUMN, k]
+    turn_memories(work, width, error)
     for k in range(width):
         work[(X0 + PHASE) * width + k] += error[PHASE_COLUMN, k]
 

@@ -6,6 +6,7 @@ import hashlib
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from fish_env.model.corners import MEMORY
 from fish_env.model.effect import Effect
 from fish_env.model.state import BASE_STATES
 from fish_env.params.packing import RECORD_FIELDS
@@ -69,6 +70,16 @@ class Composition:
     def tail_rates(self) -> list[bool]:
         """Whether those rows are rates of the tail (rad/s), as their names end, or angles (rad)."""
         return [self.state_names[row].endswith("rate") for row in self.tail_rows]
+
+    @property
+    def tail_memories(self) -> list[tuple[int, int]]:
+        """Of tails that remember where they were: the rows of that angle, and of the settled rate.
+
+        What else is remembered follows the angle, see :data:`fish_env.model.corners.MEMORY`.
+        """
+        remembering = [e for e in self.effects if e.memory.get("tail", ())[: len(MEMORY)] == MEMORY]
+        rows = self.state_names.index
+        return [(rows(f"{e.name}.angle"), rows(f"{e.name}.settled_rate")) for e in remembering]
 
     @property
     def corners(self) -> tuple[Effect, ...]:

@@ -76,6 +76,28 @@ def test_the_steps_get_a_torque_limit_as_wrong_as_it_says(dataset):
     assert off(dataset, TORQUE) < said * np.nanmax(np.abs(change))
 
 
+@pytest.mark.parametrize("finer", [1, 4])
+def test_a_limit_that_the_tail_never_meets_changes_no_likelihood(finer):
+    """Also where the filter turns the phase of the tail at every sample, as a walk lets it.
+
+    A tail that was left behind by such a turn would race after its command at its largest rate.
+    """
+    beating = np.tile([0.1, 0.4, 1.6, 0.0, 0.0], (4, 1))
+    problem = SeriesProblem(simulate(Setup(runs=1, duration=4.0), beating))
+    runs = [replace(run, substeps=finer * run.substeps) for run in problem.runs]
+    noise = replace(noise_of(problem), phase_sd=0.03)
+
+    def likelihood(effects):
+        point = Point(np.zeros(len(problem.baseline)), effects)
+        (run,) = problem.with_runs(runs).filtered(point, noise)
+        return run.log_likelihood
+
+    rate = EffectParameterId("servo_rate_limit", "rate")
+    plain, unmet, met = (likelihood(e) for e in ({}, {rate: 16.0}, {rate: 3.8}))
+    assert unmet == pytest.approx(plain, abs=1e-3)
+    assert met < plain - 30.0
+
+
 @pytest.mark.parametrize("effects", [LAG, LIMIT], ids=["lag", "rate limit"])
 def test_plain_steps_would_not_do(dataset, effects):
     assert off(dataset, effects, without_fine_steps) > 2.0 * off(dataset, effects)

@@ -12,6 +12,7 @@ from fish_env.inference.estimate.fit import fit
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import Coefficient
 from fish_env.inference.problem import Point
+from fish_env.inference.screening import Screen
 from tests.inference.stated import Stated, apart, effect, fit_of, size_of
 
 
@@ -118,8 +119,9 @@ def test_one_of_two_look_alikes_goes_and_may_be_a_rival(apart_by, kept, rivals):
 
 
 def attribution_of(accepted, rivals=()):
-    """What a search has found; of the screens nothing counts here."""
-    return Attribution(accepted, None, None, accepted, tuple(rivals), (), 0.0)
+    """What a search has found; by its screens all that acts is significant."""
+    screen = Screen((), 0.0, 0.05)
+    return Attribution(accepted, screen, screen, accepted, tuple(rivals), (), 0.0)
 
 
 @pytest.mark.parametrize("size", [0.3, 1.25], ids=["interval holds neutral", "evidence is weak"])

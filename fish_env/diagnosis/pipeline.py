@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -43,13 +43,13 @@ from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.parallel import both
 from fish_env.inference.pipeline import investigate, refit_baseline, unnamed
 from fish_env.inference.probes import causes_of
+from fish_env.inference.progress import Report, silent
 from fish_env.inference.verdict import EXTENDING
 from fish_env.params.io import as_fish, fish_files
 from fish_env.params.schema import FishParams
 from fish_env.rigidbody.consistency import Consistency, check_consistency
 from fish_env.rigidbody.noise_floor import Floor, noise_floors
 
-Progress = Callable[[str], None]
 USELESS = (
     "With all causes that were found the model predicts held-out runs no better than their mean. "
     "So nothing is named."
@@ -62,7 +62,7 @@ def diagnose(
     seed: int = 0,
     quick: bool = False,
     fish: FishParams | str | Path | None = None,
-    progress: Progress | None = None,
+    progress: Report | None = None,
     measured_beats: bool = False,
     trust_effects: bool = False,
 ) -> dict[str, Any]:
@@ -87,7 +87,7 @@ def diagnose(
         ParameterError: the fish cannot be used.
         OutputError: an output would replace a file that is read, or cannot be written.
     """
-    tell = progress or (lambda step: None)
+    tell = progress or silent
     dataset = folder if isinstance(folder, Dataset | SteadyDataset) else load_dataset(folder)
     chosen = as_fish(fish or dataset.fish, trust_effects)
     if out is not None:
@@ -133,7 +133,7 @@ def diagnose_runs(
     fish: FishParams | None = None,
     seed: int = 0,
     quick: bool = False,
-    progress: Progress = lambda step: None,
+    progress: Report = silent,
 ) -> Diagnosis:
     """Diagnose time series.
 
@@ -154,7 +154,7 @@ def diagnose_runs(
 
 
 def _diagnose_runs(
-    dataset: Dataset, fish: FishParams | None, seed: int, quick: bool, progress: Progress
+    dataset: Dataset, fish: FishParams | None, seed: int, quick: bool, progress: Report
 ) -> Diagnosis:
     begin = time.perf_counter()
     effort = effort_of(quick)

@@ -175,7 +175,7 @@ def settled(
         found: what the search has found.
         thoroughly: whether estimates are to be published.
         report: told what is being done.
-        relaxed_log_p: added to the log p-value that makes a coefficient significant.
+        relaxed_log_p: added to the log p-value that makes a cause significant.
     """
     threshold = partial(threshold_of_coefficients, found.shown, relaxed_log_p=relaxed_log_p)
     if found.accepted.causes:

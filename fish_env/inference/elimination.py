@@ -117,8 +117,10 @@ def without_insignificant(
             effect is the one beside none.
         report: told what is being done.
     """
+    if len(current.causes) < 2:
+        return current
     needed: set[CauseId] = set()
-    rough = current.fit.step_error
+    rough = current.fit.likelihood_error
     while len(current.causes) > 1:
         own, judged = current.fit, [c for c in current.causes if c not in needed]
         lifted = sum(isinstance(name, Coefficient) for name in current.causes)

@@ -46,12 +46,12 @@ def test_the_likelihood_follows_the_beat_smoothly(limit):
     """
     effects = {limit: LIMITS[limit], SCALE: 1.0}
     problem = SeriesProblem(
-        swum(limit, LIMITS[limit]), paths=PATHS, effects=[i.effect for i in effects]
+        swum(limit, LIMITS[limit], 12.0), paths=PATHS, effects=[i.effect for i in effects]
     )
     noise, values = replace(Setup().noise, phase_sd=0.01), []
     for step in STEPS:
         point = Point(problem.start.z, {**effects, SCALE: 1.0 + 0.0025 * step})
         values.append(-2.0 * sum(run.log_likelihood for run in problem.filtered(point, noise)))
     cubic = np.polyval(np.polyfit(STEPS, values, 3), STEPS)
-    assert np.ptp(values) > 50.0
+    assert np.ptp(values) > 100.0
     assert np.std(values - cubic) < 0.01 * np.ptp(values)

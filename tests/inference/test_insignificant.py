@@ -127,9 +127,9 @@ def test_a_cause_has_to_explain_more_than_the_steps_get_wrong(off, left):
 
     stated = InUsualSteps(residuals, [effect(LAG), effect("weak")], off=off)
     current = Explanation((LAG, "weak"), fit(stated, (LAG, "weak")))
-    assert current.fit.step_error == pytest.approx(4.0 * off)
+    assert current.fit.likelihood_error == pytest.approx(4.0 * off)
     assert without_insignificant(current, lambda others: THRESHOLD, [].append).causes == left
 
 
 def test_smooth_motion_has_no_error_of_steps():
-    assert explained(3.0).fit.step_error == 0.0
+    assert explained(3.0).fit.likelihood_error == 0.0

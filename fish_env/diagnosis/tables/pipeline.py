@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -37,11 +36,11 @@ from fish_env.inference.explanation import Explanation
 from fish_env.inference.pipeline import investigate, refit_baseline
 from fish_env.inference.preconditions import unseen
 from fish_env.inference.probes import causes_of
+from fish_env.inference.progress import Report, silent
 from fish_env.inference.verdict import EXTENDING
 from fish_env.params.io import load_fish
 from fish_env.params.schema import FishParams
 
-Progress = Callable[[str], None]
 ABSENT = (
     "left out, because this table cannot show effects that depend on place, heading or time, or "
     "that do not change averages: {names}"
@@ -54,7 +53,7 @@ def diagnose_steady(
     *,
     seed: int = 0,
     quick: bool = False,
-    progress: Progress = lambda step: None,
+    progress: Report = silent,
     out: Path | None = None,
 ) -> dict[str, Any]:
     """Diagnose a table of steady motion.
@@ -87,7 +86,7 @@ def diagnose_table(
     fish: FishParams | None,
     seed: int,
     quick: bool,
-    progress: Progress,
+    progress: Report,
 ) -> TableDiagnosis:
     """Diagnose a table, with everything found on the way (see :func:`diagnose_steady`)."""
     begin = time.perf_counter()

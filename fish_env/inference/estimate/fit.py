@@ -140,7 +140,7 @@ class Fit:
         return _extrapolated(self)
 
     @cached_property
-    def step_error(self) -> float:
+    def likelihood_error(self) -> float:
         """How far steps may put -2 log likelihood off, where the motion's rate jumps; else zero.
 
         As the difference to finer steps, of runs whose errors are independent of each other. Where

@@ -18,6 +18,7 @@ from fish_env.model.corners import (
     angle_at,
     cubic,
     follow,
+    gained_in_half,
     handed_on,
     rises,
     starting,
@@ -88,7 +89,8 @@ def move_in_part(tail, inputs, phase, time, fish, e, states, memory, since):
         tail.acceleration if touching else 0.0,
     )
     driven, _ = spread_jumps(moved, settled_rate)
-    return handed_on(e.gap > 0.0, tail, driven, 0.0, since, side)
+    gained = gained_in_half(tail, driven, since)
+    return handed_on(e.gap > 0.0, tail, driven, gained, since, side)
 
 
 @kernel

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from math import inf
 
-from fish_env.model.corners import MEMORY, handed_on, starting
+from fish_env.model.corners import MEMORY, gained_in_half, handed_on, starting
 from fish_env.model.effect import Effect, EffectParameter
 from fish_env.model.jit import kernel
 from fish_env.model.servo import chase, chase_in_part, met_or_left
@@ -33,7 +33,7 @@ def move_in_part(tail, inputs, phase, time, fish, e, states, memory, since):
     on = e.rate < inf
     limit = e.rate if on else 1.0
     limited = chase_in_part(tail, limit, limit, settled_rate, since, memory)
-    return handed_on(on, tail, limited, 0.0, since, memory[5])
+    return handed_on(on, tail, limited, gained_in_half(tail, limited, since), since, memory[5])
 
 
 @kernel

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from math import inf
 
-from fish_env.model.corners import MEMORY, handed_on, starting
+from fish_env.model.corners import MEMORY, gained_in_half, handed_on, starting
 from fish_env.model.effect import Effect, EffectParameter
 from fish_env.model.jit import kernel
 from fish_env.model.servo import (
@@ -97,7 +97,8 @@ def move_in_part(tail, inputs, phase, time, fish, motion, e, states, memory, sin
     now = speed_now(tail, motion, angle, before * since, fish, e)
     kept = (angle, told, told_rate, gained, step, side)
     limited = chase_in_part(tail, 0.5 * (before + now), now, settled_rate, since, kept)
-    seen, slopes, kept = handed_on(on, tail, limited, 0.0, since, side)
+    more = gained_in_half(tail, limited, since)
+    seen, slopes, kept = handed_on(on, tail, limited, more, since, side)
     return seen, slopes, with_speed(kept, now if on else e.speed)
 
 

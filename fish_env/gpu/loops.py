@@ -28,12 +28,12 @@ from fish_env.model.state import INTEGRAL_ROW
 if TYPE_CHECKING:  # what a composed module defines
     from fish_env.model.composed import (
         BACK,
-        CORNERS,
         FAILED,
         LATE_TAIL,
         MODE,
         N_PARAMETERS,
         N_STATES,
+        OWN_STEPS,
         PAR,
         REAL,
         ROW_GOAL,
@@ -48,16 +48,15 @@ if TYPE_CHECKING:  # what a composed module defines
         TIME,
         TRACE_ROW,
         TRACE_ROWS,
-        TURNS,
         WORK_ROWS,
         X0,
         U,
         accept_actuators,
         accept_states,
+        find_turns,
         gather,
         gather_targets,
         judge,
-        lane_turns,
         observe,
         plan_actuators,
         rk4_step,
@@ -90,11 +89,9 @@ def advance_fish(
     work[TIME] = time[first]
     work[FAILED] = failed_at[first]
     late = LATE_TAIL & (history.shape[0] > 0)
-    own_time = work[:0]
-    turns = False
-    if CORNERS:
-        lane_turns(0, 1, work)
-        turns = work[TURNS] > 0.0
+    same_pace = work[:0]
+    if OWN_STEPS:
+        find_turns(work, 1)
     sample = trace_at % trace.shape[0] if trace.shape[0] > 0 else 0
     for segment in range(steps.shape[0]):
         h = sizes[segment]
@@ -103,12 +100,12 @@ def advance_fish(
         for i in range(steps[segment]):
             elapsed = starts[segment] + np.float64(i) * h
             plan_actuators(work, 1, h)
-            if CORNERS:
-                step_in_parts(work, 1, elapsed, h, tables, late, history, first, 1, turns)
+            if OWN_STEPS:
+                step_in_parts(work, 1, elapsed, h, tables, late, history, first, 1, same_pace)
             else:
-                rk4_step(work, 1, elapsed, h, tables, late, history, first, 1, own_time)
+                rk4_step(work, 1, elapsed, h, tables, late, history, first, 1)
                 accept_states(work, 1, elapsed + h)
-                accept_actuators(work, 1)
+            accept_actuators(work, 1)
             until -= 1
             if (until == 0) & (trace.shape[0] > 0):
                 for row in range(TRACE_ROWS):

@@ -15,12 +15,11 @@ from fish_env.identification.state_blocks import PHASE_COLUMN
 
 # --- completed by compose ---
 from fish_env.model.composed import (
-    BODY,
     DX,
+    FAILED,
     N_PARAMETERS,
     N_STATES,
     PAR,
-    SUM,
     TAIL_MEMORIES,
     TAIL_RATES,
     TAIL_ROWS,
@@ -29,12 +28,12 @@ from fish_env.model.composed import (
     X0,
     U,
     X,
+    find_turns,
     kernel,
     lane_initialise,
-    normalise,
     past_matters,
-    rk4_step,
     shared_kernel,
+    step_in_parts,
     switch_effects,
 )
 from fish_env.model.history import HEARD, RECORD
@@ -44,7 +43,6 @@ from fish_env.model.history import HEARD, RECORD
 BLOCK = 24  # lanes: a fish's coefficients, an effect or two; 20 states; whole vector registers
 VECTOR = 4  # lanes that processors compute at once: part of a vector takes as long as all of it
 WRENCH = PAR + N_PARAMETERS - 6
-DIVERGED = 1e4
 MOST_SWING = 1.2  # swing of a soft tail over the told one, below its resonance
 TOLD_PHASE = 1 + HEARD.index("phase")  # its row in a slot of a history
 STEP_S = 0.005
@@ -85,24 +83,15 @@ def set_commands(work, width, times, values, at, start, length, skew, delay, sha
 
 @shared_kernel
 def step_lanes_once(work, elapsed, h, pace, late, history, tables):
-    """One RK4 step of every lane, kept where it stays finite."""
-    width, lanes = BLOCK, pace.shape[0]  # as many, but unknown: see rk4_step
-    for k in range(lanes):  # true time since the run began is `pace` times the recorded one
+    """One step of every lane, of h seconds by the clock of the record.
+
+    A lane that diverges stays where it is for the rest of the step.
+    """
+    width = BLOCK
+    for k in range(pace.shape[0]):  # true time since the run began is `pace` times the recorded one
         work[TIME * width + k] = (pace[k] - 1.0) * elapsed
-    rk4_step(work, width, elapsed, h, tables, late, history, 0, width, pace)
-    normalise(work, width, lanes)
-    for n in range(BODY * width):  # what the step has changed, see keep_step
-        work[SUM * width + n] = work[X * width + n] - work[X0 * width + n]
-    finite = True
-    for n in range(N_STATES * width):
-        finite &= abs(work[X * width + n]) < DIVERGED
-    if finite:  # the usual case: masked stores are slow
-        for n in range(N_STATES * width):
-            work[X0 * width + n] = work[X * width + n]
-    else:
-        for n in range(N_STATES * width):
-            value = work[X * width + n]
-            work[X0 * width + n] = value if abs(value) < DIVERGED else work[X0 * width + n]
+        work[FAILED * width + k] = np.inf
+    step_in_parts(work, width, elapsed, h, tables, late, history, 0, width, pace)
 
 
 @kernel
@@ -265,6 +254,7 @@ def start_effects(work, lanes, width, begin, swimming, pace, late, history, tabl
     Only so many lanes will move; the others stay where they are.
     """
     switch_effects(whole_vectors(lanes, width), width, work)
+    find_turns(work, width)
     initialise_effects(work)
     if swimming & past_matters(width, work):
         base = work[X0 * width : (X0 + BASE) * width].copy()
@@ -272,7 +262,7 @@ def start_effects(work, lanes, width, begin, swimming, pace, late, history, tabl
         for n in range(BASE * width):
             work[X0 * width + n] = base[n]
         for k in range(width):  # as much earlier as the beat is going to last
-            work[(X0 + PHASE) * width + k] -= SETTLING_S * work[(DX + PHASE) * width + k]
+            work[(X0 + PHASE) * width + k] -= SETTLING_S * pace[k] * work[(DX + PHASE) * width + k]
         initialise_effects(work)
         for i in range(SETTLING_STEPS):
             earlier = begin - SETTLING_S + i * STEP_S

@@ -24,7 +24,7 @@ def filter_kernels(model: ExtendedModel) -> Kernels:
     """Compiled filter for a model whose last effect is the applied wrench."""
     composition = model.kernels.composition
     assert composition.effects[-1].name == APPLIED_WRENCH.name
-    return _loaded(composition.in_common_steps(TEMPLATES))
+    return _loaded(composition.in_blocks(TEMPLATES))
 
 
 def replay_kernels() -> Kernels:

@@ -33,6 +33,7 @@ from fish_env.model.composed import (
     WORK_ROWS,
     WRENCH,
     X0,
+    begin_step,
     difference,
     entry_point,
     innovations_of,
@@ -81,8 +82,9 @@ def slopes_of_interval(
     for i in range(steps):
         start = begin + i * h
         set_commands(work, width, times, values, at, start, h, skew, delay, True)
+        begin_step(work, width, 1, path, i)
         step_lanes_once(work, start, h, pace, late, history, tables)
-        keep_step(work, width, 1, path, i)
+        keep_step(work, width, 1, pace, path, i)
     difference(work, width, gap)
     for j in range(N_MOVING):
         for k in range(N_ERROR):
@@ -313,8 +315,9 @@ def filter_block(
             for i in range(steps):
                 begin = clock[sample - 1] + i * h
                 set_commands(work, width, times, values, at, begin, h, skew, delay, shared)
+                begin_step(work, width, lanes, path, i)
                 step_lanes_once(work, begin, h, pace, late, history, tables)
-                keep_step(work, width, lanes, path, i)
+                keep_step(work, width, lanes, pace, path, i)
             if pushed:
                 push(
                     work, width, push_basis, sample - 1, push_column, push_size, -1.0, first, count

@@ -42,21 +42,31 @@ def normalise(work, width, lanes):
 
 
 @kernel
-def keep_step(work, width, lanes, path, step):
+def begin_step(work, width, lanes, path, step):
+    """Note the body's state before a step; arguments as of :func:`keep_step`."""
+    if path.shape[0] > 0:
+        for j in range(BODY):
+            for k in range(lanes):
+                path[step, j, k] = work[(X0 + j) * width + k]
+
+
+@kernel
+def keep_step(work, width, lanes, pace, path, step):
     """Keep how the body's state changed in a step, and its slope at the end.
 
     Args:
         work: all lanes, just after the step.
         width: how many these are.
         lanes: how many of them to keep.
+        pace: (width,) true seconds per recorded second.
         path: (steps, 26, width) what was kept of the steps of this interval, or no rows.
         step: number of the step.
     """
     if path.shape[0] > 0:
         for j in range(BODY):
             for k in range(lanes):
-                path[step, j, k] = work[(SUM + j) * width + k]
-                path[step, BODY + j, k] = work[(DX + j) * width + k]
+                path[step, j, k] = work[(X0 + j) * width + k] - path[step, j, k]
+                path[step, BODY + j, k] = pace[k] * work[(DX + j) * width + k]
 
 
 @kernel

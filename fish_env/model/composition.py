@@ -36,18 +36,18 @@ class Composition:
         effects: effects in the order their hooks run.
         tables: coefficient curves may come from tables (slower: a search for each).
         templates: source files with the entry points; each may use what precedes it.
-        common_steps: every lane takes the same steps, however the rate of its tail jumps; else a
-            rollout parts the steps of each lane where it jumps.
+        blocks: lanes are computed in blocks, in which effects that are off take no time, and each
+            has its own pace.
     """
 
     effects: tuple[Effect, ...] = ()
     tables: bool = False
     templates: tuple[Path, ...] = (TEMPLATE, PARTS_TEMPLATE)
-    common_steps: bool = False
+    blocks: bool = False
 
-    def in_common_steps(self, templates: tuple[Path, ...]) -> Composition:
-        """The same with further templates, where every lane takes the same steps."""
-        return replace(self, templates=(*self.templates, *templates), common_steps=True)
+    def in_blocks(self, templates: tuple[Path, ...]) -> Composition:
+        """The same with further templates, computed in blocks."""
+        return replace(self, templates=(*self.templates, *templates), blocks=True)
 
     @property
     def state_names(self) -> tuple[str, ...]:
@@ -83,10 +83,13 @@ class Composition:
 
     @property
     def corners(self) -> tuple[Effect, ...]:
-        """Effects for which a rollout parts its steps."""
-        if self.common_steps:
-            return ()
+        """Effects for which steps are parted."""
         return tuple(e for e in self.effects if e.turns is not None or e.command_delay)
+
+    @property
+    def own_steps(self) -> bool:
+        """Whether each lane has its own steps: parted where its tail's rate jumps, at its pace."""
+        return self.blocks or bool(self.corners)
 
     @property
     def delays(self) -> tuple[str, ...]:
@@ -112,5 +115,5 @@ class Composition:
             "|tables" if self.tables else ""
         )
         kind = "baseline" if not self.effects else f"effects{len(self.effects)}"
-        names += "|common" if self.common_steps else ""
+        names += "|blocks" if self.blocks else ""
         return f"{kind}_{hashlib.sha256(names.encode()).hexdigest()[:8]}"

@@ -152,6 +152,12 @@ def followed(time_constant, excess):
 
 
 @kernel
+def gained_in_half(tail, moved, since):
+    """What a tail gains on its command in the last half of a part without jumps (rad)."""
+    return 0.5 * since * (moved.rate - tail.rate)
+
+
+@kernel
 def handed_on(on, tail, moved, gained, since, side):
     """What a tail hook returns: the moved tail where the effect is on, else the command's."""
     seen = Tail(

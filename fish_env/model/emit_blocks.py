@@ -65,8 +65,11 @@ GIVEN = {
 MOVED = ("body_drag", "tail_force", "wrench")
 """Stages whose hooks read the motion."""
 ARGUMENTS = "k, width, elapsed, shift, work"
-BLOCK = "width, elapsed, shift, work, tables"
+BLOCK = "width, elapsed, fraction, h, work, tables"
+SHIFT = "shift = lane_shift(k, width, fraction, h, work)"
 SWITCH = "lanes, width, work"
+COUNT = "lanes = lanes_in(width, work)"
+EACH = "for k in range(lanes):"
 
 
 class BlockEmitter(CornerEmitter):
@@ -75,30 +78,31 @@ class BlockEmitter(CornerEmitter):
     def __init__(self, composition: Composition) -> None:
         super().__init__(composition)
         switched = any(not effect.varies for effect in self.effects)
-        self.parted = composition.common_steps and switched
-        self.flags = len(self.effects) if self.parted else 0
+        self.looped = composition.blocks and switched
+        self.flags = len(self.effects) if self.looped else 0
         self.first: dict[str, int] = {}
         kept = self.flags + 4
         for name, kind in KEPT.items():
             self.first[name] = kept
             kept += len(_fields(kind))
-        self.kept = kept if self.parted else int(composition.common_steps)
+        self.kept = kept if self.looped else int(composition.blocks)
 
     def text(self) -> str:
         """All functions of one composition."""
-        own = self.in_loops() if self.parted else self.in_one_loop()
+        own = self.in_loops() if self.looped else self.in_one_loop()
+        own += [self.counting(), self.shifting()]
         return "\n".join([super().text(), f"N_KEPT = {self.kept}\n", *own])
 
     def in_one_loop(self) -> list[str]:
         """The derivative where all lanes compute all effects."""
         call = "lane_derivative(k, width, elapsed, shift, work, tables)"
         past = any(map(_has_past, self.effects))
-        count, told = (self.lanes, f"{self.counted} = lanes") if self.kept else ("width", "pass")
+        told = f"{self.counted} = lanes" if self.kept else "pass"
         return [
             self.function("switch_effects", SWITCH, [told]),
             self.function("memory_matters", "width, work", ["return N_MEMORY > 0"]),
             self.function("past_matters", "width, work", [f"return {past}"]),
-            self.function("derive_lanes", BLOCK, [f"for k in range({count}):", f"    {call}"]),
+            self.function("derive_lanes", BLOCK, [COUNT, EACH, f"    {SHIFT}", f"    {call}"]),
         ]
 
     def in_loops(self) -> list[str]:
@@ -117,10 +121,16 @@ class BlockEmitter(CornerEmitter):
         """How many lanes are computed. No compiler knows it: else it would write the loops out."""
         return f"work[(KEPT + {self.flags}) * width]"
 
-    @property
-    def lanes(self) -> str:
+    def counting(self) -> str:
         """The same as a whole number."""
-        return f"int({self.counted})"
+        count = f"int({self.counted})" if self.kept else "width"
+        return self.function("lanes_in", "width, work", [f"return {count}"])
+
+    def shifting(self) -> str:
+        """How far into its step a lane is, at a fraction of the step or of its present part (s)."""
+        own = "work[BEGUN * width + k] + fraction * work[LENGTH * width + k]"
+        shift = own if self.composition.own_steps else "fraction * h"
+        return self.function("lane_shift", "k, width, fraction, h, work", [f"return {shift}"])
 
     @property
     def remembering(self) -> int:
@@ -287,7 +297,7 @@ class BlockEmitter(CornerEmitter):
 
     def loops(self) -> str:
         """The derivative of all lanes."""
-        lines = [f"lanes = {self.lanes}", *_loop("block_told"), *self.hooks("inputs")]
+        lines = [COUNT, *_loop("block_told"), *self.hooks("inputs")]
         lines += _loop("block_drive")
         for stage in ("water", "water_rate", "tail", "barycentre", "body_drag"):
             lines += self.hooks(stage)
@@ -318,7 +328,7 @@ def _fields(kind: type | None) -> tuple[str, ...]:
 
 def _loop(function: str, *more: str) -> list[str]:
     """A loop over the lanes that calls a function for each."""
-    return ["for k in range(lanes):", f"    {function}({', '.join([ARGUMENTS, *more])})"]
+    return [EACH, f"    {SHIFT}", f"    {function}({', '.join([ARGUMENTS, *more])})"]
 
 
 def _has_past(effect: Effect) -> bool:

@@ -1,4 +1,4 @@
-"""Steps of a rollout that are parted, for each lane by itself, where the rate of its tail jumps.
+"""Steps of each lane: at its own pace, and parted where the rate of its tail jumps.
 
 Completed by :mod:`fish_env.model.compose` behind the rollout template, whose rows it uses.
 """
@@ -12,21 +12,27 @@ from fish_env.model.composed import (
     CORNER,
     DX,
     LENGTH,
+    N_MEMORY,
     N_SLOPES,
     N_STATES,
     PAST,
     PAST_END,
     RECORD,
+    STEP,
     SUM,
     TOLD,
+    TURNS,
     X0,
     X,
-    accept_actuators,
     accept_states,
+    derive_lanes,
     kernel,
     lane_corner,
-    lane_derivative,
     lane_remember,
+    lane_shift,
+    lane_turns,
+    lanes_in,
+    memory_matters,
     tell_tail,
 )
 from fish_env.model.history import recall_at, told_anew
@@ -39,51 +45,63 @@ INSTANT = 1e-9  # s; what is told at a time is told this much later too
 
 
 @kernel
-def recall_in_part(work, width, past, share, h, history, first, count):
-    """As ``recall``, at a share of each lane's part of the step."""
-    edge = INSTANT if share == 0.0 else -INSTANT
-    for k in range(width):
+def find_turns(work, width):
+    """Find the lanes whose tail's rate may jump; to be called when all have their parameters."""
+    for k in range(lanes_in(width, work)):
+        lane_turns(k, width, work)
+
+
+@kernel
+def recall_in_part(work, width, past, fraction, h, history, first, count):
+    """As ``recall``, at a fraction of each lane's part of the step."""
+    edge = INSTANT if fraction == 0.0 else -INSTANT
+    for k in range(lanes_in(width, work)):
         lane = first + (k if k < count else count - 1)
         ago = work[(TOLD + RECORD - 1) * width + k]
-        shift = work[BEGUN * width + k] + share * work[LENGTH * width + k]
-        time = work[BEGIN * width + k] + shift - ago
-        recall_at(work, width, k, past, time, edge, ago / h, history, lane)
+        time = work[BEGIN * width + k] + lane_shift(k, width, fraction, h, work) - ago
+        recall_at(work, width, k, past, time, edge, ago / work[STEP * width + k], history, lane)
 
 
 @kernel
 def look_ahead(work, width, elapsed, h, late, history, first, count, last):
     """End each lane's part of the step where the rate of its tail jumps first."""
-    for k in range(width):
-        work[LENGTH * width + k] = h - work[BEGUN * width + k]
+    lanes = lanes_in(width, work)
+    for k in range(lanes):
+        work[LENGTH * width + k] = work[STEP * width + k] - work[BEGUN * width + k]
     if late:
         recall_in_part(work, width, PAST, 0.0, h, history, first, count)
         recall_in_part(work, width, PAST_END, 1.0, h, history, first, count)
-    for k in range(width):
+    for k in range(lanes):
         lane_corner(k, width, elapsed, work)
     if late:
-        for k in range(width):
+        for k in range(lanes):
             lane = first + (k if k < count else count - 1)
             ago, length = work[(TOLD + RECORD - 1) * width + k], work[LENGTH * width + k]
             time = work[BEGIN * width + k] + work[BEGUN * width + k] - ago
-            anew = told_anew(time, length, ago / h, history, lane)
+            anew = told_anew(time, length, ago / work[STEP * width + k], history, lane)
             corner = work[CORNER * width + k]
             work[CORNER * width + k] = min(corner, anew) if ago > 0.0 else corner
-    for k in range(width):
-        length, least = work[LENGTH * width + k], SHORTEST * h
+    for k in range(lanes):
+        length, least = work[LENGTH * width + k], SHORTEST * work[STEP * width + k]
         corner = work[CORNER * width + k]
         whole = last | (not (corner <= length - least))
         work[LENGTH * width + k] = length if whole else max(corner, least)
 
 
 @kernel
-def step_in_parts(work, width, elapsed, h, tables, late, history, first, count, turns):
+def step_in_parts(work, width, elapsed, h, tables, late, history, first, count, pace):
     """One step of every lane, as ``rk4_step`` and what accepts it, in parts between corners.
 
     A lane without corners in the step takes it whole, to the same bits whatever the others do.
+    ``pace``, (width,), is how much faster the time of each lane runs; without entries it is one.
     """
-    for k in range(width):
+    lanes = lanes_in(width, work)
+    turns = False
+    for k in range(lanes):
+        work[STEP * width + k] = h * pace[k] if pace.shape[0] > 0 else h
         work[BEGUN * width + k] = 0.0
-        work[LENGTH * width + k] = h
+        work[LENGTH * width + k] = work[STEP * width + k]
+        turns |= work[TURNS * width + k] > 0.0
     for n in range(N_STATES * width):
         work[X * width + n] = work[X0 * width + n]
     if late:
@@ -95,21 +113,22 @@ def step_in_parts(work, width, elapsed, h, tables, late, history, first, count, 
         rk4_part(work, width, elapsed, h, tables, late, history, first, count)
         accept_states(work, width, elapsed + h)
         unfinished = 0
-        for k in range(width):
+        for k in range(lanes):
+            step = work[STEP * width + k]
             done = work[BEGUN * width + k] + work[LENGTH * width + k]
-            finished = done > h - 0.5 * SHORTEST * h
-            work[BEGUN * width + k] = h if finished else done
+            finished = done > step - 0.5 * SHORTEST * step
+            work[BEGUN * width + k] = step if finished else done
             unfinished += 0 if finished else 1
         if unfinished == 0:
             break
         for n in range(N_STATES * width):
             work[X * width + n] = work[X0 * width + n]
-    accept_actuators(work, width)
 
 
 @kernel
 def rk4_part(work, width, elapsed, h, tables, late, history, first, count):
     """One Runge-Kutta step of every lane over its own part of the step, from X = X0."""
+    lanes = lanes_in(width, work)
     for n in range(N_SLOPES * width):
         work[SUM * width + n] = 0.0
     for stage in range(4):
@@ -118,12 +137,10 @@ def rk4_part(work, width, elapsed, h, tables, late, history, first, count):
         ahead = 0.5 if stage < 2 else 1.0
         if late:
             recall_in_part(work, width, PAST, fraction, h, history, first, count)
-        for k in range(width):
-            shift = work[BEGUN * width + k] + fraction * work[LENGTH * width + k]
-            lane_derivative(k, width, elapsed, shift, work, tables)
+        derive_lanes(width, elapsed, fraction, h, work, tables)
         if stage < 3:
             for i in range(N_SLOPES):
-                for k in range(width):
+                for k in range(lanes):
                     slope = work[(DX + i) * width + k]
                     length = work[LENGTH * width + k]
                     work[(SUM + i) * width + k] += weight * slope
@@ -132,10 +149,11 @@ def rk4_part(work, width, elapsed, h, tables, late, history, first, count):
                     )
         else:
             for i in range(N_SLOPES):
-                for k in range(width):
+                for k in range(lanes):
                     total = work[(SUM + i) * width + k] + work[(DX + i) * width + k]
                     sixth = work[LENGTH * width + k] / 6.0
                     work[(X + i) * width + k] = work[(X0 + i) * width + k] + sixth * total
-    for k in range(count):
-        shift = work[BEGUN * width + k] + work[LENGTH * width + k]
-        lane_remember(k, width, elapsed, shift, work)
+    if N_MEMORY > 0 and memory_matters(width, work):
+        for k in range(min(lanes, count)):
+            shift = lane_shift(k, width, 1.0, h, work)
+            lane_remember(k, width, elapsed, shift, work)

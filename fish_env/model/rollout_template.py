@@ -12,20 +12,20 @@ import numpy as np
 
 # --- completed by compose ---
 from fish_env.model.composed import (
-    CORNERS,
     LATE_TAIL,
     N_KEPT,
     N_MEMORY,
     N_PARAMETERS,
     N_STATES,
+    OWN_STEPS,
     derive_lanes,
+    find_turns,
     lane_command,
     lane_corner,
     lane_derivative,
     lane_initialise,
     lane_remember,
     lane_terms,
-    lane_turns,
     memory_matters,
     step_in_parts,
     switch_effects,
@@ -54,11 +54,12 @@ BEGIN = ANGLE + 1  # time at which a step begins (s), then the tail's command (s
 TOLD = BEGIN + LATE_TAIL
 PAST = TOLD + LATE_TAIL * RECORD
 PAST_END = PAST + LATE_TAIL * len(HEARD)
-BEGUN = PAST_END + LATE_TAIL * len(HEARD)  # how much of its step a lane has done (s), and of
-LENGTH = BEGUN + CORNERS  # corners: the length of its present part (s),
-CORNER = LENGTH + CORNERS  # when in it the tail's rate jumps (s),
-TURNS = CORNER + CORNERS  # and whether it may jump at all
-KEPT = TURNS + CORNERS  # what is on, and what effects hand on (see model.emit_blocks)
+STEP = PAST_END + LATE_TAIL * len(HEARD)  # of a lane with its own steps: the length of one (s),
+BEGUN = STEP + OWN_STEPS  # how much of it has been done (s),
+LENGTH = BEGUN + OWN_STEPS  # the length of its present part (s),
+CORNER = LENGTH + OWN_STEPS  # when in it the tail's rate jumps (s),
+TURNS = CORNER + OWN_STEPS  # and whether it may jump at all
+KEPT = TURNS + OWN_STEPS  # what is on, and what effects hand on (see model.emit_blocks)
 PAR = KEPT + N_KEPT
 WORK_ROWS = PAR + N_PARAMETERS
 LARGEST = 1e4  # a state beyond this many SI units has diverged
@@ -128,11 +129,8 @@ def tell_tail(work, width, elapsed, history, first, count):
 
 
 @kernel
-def rk4_step(work, width, elapsed, h, tables, late, history, first, count, pace):
-    """One classical Runge-Kutta step of every lane: X0 -> X. Memory follows from where it ends.
-
-    ``pace``, (width,), multiplies the rate of each lane's own time; without entries it is one.
-    """
+def rk4_step(work, width, elapsed, h, tables, late, history, first, count):
+    """One classical Runge-Kutta step of every lane: X0 -> X. Memory follows from where it ends."""
     for n in range(N_STATES * width):
         work[X * width + n] = work[X0 * width + n]
     for n in range(N_SLOPES * width):
@@ -145,12 +143,7 @@ def rk4_step(work, width, elapsed, h, tables, late, history, first, count, pace)
         ahead = 0.5 * h if stage < 2 else h
         if late:
             recall(work, width, TOLD, PAST, BEGIN, fraction * h, h, history, first, count)
-        derive_lanes(width, elapsed, fraction * h, work, tables)
-        if pace.shape[0] > 0:
-            # As long as the width, but unknown: else the loop would be unrolled, not vectorised.
-            for i in range(N_SLOPES):
-                for k in range(pace.shape[0]):
-                    work[(DX + i) * width + k] *= pace[k]
+        derive_lanes(width, elapsed, fraction, h, work, tables)
         if stage < 3:
             for n in range(N_SLOPES * width):
                 slope = work[DX * width + n]
@@ -186,7 +179,7 @@ def accept_states(work, width, elapsed):
             value = work[(X + j) * width + k]
             work[SIZE * width + k] += abs(value) if bounded else 0.0 * value
     for k in range(width):
-        moved = work[LENGTH * width + k] > 0.0 if CORNERS else True
+        moved = work[LENGTH * width + k] > 0.0 if OWN_STEPS else True
         failed = work[FAILED * width + k]
         good = (work[SIZE * width + k] < LARGEST) & (failed == np.inf)
         now = work[TIME * width + k] + elapsed
@@ -227,12 +220,9 @@ def advance_block(
         work[TIME * width + k] = time[lane]
         work[FAILED * width + k] = failed_at[lane]
     late = LATE_TAIL & (history.shape[0] > 0)
-    own_time = work[:0]
-    turns = False
-    if CORNERS:
-        for k in range(width):
-            lane_turns(k, width, work)
-            turns |= work[TURNS * width + k] > 0.0
+    same_pace = work[:0]
+    if OWN_STEPS:
+        find_turns(work, width)
     stored = trace_at
     for segment in range(steps.shape[0]):
         h = sizes[segment]
@@ -241,14 +231,14 @@ def advance_block(
         for i in range(steps[segment]):
             elapsed = starts[segment] + i * h
             plan_actuators(work, width, h)
-            if CORNERS:
+            if OWN_STEPS:
                 step_in_parts(
-                    work, width, elapsed, h, tables, late, history, first, count, turns
+                    work, width, elapsed, h, tables, late, history, first, count, same_pace
                 )  # fmt: skip
             else:
-                rk4_step(work, width, elapsed, h, tables, late, history, first, count, own_time)
+                rk4_step(work, width, elapsed, h, tables, late, history, first, count)
                 accept_states(work, width, elapsed + h)
-                accept_actuators(work, width)
+            accept_actuators(work, width)
             if (trace.shape[0] > 0) & ((i + 1) % every[segment] == 0):
                 sample = stored % trace.shape[0]
                 for j in range(trace.shape[1]):
@@ -322,9 +312,9 @@ def presume_told(work, width):
         for k in range(width):
             lane_command(k, width, 0.0, work)
         assume_running(work, width, TOLD, PAST)
-    if LATE_TAIL & CORNERS:
+    if LATE_TAIL & OWN_STEPS:
         assume_running(work, width, TOLD, PAST_END)
-    if CORNERS:
+    if OWN_STEPS:
         for k in range(width):
             work[LENGTH * width + k] = MOMENT
             lane_corner(k, width, 0.0, work)

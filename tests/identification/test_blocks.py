@@ -28,6 +28,8 @@ NAMES = (
 )
 """Effects that have a hook for each stage among them, states, a memory, and a late command."""
 WIDTH = 24
+LENGTH = 0.005
+"""Of the present part of a step (s)."""
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +40,7 @@ def effects():
 @pytest.fixture(scope="module")
 def module(effects):
     """The composed physics as plain Python, which takes no time to compile."""
-    return plain_module(Composition(effects).in_common_steps(TEMPLATES), {})
+    return plain_module(Composition(effects).in_blocks(TEMPLATES), {})
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +61,7 @@ def block(module, effects, on, rng):
     state = work[module.X : module.X + module.N_STATES]
     state[:] = 0.1 * rng.standard_normal(state.shape)
     state[3:7] /= np.linalg.norm(state[3:7], axis=0)
+    work[module.LENGTH] = LENGTH
     work[module.U : module.U + 5] = np.array([[0.1], [0.3], [1.2], [0.004], [0.1]])
     heard = work[module.PAST : module.PAST_END]
     heard[:] = 0.1 * rng.standard_normal(heard.shape)
@@ -79,7 +82,7 @@ def in_loops(module, work, tables):
     """Slopes (states, lanes) as the loops of the block find them."""
     work = work.copy()
     module.switch_effects(WIDTH, WIDTH, work)
-    module.derive_lanes(WIDTH, 0.02, 0.005, work, tables)
+    module.derive_lanes(WIDTH, 0.02, 1.0, LENGTH, work, tables)
     return slopes(module, work)
 
 
@@ -87,7 +90,7 @@ def lane_by_lane(module, work, tables):
     """The same by the function of one lane."""
     work = work.copy()
     for k in range(WIDTH):
-        module.lane_derivative(k, WIDTH, 0.02, 0.005, work, tables)
+        module.lane_derivative(k, WIDTH, 0.02, LENGTH, work, tables)
     return slopes(module, work)
 
 
@@ -119,7 +122,7 @@ def test_each_effect_is_seen_to_be_on(module, effects, tables, name):
 def test_a_block_that_overlooks_effects_is_noticed(effects, tables):
     """Where no effect is ever found to be on, the comparison fails."""
     blind = {"    on = on if ": "    on = 0.0 if "}
-    module = plain_module(Composition(effects).in_common_steps(TEMPLATES), blind)
+    module = plain_module(Composition(effects).in_blocks(TEMPLATES), blind)
     work = block(module, effects, NAMES, np.random.default_rng(0))
     assert np.any(in_loops(module, work, tables) != lane_by_lane(module, work, tables))
 
@@ -142,12 +145,12 @@ def test_one_lane_switches_an_effect_on_for_its_block(module, effects):
 def test_lanes_behind_those_that_move_have_no_slopes(names, tables):
     """And the others have the bits that they have in a full block."""
     effects = tuple(effect for name, effect in catalogue().items() if name in names)
-    module = plain_module(Composition(effects).in_common_steps(TEMPLATES), {})
+    module = plain_module(Composition(effects).in_blocks(TEMPLATES), {})
     work = block(module, effects, names, np.random.default_rng(1))
     whole = in_loops(module, work, tables)
     part = work.copy()
     module.switch_effects(8, WIDTH, part)
-    module.derive_lanes(WIDTH, 0.02, 0.005, part, tables)
+    module.derive_lanes(WIDTH, 0.02, 1.0, LENGTH, part, tables)
     np.testing.assert_array_equal(slopes(module, part)[:, :8], whole[:, :8])
     assert not slopes(module, part)[:, 8:].any()
     assert whole[:, 8:].any()

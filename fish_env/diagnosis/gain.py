@@ -95,7 +95,7 @@ def one_step(baseline: Fit, extended: Fit) -> OneStep:
 
 
 def _as_fitted(fit: Fit, noise: NoiseModel) -> Sequence[Filtered]:
-    return series_of(fit).with_refinement().filtered(fit.point, noise)
+    return series_of(fit).in_usual_steps().filtered(fit.point, noise)
 
 
 def misfit_of(problem: SeriesProblem, judged: OneStep) -> dict[str, Pair]:

@@ -191,7 +191,7 @@ def _diagnose_runs(
             found, gain = unnamed(found, judging, np.random.default_rng([seed, 4])), None
             dataset = replace(dataset, notes=(*dataset.notes, USELESS))
     progress("locating the misfit")
-    problem = problem.with_refinement()  # what was published, where comparisons do with less
+    problem = problem.in_usual_steps()  # what was published, where comparisons do with less
     judged = one_step(baseline, found.accepted)
     place = localise_fits(problem, judged, np.random.default_rng([seed, 3]))
     progress("choosing the next experiment")

@@ -1,14 +1,13 @@
 """Angle limit: stops limit the tail angle on one side or on both.
 
-The tail's rate jumps when it meets a stop. Within half a step of the jump, the rate is replaced by
-its mean over one step about the present time. The steps then add up to the change of the angle.
+The tail's rate jumps when it meets a stop, and steps are parted there.
 """
 
 from __future__ import annotations
 
 from math import inf
 
-from fish_env.model.corners import TOUCH, UNTOLD_STEP, cubic, rate_against_stops, rises
+from fish_env.model.corners import TOUCH, cubic, rises
 from fish_env.model.effect import Effect, EffectParameter
 from fish_env.model.jit import kernel
 from fish_env.model.records import Tail
@@ -17,27 +16,14 @@ from fish_env.model.records import Tail
 @kernel
 def stop_tail(tail, inputs, phase, time, fish, e, memory, since):
     """xi = min(max(cmd, lower), upper); at rest against a stop."""
-    step, side = memory
-    held = (tail.angle < e.lower) | (tail.angle > e.upper)
-    seen = Tail(
-        min(max(tail.angle, e.lower), e.upper),
-        rate_against_stops(tail, e.lower, e.upper, held, step),
-        0.0 if held else tail.acceleration,
-    )
-    return seen, (since if since > 0.0 else step, side)
-
-
-@kernel
-def move_in_part(tail, inputs, phase, time, fish, e, memory, since):
-    """The same until the tail meets a stop or leaves it."""
-    step, side = memory
+    (side,) = memory
     held = side != 0.0
     seen = Tail(
         (e.upper if side > 0.0 else e.lower) if held else tail.angle,
         0.0 if held else tail.rate,
         0.0 if held else tail.acceleration,
     )
-    return seen, (step, side)
+    return seen, (side,)
 
 
 @kernel
@@ -55,13 +41,13 @@ def corner(tail, phase, later, later_phase, e, memory, length):
     side = 1.0 if above else (-1.0 if below else 0.0)
     up = above | ((not below) & (later.angle > e.upper))
     way, stop = 1.0 if up == (side == 0.0) else -1.0, e.upper if up else e.lower
-    return length * rises(way * (a - stop), way * b, way * c, way * d), (length, side)
+    return length * rises(way * (a - stop), way * b, way * c, way * d), (side,)
 
 
 @kernel
 def start_anywhere(inputs, tail, fish, e):
-    """The length of the step before a run is unknown."""
-    return UNTOLD_STEP, 1.0 if tail.angle > e.upper else (-1.0 if tail.angle < e.lower else 0.0)
+    """A stop holds the tail, or none."""
+    return (1.0 if tail.angle > e.upper else (-1.0 if tail.angle < e.lower else 0.0),)
 
 
 EFFECT = Effect(
@@ -75,13 +61,11 @@ EFFECT = Effect(
         EffectParameter("upper", "rad", inf, 0.0, inf, (0.2, 0.7), "stop on the starboard side"),
     ),
     hooks={"tail": stop_tail},
-    memory={"tail": ("step", "side")},
+    memory={"tail": ("side",)},
     initial_states=start_anywhere,
     turns=turns,
     corner=corner,
-    part=move_in_part,
     order=3,
-    step_error=0.003,
     confusable_with=(
         "offset_gain",
         "swing_loss",

@@ -3,42 +3,18 @@
 The tail stays at rest until the servo has taken up the play, and then moves with it. This "play"
 operator is exact from step to step and needs no stiff contact force.
 
-The tail's rate jumps when contact is made. If a jump falls within a step, the hydrodynamics use the
-mean of the rate over that step. Otherwise, at a step of 10 ms, forces that depend on the rate would
-be wrong by a tenth to a half of the effect's share of them.
+The tail's rate jumps when contact is made, and steps are parted there.
 """
 
 from __future__ import annotations
 
 from math import inf
 
-from fish_env.model.corners import (
-    MEMORY,
-    TOUCH,
-    angle_at,
-    cubic,
-    follow,
-    gained_in_half,
-    handed_on,
-    rises,
-    starting,
-)
+from fish_env.model.corners import MEMORY, TOUCH, cubic, handed_on, rises, starting
 from fish_env.model.effect import Effect, EffectParameter
 from fish_env.model.jit import kernel
 from fish_env.model.records import Tail
-from fish_env.model.tail import SETTLING_TIME, spread_jumps
-
-ROUNDING = 1e-9  # rad; teeth this close touch
-STANDSTILL = 1e-3  # rad/s; a tail this slow rests
-
-
-@kernel
-def turning_point(tail, bent, since, at):
-    """The servo's angle where it reverses between the step's start and ``at`` (rad)."""
-    turning = tail.acceleration != 0.0
-    turn = since - tail.rate / (tail.acceleration if turning else 1.0)
-    inside = turning & (turn > 0.0) & (turn < at)
-    return angle_at(tail, bent, (turn if inside else at) - since)
+from fish_env.model.tail import SETTLING_TIME
 
 
 @kernel
@@ -48,49 +24,17 @@ def within(angle, servo, half):
 
 
 @kernel
-def ahead_of_servo(angle, tail, bent, since, at, half):
-    """How far the tail is ahead of its servo, a time ``at`` after the step's start (rad).
-
-    xi = the old xi, moved no further than into [servo - gap/2, servo + gap/2].
-    """
-    goal = angle_at(tail, bent, at - since)
-    first = within(angle, angle_at(tail, bent, -since), half)
-    return within(within(first, turning_point(tail, bent, since, at), half), goal, half) - goal
-
-
-@kernel
 def take_up_play(tail, inputs, phase, time, fish, e, states, memory, since):
     """The tail rests within the play, and moves with the servo while in contact."""
     (settled_rate,) = states
-    half = 0.5 * e.gap
-    ahead, rate, gained = follow(ahead_of_servo, half, tail, since, memory)
-    pushed = (ahead - ROUNDING < -half) & (tail.rate > 0.0)
-    pulled = (ahead + ROUNDING > half) & (tail.rate < 0.0)
-    driven, _ = spread_jumps(
-        Tail(
-            tail.angle + ahead,
-            rate if abs(rate) > STANDSTILL else 0.0,
-            tail.acceleration if pushed | pulled else 0.0,
-        ),
-        settled_rate,
-    )
-    return handed_on(e.gap > 0.0, tail, driven, gained, since, memory[5])
-
-
-@kernel
-def move_in_part(tail, inputs, phase, time, fish, e, states, memory, since):
-    """The same until the rate jumps."""
-    (settled_rate,) = states
-    side = memory[5]
+    angle, _, _, side = memory
     touching = side != 0.0
     moved = Tail(
-        tail.angle - side * (0.5 * e.gap) if touching else memory[0],
+        tail.angle - side * (0.5 * e.gap) if touching else angle,
         tail.rate if touching else 0.0,
         tail.acceleration if touching else 0.0,
     )
-    driven, _ = spread_jumps(moved, settled_rate)
-    gained = gained_in_half(tail, driven, since)
-    return handed_on(e.gap > 0.0, tail, driven, gained, since, side)
+    return handed_on(e.gap > 0.0, tail, moved, settled_rate, side)
 
 
 @kernel
@@ -106,7 +50,8 @@ def corner(tail, phase, later, later_phase, e, memory, length):
     The tail rests meanwhile (0), or moves with the servo: to positive angles (1), or back (-1).
     """
     half = 0.5 * e.gap
-    angle = within(memory[0], tail.angle, half)
+    remembered, rate, acceleration, _ = memory
+    angle = within(remembered, tail.angle, half)
     ahead = tail.angle - angle
     pushed = (ahead >= half - TOUCH) & (tail.rate > 0.0)
     pulled = (ahead <= TOUCH - half) & (tail.rate < 0.0)
@@ -120,7 +65,7 @@ def corner(tail, phase, later, later_phase, e, memory, length):
         0.0 if moving else way * d,
     )
     begun = tail.angle - side * half if moving else angle
-    return when, (begun, tail.angle, tail.rate, 0.0, length, side)
+    return when, (begun, rate, acceleration, side)
 
 
 @kernel
@@ -151,10 +96,8 @@ EFFECT = Effect(
     initial_states=start_in_contact,
     turns=turns,
     corner=corner,
-    part=move_in_part,
     time_scale=fastest,
     order=6,
-    step_error=0.003,
     confusable_with=(
         "servo_delay",
         "servo_rate_limit",

@@ -23,7 +23,6 @@ EFFECT = Effect(
     ),
     command_delay="delay",
     order=3,
-    step_error=0.001,
     confusable_with=(
         "clock_scale",
         "clock_skew",

@@ -1,39 +1,27 @@
 """Servo rate limit: the tail's servo has a largest rate.
 
-The tail's rate jumps when it meets its command again. If a jump falls within a step, the
-hydrodynamics use the mean of the rate over that step. Otherwise the path would be wrong by up to a
-twentieth of the effect on it, even at steps of 2.5 ms.
+The tail's rate jumps when it meets its command again, and steps are parted there.
 """
 
 from __future__ import annotations
 
 from math import inf
 
-from fish_env.model.corners import MEMORY, gained_in_half, handed_on, starting
+from fish_env.model.corners import MEMORY, handed_on, starting
 from fish_env.model.effect import Effect, EffectParameter
 from fish_env.model.jit import kernel
-from fish_env.model.servo import chase, chase_in_part, met_or_left
+from fish_env.model.servo import chase, met_or_left
 from fish_env.model.tail import SETTLING_TIME
 
 
 @kernel
 def limit_rate(tail, inputs, phase, time, fish, e, states, memory, since):
-    """The tail moves towards its command, by at most rate times the time since the last step."""
+    """The tail moves towards its command, by at most rate times the time since the last part."""
     (settled_rate,) = states
+    angle, _, _, side = memory
     on = e.rate < inf
     limit = e.rate if on else 1.0
-    limited, gained = chase(tail, limit, settled_rate, since, memory)
-    return handed_on(on, tail, limited, gained, since, memory[5])
-
-
-@kernel
-def move_in_part(tail, inputs, phase, time, fish, e, states, memory, since):
-    """The same until the rate jumps."""
-    (settled_rate,) = states
-    on = e.rate < inf
-    limit = e.rate if on else 1.0
-    limited = chase_in_part(tail, limit, limit, settled_rate, since, memory)
-    return handed_on(on, tail, limited, gained_in_half(tail, limited, since), since, memory[5])
+    return handed_on(on, tail, chase(tail, limit, limit, angle, side, since), settled_rate, side)
 
 
 @kernel
@@ -45,7 +33,10 @@ def turns(e):
 @kernel
 def corner(tail, phase, later, later_phase, e, memory, length):
     """When the tail meets its command, or the command becomes too fast."""
-    return met_or_left(tail, later, e.rate if e.rate < inf else 1.0, memory, length)
+    angle, rate, acceleration, _ = memory
+    limit = e.rate if e.rate < inf else 1.0
+    when, angle, side = met_or_left(tail, later, limit, angle, length)
+    return when, (angle, rate, acceleration, side)
 
 
 @kernel
@@ -75,10 +66,8 @@ EFFECT = Effect(
     initial_states=start_at_command,
     turns=turns,
     corner=corner,
-    part=move_in_part,
     time_scale=fastest,
     order=4,
-    step_error=0.002,
     confusable_with=(
         "servo_backlash",
         "servo_lag",

@@ -12,18 +12,13 @@ from __future__ import annotations
 import math
 from math import inf
 
-from fish_env.model.corners import MEMORY, gained_in_half, handed_on, starting
+from fish_env.model.corners import MEMORY, handed_on, starting
 from fish_env.model.effect import Effect, EffectParameter
 from fish_env.model.jit import kernel
-from fish_env.model.servo import (
-    ROUNDING,
-    chase,
-    chase_in_part,
-    hinge_flow,
-    hinge_moment,
-    met_or_left,
-)
+from fish_env.model.servo import chase, hinge_flow, hinge_moment, met_or_left
 from fish_env.model.tail import SETTLING_TIME
+
+ROUNDING = 1e-9  # rad; a tail this close to its command is on it
 
 
 @kernel
@@ -71,35 +66,20 @@ def speed_now(tail, motion, angle, reach, fish, e):
 
 @kernel
 def turn_against_water(tail, inputs, phase, time, fish, motion, e, states, memory, since):
-    """The tail moves towards its command at the mean speed that its load left in this step."""
+    """The tail moves towards its command at the mean speed that its load left in this part."""
     (settled_rate,) = states
-    angle, told, told_rate, gained, step, side, before = memory
+    angle, _, _, side, before = memory
     on = e.torque < inf
     now = speed_now(tail, motion, angle, before * since, fish, e)
-    kept = (angle, told, told_rate, gained, step, side)
-    limited, more = chase(tail, 0.5 * (before + now), settled_rate, since, kept)
-    seen, slopes, kept = handed_on(on, tail, limited, more, since, side)
+    moved = chase(tail, 0.5 * (before + now), now, angle, side, since)
+    seen, slopes, kept = handed_on(on, tail, moved, settled_rate, side)
     return seen, slopes, with_speed(kept, now if on else e.speed)
 
 
 @kernel
 def with_speed(kept, speed):
     """What is remembered, with the speed (rad/s)."""
-    return kept[0], kept[1], kept[2], kept[3], kept[4], kept[5], speed
-
-
-@kernel
-def move_in_part(tail, inputs, phase, time, fish, motion, e, states, memory, since):
-    """The same until the rate jumps."""
-    (settled_rate,) = states
-    angle, told, told_rate, gained, step, side, before = memory
-    on = e.torque < inf
-    now = speed_now(tail, motion, angle, before * since, fish, e)
-    kept = (angle, told, told_rate, gained, step, side)
-    limited = chase_in_part(tail, 0.5 * (before + now), now, settled_rate, since, kept)
-    more = gained_in_half(tail, limited, since)
-    seen, slopes, kept = handed_on(on, tail, limited, more, since, side)
-    return seen, slopes, with_speed(kept, now if on else e.speed)
+    return kept[0], kept[1], kept[2], kept[3], speed
 
 
 @kernel
@@ -111,10 +91,9 @@ def turns(e):
 @kernel
 def corner(tail, phase, later, later_phase, e, memory, length):
     """When the tail meets its command, or the command becomes too fast for its load."""
-    angle, told, told_rate, gained, step, side, before = memory
-    kept = (angle, told, told_rate, gained, step, side)
-    when, kept = met_or_left(tail, later, before, kept, length)
-    return when, with_speed(kept, before)
+    angle, rate, acceleration, _, before = memory
+    when, angle, side = met_or_left(tail, later, before, angle, length)
+    return when, (angle, rate, acceleration, side, before)
 
 
 @kernel
@@ -157,11 +136,9 @@ EFFECT = Effect(
     initial_states=start_at_command,
     turns=turns,
     corner=corner,
-    part=move_in_part,
     loaded=True,
     time_scale=fastest,
     order=4,
-    step_error=0.03,
     confusable_with=(
         "beat_load",
         "body_flexibility",

@@ -1,16 +1,14 @@
 """Tail asymmetry: the amplitude is larger on one side.
 
-The angle is exact. The tail's rate jumps where the stroke changes sign. Within half a step of the
-jump, the rate is replaced by its mean over one step about the present time. These means add up to
-the change of the angle, wherever in a step the rate jumps. The acceleration, which acts only on the
-inertia of the water, contains the whole jump as a wider pulse.
+The angle is exact. The tail's rate jumps where the stroke changes sign, and steps are parted there.
+The acceleration, which acts only on the inertia of the water, contains the whole jump as a wider
+pulse.
 """
 
 from __future__ import annotations
 
 import math
 
-from fish_env.model.corners import UNTOLD_STEP
 from fish_env.model.effect import Effect, EffectParameter
 from fish_env.model.jit import kernel
 from fish_env.model.records import Tail
@@ -22,14 +20,6 @@ PULSE_AREA = 0.6169605345437128  # integral of cos^16 over half a turn, pi C(16,
 
 SAME = 1e-4 / math.pi
 """Half turns. A phase this close below a multiple of pi has reached it."""
-
-
-@kernel
-def swing_at(amplitude, amplitude_rate, frequency, frequency_rate, phase, ahead):
-    """A1 sin(phi_t) a time ``ahead`` (s) of a phase (rad)."""
-    turned = ahead * (frequency + 0.5 * ahead * frequency_rate)
-    sine, _ = sincos(phase + TWO_PI * turned)
-    return (amplitude + ahead * amplitude_rate) * sine
 
 
 @kernel
@@ -59,29 +49,9 @@ def stretched(tail, inputs, sine, cosine, side, e):
 @kernel
 def stretch_half_strokes(tail, inputs, phase, time, fish, e, memory, since):
     """Adds ratio A1 |sin(phi_t)| to the angle, and its derivatives."""
-    step, half_stroke = memory
+    (side,) = memory
     sine, cosine = sincos(phase)
-    side = 1.0 if sine > 0.0 else -1.0
-    motion = (
-        inputs.tail_amplitude,
-        inputs.tail_amplitude_rate,
-        inputs.tail_frequency,
-        inputs.tail_frequency_rate,
-    )
-    early = swing_at(*motion, phase, -0.5 * step)
-    late = swing_at(*motion, phase, 0.5 * step)
-    jump = (abs(late) - abs(early)) - side * (late - early)  # zero away from the jump
-    smooth = stretched(tail, inputs, sine, cosine, side, e)
-    seen = Tail(smooth.angle, smooth.rate + e.ratio * (jump / step), smooth.acceleration)
-    return seen, (since if since > 0.0 else step, half_stroke)
-
-
-@kernel
-def move_in_part(tail, inputs, phase, time, fish, e, memory, since):
-    """The same until the stroke changes sign."""
-    step, side = memory
-    sine, cosine = sincos(phase)
-    return stretched(tail, inputs, sine, cosine, side, e), (step, side)
+    return stretched(tail, inputs, sine, cosine, side, e), (side,)
 
 
 @kernel
@@ -98,14 +68,14 @@ def corner(tail, phase, later, later_phase, e, memory, length):
     turned = later_phase - phase
     left = (half_turns + 1.0) * math.pi - phase
     share = left / (turned if turned > 0.0 else 1.0)
-    return length * share if turned > left else math.inf, (length, side)
+    return length * share if turned > left else math.inf, (side,)
 
 
 @kernel
 def start_anywhere(inputs, tail, fish, e):
-    """The length of the step before a run is unknown; the tail is on one side, or goes there."""
+    """The tail is on one side, or goes there."""
     stroke = tail.angle - inputs.tail_offset
-    return UNTOLD_STEP, 1.0 if (stroke if stroke != 0.0 else tail.rate) > 0.0 else -1.0
+    return (1.0 if (stroke if stroke != 0.0 else tail.rate) > 0.0 else -1.0,)
 
 
 EFFECT = Effect(
@@ -120,11 +90,10 @@ EFFECT = Effect(
         ),
     ),
     hooks={"tail": stretch_half_strokes},
-    memory={"tail": ("step", "side")},
+    memory={"tail": ("side",)},
     initial_states=start_anywhere,
     turns=turns,
     corner=corner,
-    part=move_in_part,
     order=1,
     confusable_with=(
         "com_offset",

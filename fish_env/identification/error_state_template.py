@@ -15,6 +15,7 @@ from fish_env.identification.state_blocks import PHASE_COLUMN
 
 # --- completed by compose ---
 from fish_env.model.composed import (
+    BEGUN,
     DX,
     FAILED,
     N_PARAMETERS,
@@ -114,30 +115,23 @@ def share_told(width, history):
 
 @kernel
 def turn_memories(work, width, error):
-    """Apply the error of the phase to what a tail with corners remembers of itself and its command.
+    """Apply the error of the phase to what a tail with corners remembers of itself.
 
-    Each is where it would be that much later in the beat. Were they left behind, the tail would
-    have to catch up with its command at every sample, at its largest rate.
+    It is where it would be that much later in the beat. Were it left behind, it would have to catch
+    up with its command at every sample, at its largest rate.
     """
     for j in range(TAIL_MEMORIES.shape[0]):
-        row, settled = TAIL_MEMORIES[j]
+        angle = X0 + TAIL_MEMORIES[j]
+        rate, acceleration = angle + 1, angle + 2
         for k in range(width):
             turning = work[(DX + PHASE) * width + k]
             if (turning > 0.0) & (error[PHASE_COLUMN, k] != 0.0):
                 later = error[PHASE_COLUMN, k] / turning
                 most = MOST_SWING * work[(U + 1) * width + k] * turning
-                told_rate = work[(X0 + row + 2) * width + k]
-                gained, step = work[(X0 + row + 3) * width + k], work[(X0 + row + 4) * width + k]
-                follows = gained == 0.0
-                rate = told_rate if follows else told_rate + 2.0 * gained / step
-                slope = work[(DX + settled) * width + k] if follows else 0.0
-                bent = min(max(slope, -most * turning), most * turning)
-                told = min(max(told_rate, -most), most)
-                work[(X0 + row) * width + k] += later * (
-                    min(max(rate, -most), most) + 0.5 * later * bent
-                )
-                work[(X0 + row + 1) * width + k] += later * (told + 0.5 * later * bent)
-                work[(X0 + row + 2) * width + k] += later * bent
+                speed = min(max(work[rate * width + k], -most), most)
+                bent = min(max(work[acceleration * width + k], -most * turning), most * turning)
+                work[angle * width + k] += later * (speed + 0.5 * later * bent)
+                work[rate * width + k] += later * bent
 
 
 @kernel
@@ -233,6 +227,8 @@ def load_lane(work, width, k, state, par, row, first_command):
 def initialise_effects(work):
     """Effect states at rest (they live in the X rows)."""
     width = BLOCK
+    for k in range(width):
+        work[BEGUN * width + k] = 0.0
     for n in range(N_STATES * width):
         work[X * width + n] = work[X0 * width + n]
     for k in range(width):

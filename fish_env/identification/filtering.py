@@ -52,7 +52,6 @@ class Filtered:
         wrench: (T, 6) filtered disturbance, body frame (N, N m).
         log_likelihood: without its constant.
         slopes: what another noise model's likelihood is computed from, if it was asked for.
-        corners: whether its steps are those of motion with corners.
     """
 
     gains: FloatArray
@@ -63,7 +62,6 @@ class Filtered:
     wrench: FloatArray
     log_likelihood: float
     slopes: Slopes | None = None
-    corners: bool = False
 
     @property
     def residuals(self) -> FloatArray:
@@ -218,7 +216,6 @@ class RunFilter:
         sensors: Measurement,
         noise: NoiseModel,
         keep_slopes: bool = False,
-        corners: bool = False,
     ) -> list[Filtered]:
         """Filter every run with one parameter set.
 
@@ -227,7 +224,6 @@ class RunFilter:
             sensors: for one lane.
             noise: noise model.
             keep_slopes: keep what :meth:`replay` needs.
-            corners: take the steps of motion with corners.
         """
         entry = self.kernels.entry("ekf_run")
 
@@ -248,14 +244,14 @@ class RunFilter:
                 state0, data.swimming, record, measurement.pace[0], measurement.skew[0],
                 measurement.delay[0], measurement.gain[:, 0], measurement.bias[:, 0],
                 measurement.device_ages[:, 0], measurement.lens, data.clock,
-                data.steps(corners), *data.driven,
+                data.substeps, *data.driven,
                 data.corrected, self.codes, sensor_variance(noise, data), noise.jitter_sd * rates,
                 data.covariance0, noise.wrench_variance, noise.correlation_s, noise.phase_sd**2,
                 noise.phase_reach, self._history_rows(record, data), data.known_wrench,
                 self.model.tables, k, w, e, share, x, d, slopes.motion, slopes.channels, slopes.raw,
             )  # fmt: skip
             kept = slopes if keep_slopes else None
-            return Filtered(k, w, e, share, x, d, float(value), kept, corners)
+            return Filtered(k, w, e, share, x, d, float(value), kept)
 
         return list(_threads().map(one, zip(self.runs, self.rates, strict=True)))
 
@@ -340,7 +336,7 @@ class RunFilter:
             entry(
                 state0, data.swimming, record, sensors.pace, sensors.skew, sensors.delay,
                 sensors.gain, sensors.bias, sensors.device_ages, sensors.lens, data.clock,
-                data.steps(gains.corners), *data.driven,
+                data.substeps, *data.driven,
                 data.corrected, self.codes, gains.gains, gains.whitening,
                 noise.correlation_s, self._history_rows(record, data), data.known_wrench, basis,
                 column, size, self.model.tables, out, place, first, last,

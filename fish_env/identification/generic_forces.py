@@ -121,11 +121,7 @@ class BoundForces:
         return float(probes(np.array([column]))[0])
 
     def changes(self, columns: IntArray) -> FloatArray:
-        """How :func:`probes` of some wrenches change the residuals of the fit (D, N).
-
-        What a wrench does to the hull hardly depends on how jumps of the tail's rate are resolved:
-        a fit that does not look the same in long steps for their sake alone takes those as well.
-        """
+        """How :func:`probes` of some wrenches change the residuals of the fit (D, N)."""
         fit, count = self.fit, 1 + len(columns)  # the first gets none
         z = np.repeat(fit.point.z[:, None], count, axis=1)
         effects = {id: np.full(count, value) for id, value in fit.point.effects.items()}
@@ -135,10 +131,8 @@ class BoundForces:
             chosen: Prodded = problem
             return chosen.changes(z, effects, fit.noise, fit.filtered, pushes)
 
-        corners = fit.problem.refines_steps(fit.point.effects)
-        problem = fit.problem.with_long_steps() if corners else fit.comparing
-        out = pushed(problem)
-        if problem is not fit.problem and not np.isfinite(out).all():
+        out = pushed(fit.comparing)
+        if fit.comparing is not fit.problem and not np.isfinite(out).all():
             out = pushed(fit.problem)
         return out.T
 

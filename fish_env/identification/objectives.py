@@ -89,7 +89,7 @@ class OneStep:
         """Fit coefficients, effects and noise."""
         report("searching for initial values")
         begin = start or likely_start(problem, problem.effects)
-        return fit(problem, start=begin, report=report).extrapolated
+        return fit(problem, start=begin, report=report)
 
     def errors(self, problem: SeriesProblem, fit: Fit) -> list[Errors]:
         """Of each run and channel, how far the next sample is off."""

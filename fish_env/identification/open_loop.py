@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Protocol
 
@@ -23,10 +23,6 @@ class Predicting(Protocol):
 
     runs: tuple[RunData, ...]
 
-    def cuts_steps(self, effects: Iterable[EffectParameterId]) -> bool:
-        """Whether one of these has shorter steps than others: it makes the tail's rate jump."""
-        ...
-
     def innovations(
         self,
         z: FloatArray,
@@ -39,17 +35,13 @@ class Predicting(Protocol):
 
 
 def without_feedback(
-    run: RunData,
-    states: int = len(BASE_STATES),
-    corners: bool = False,
-    sd: FloatArray | None = None,
+    run: RunData, states: int = len(BASE_STATES), sd: FloatArray | None = None
 ) -> Filtered:
     """Gains of zero, so that "innovations" are plain prediction errors.
 
     Args:
         run: the run.
         states: rows of the state.
-        corners: whether the tail's rate may jump.
         sd: (C,) units that errors count in; default: those of the channels.
     """
     samples, channels = run.measured.shape
@@ -62,28 +54,23 @@ def without_feedback(
         np.zeros((samples, states)),
         np.zeros((samples, 6)),
         0.0,
-        corners=corners,
     )
 
 
-def in_units_of_noise(
-    runs: Sequence[RunData], sensor_sd: FloatArray, corners: bool
-) -> list[Filtered]:
+def in_units_of_noise(runs: Sequence[RunData], sensor_sd: FloatArray) -> list[Filtered]:
     """Of each run, gains of zero and errors that count in units of its sensors' noise.
 
     Args:
         runs: the runs.
         sensor_sd: (C,) usual noise of the channels.
-        corners: whether the tail's rate may jump.
     """
-    return [without_feedback(r, corners=corners, sd=sensor_sd * r.noise_scale) for r in runs]
+    return [without_feedback(r, sd=sensor_sd * r.noise_scale) for r in runs]
 
 
 def errors(problem: Predicting, point: Point, noise: NoiseModel) -> list[FloatArray]:
     """Measured minus predicted of each run from its initial state, (T, C), NaN where missing."""
     effects = {id: np.array([value]) for id, value in point.effects.items()}
-    corners = problem.cuts_steps(point.effects)
-    still = [without_feedback(run, corners=corners) for run in problem.runs]
+    still = [without_feedback(run) for run in problem.runs]
     flat = problem.innovations(point.z[:, None], effects, noise, still)[0]
     parts = np.split(flat, np.cumsum([run.measured.size for run in problem.runs])[:-1])
     return [

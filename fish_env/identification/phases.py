@@ -47,10 +47,6 @@ class Filtering(Protocol):
         """The quickest filter that computes with these effect parameters."""
         ...
 
-    def cuts_steps(self, effects: Iterable[EffectParameterId]) -> bool:
-        """Whether one of these has shorter steps than others: it makes the tail's rate jump."""
-        ...
-
     def with_runs(self: S, runs: Sequence[RunData]) -> S:
         """The same on other runs."""
         ...
@@ -114,8 +110,7 @@ def _likeliest(
     trials = [_starting(_beginning(run), phase, spread) for run, own in tried for phase in own]
     judge = RunFilter(problem.filter_for(point.effects).model, trials, problem.channels)
     record, measurement = problem.lane(point)
-    corners = problem.cuts_steps(point.effects)
-    values = [r.log_likelihood for r in judge.run(record, measurement, noise, corners=corners)]
+    values = [r.log_likelihood for r in judge.run(record, measurement, noise)]
     best = np.argmax(np.reshape(values, (len(tried), -1)), axis=1)
     return [float(own[i]) for (_, own), i in zip(tried, best, strict=True)]
 

@@ -37,11 +37,8 @@ FINER = 4
 """How many times finer those are than the others."""
 LONG_STEP_S = 0.02
 """Longest step where causes are only compared: what most of them change comes out the same within
-a thousandth, what the quickest lags change within a tenth, and within a quarter where the tail's
-rate jumps. Twice as long, a lag that the usual steps follow diverges."""
-CORNERS = 2
-"""How many times finer steps are where the tail's rate may jump at any time. What they get wrong is
-a hundredth of an effect or two, and :attr:`Fit.extrapolated` puts that right."""
+a thousandth, what the quickest lags change within a tenth. Twice as long, a lag that the usual
+steps follow diverges."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,19 +199,10 @@ class RunData:
         """(devices,) the same by the run's present numbers, and all that makes devices late."""
         return np.asarray(self.ages(self.variation[:, None])[:, 0] + self.late)
 
-    def steps(self, corners: bool) -> IntArray:
-        """(T,) RK4 steps up to each sample, finer for motion with corners."""
-        return self.corner_substeps if corners else self.substeps
-
-    @property
-    def corner_substeps(self) -> IntArray:
-        """(T,) steps for motion with corners: finer everywhere."""
-        return CORNERS * self.substeps
-
     @cached_property
     def shortest_step(self) -> float:
-        """Of the steps for motion with corners (s)."""
-        return float(np.min(np.diff(self.clock) / self.corner_substeps[1:]))
+        """The shortest of its RK4 steps (s)."""
+        return float(np.min(np.diff(self.clock) / self.substeps[1:]))
 
     def in_long_steps(self, fastest: float = np.inf, long: float = LONG_STEP_S) -> RunData:
         """The same run, simulated no finer than a comparison needs.
@@ -236,10 +224,6 @@ class RunData:
         if self.usual_substeps is None:
             return self
         return replace(self, substeps=self.usual_substeps, usual_substeps=None)
-
-    def in_finer_steps(self) -> RunData:
-        """The same run in finer steps."""
-        return replace(self, substeps=FINER * self.substeps)
 
     @property
     def commands(self) -> tuple[FloatArray, FloatArray]:

@@ -98,7 +98,6 @@ class SeriesProblem(Stepped):
         )
         self.baseline = baseline_of(dataset, self.fish, paths)
         self.effects = tuple(effects)
-        self.unrefined = self.cut = False
         self.drive = TailDrive()
         self._filters: dict[frozenset[str], RunFilter] = {}
         if unknown := [name for name in self.effects if name not in self.known]:
@@ -158,7 +157,7 @@ class SeriesProblem(Stepped):
         """Windows from filtered states over which the fish swims alone (see the protocol)."""
         cut = [windows(run, f, self.channels) for run, f in zip(self.runs, filtered, strict=True)]
         problem = self.with_runs([window for own in cut for window in own])
-        still = in_units_of_noise(problem.runs, noise.sensor_sd, filtered[0].corners)
+        still = in_units_of_noise(problem.runs, noise.sensor_sd)
         return problem, still, np.repeat(np.arange(len(cut)), [len(own) for own in cut])
 
     @property
@@ -326,8 +325,8 @@ class SeriesProblem(Stepped):
         It begins where its run does, and not ``near`` another one. Where runs differ it keeps in
         any case what :meth:`RunFilter.replay` needs.
         """
-        corners, keep = self.cuts_steps(point.effects), keep_slopes or bool(noise.spread.any())
-        return self.filter_for(point.effects).run(*self.lane(point), noise, keep, corners)
+        keep = keep_slopes or bool(noise.spread.any())
+        return self.filter_for(point.effects).run(*self.lane(point), noise, keep)
 
     def lasting(self, filtered: Sequence[Filtered]) -> list[Filtered]:
         """The filtered runs without the slopes of their filters, a third of what a fit holds."""

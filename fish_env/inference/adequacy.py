@@ -192,13 +192,12 @@ def _beyond(
     return bool(interval[0] > neutral + times * above or interval[1] < neutral + times * below)
 
 
-def adequacy(fit: Fit, rng: np.random.Generator, tolerated: float = 0.0) -> Adequacy:
+def adequacy(fit: Fit, rng: np.random.Generator) -> Adequacy:
     """Test a fit against forces of no particular origin.
 
     Args:
         fit: the explanation.
         rng: for the null distribution.
-        tolerated: evidence (in -2 log likelihood) that a simulation error may cause.
     """
     forces, signals = _indicated(fit)
     freedom = fit.problem.noise_freedom(fit)
@@ -208,8 +207,7 @@ def adequacy(fit: Fit, rng: np.random.Generator, tolerated: float = 0.0) -> Adeq
         amount = float(signal.score[0] / signal.projected[0, 0] * forces.unit(column))
         found.append(Misfit(*forces.words(column), signal.log_p, amount))
     found.sort(key=lambda m: m.log_p)
-    strongest = max((signal.statistic for _, signal in signals), default=0.0)
-    reached = not found or found[0].log_p >= threshold or strongest < tolerated
+    reached = not found or found[0].log_p >= threshold
     estimates = (one.words for one in implausible_estimates(fit))
     implausible = (*disturbance_at_limit(fit), *estimates)
     lack = fit.problem.lack_of_fit(fit)
@@ -225,7 +223,6 @@ def strongest_alarm(fit: Fit, rng: np.random.Generator) -> tuple[float, float]:
 
 def _indicated(fit: Fit) -> tuple[GenericTerms, list[tuple[int, Signal]]]:
     """Generic forces along the fitted runs, and the test of each."""
-    fit = fit.extrapolated
     forces = fit.problem.generic_terms(fit)
     return forces, list(generic_signals(forces, Projector(fit)))
 

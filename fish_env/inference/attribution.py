@@ -69,16 +69,6 @@ class Attribution:
     failed: frozenset[CauseId] = frozenset()
     preconditions: tuple[Precondition, ...] = ()
 
-    @property
-    def tolerated(self) -> float:
-        """What the simulation of the accepted causes may get wrong itself, in the same unit."""
-        return roughness(self.accepted) * self.gain
-
-    def extrapolated(self) -> Attribution:
-        """The same, with estimates as ever finer steps put them."""
-        rivals = tuple(e.extrapolated() for e in self.rivals)
-        return replace(self, accepted=self.accepted.extrapolated(), rivals=rivals)
-
 
 def attribute(
     problem: Problem,
@@ -248,11 +238,10 @@ class Search:
 
     def together(self, found: Attribution) -> Attribution:
         """With further effects that are needed beside those found, and what the runs differ in."""
-        before, rough = found.accepted, roughness(found.accepted)
+        before = found.accepted
         current, after, replaced = pursue(
-            before, found.shown, self.causes, self.rng, self.report,
-            rough * found.gain, self.relaxed_log_p,
-        )  # fmt: skip
+            before, found.shown, self.causes, self.rng, self.report, self.relaxed_log_p
+        )
         if current is before:
             return found
         gain = found.gain + before.score - current.score
@@ -309,13 +298,12 @@ class Search:
         """
         current, effort = found.accepted, self.effort
         problem, shown = current.fit.problem, found.shown
-        least = roughness(current) * found.gain
         if current.causes and effort.retries:
             effort = effort.reduced
             if disturbance_at_limit(current.fit):
                 return None
         chosen = shortlisted(
-            problem, shown, effort.shortlist, least, self.relaxed_log_p, len(current.fit.released)
+            problem, shown, effort.shortlist, self.relaxed_log_p, len(current.fit.released)
         )
         if current.causes and self.effort.retries:
             chosen = [signal for signal in chosen if not signal.cause.is_effect]
@@ -333,10 +321,10 @@ class Search:
         # What else is missing pulls at a coefficient too, but not in all runs alike.
         alone = not current.causes or not tried or not isinstance(tried[0].causes[-1], Coefficient)
         doubtful = not alone and not agreed(tried[0], base)
-        if doubtful or gain < max(POLICY.evidence_doubt, least):
+        if doubtful or gain < POLICY.evidence_doubt:
             failed = found.failed | {signal.cause.id for signal in chosen}
             return replace(found, ranking=ranking, failed=failed)
-        best, others, after = self._questioned(current, tried, chosen, shown, found.gain + gain)
+        best, others, after = self._questioned(current, tried, chosen, shown)
         others = [e for e in others if explained_away(e.causes[-1], shown, after)]
         return replace(
             found, accepted=best, shown=after, ranking=ranking,
@@ -361,7 +349,6 @@ class Search:
         tried: list[Explanation],
         chosen: Sequence[Signal],
         shown: Screen,
-        total: float,
     ) -> tuple[Explanation, list[Explanation], Screen]:
         """The best explanation, the others, and the screen of the best.
 
@@ -369,8 +356,8 @@ class Search:
         """
         best = tried[0]
         after = screen(best.fit, self.causes, self.rng)
-        problem, least = best.fit.problem, roughness(best) * total
-        if self.effort.retries and not current.causes and shortlisted(problem, after, 1, least):
+        problem = best.fit.problem
+        if self.effort.retries and not current.causes and shortlisted(problem, after, 1):
             others = newly_shown(after, chosen)
             others += like(best.causes[-1], shown, others, problem)
             tried = restart_from_winner(current, tried, others, self.report)
@@ -378,12 +365,3 @@ class Search:
         if varied is not best:
             after = screen(varied.fit, self.causes, self.rng)
         return varied, tried[1:], after
-
-
-def roughness(explanation: Explanation) -> float:
-    """Share of the evidence for an explanation that its simulation may get wrong.
-
-    A further cause has to gain more than such an error would.
-    """
-    known = explanation.fit.problem.known
-    return max((known[name].step_error ** 2 for name in explanation.fit.effects), default=0.0)

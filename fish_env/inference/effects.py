@@ -79,7 +79,8 @@ class DeclaredEffect(Switched):
         parameters: its parameters.
         confusable_with: names of effects with a similar signature.
         equals: baseline coefficients (paths) other values of which do exactly the same.
-        step_error: share of its effect that the simulation gets wrong.
+        nonsmooth: whether it makes the motion's rate jump, so that slopes tell little of large
+            sizes.
         drifts_in_phase: whether a periodic drive gets ever further out of phase.
         diagnosed: whether a diagnosis looks for it; else it is only simulated, and fitted if asked.
         parts: parameters -> other effects, with their parameters, that together do nearly the
@@ -90,7 +91,7 @@ class DeclaredEffect(Switched):
     parameters: tuple[EffectParameter, ...]
     confusable_with: tuple[str, ...] = ()
     equals: tuple[str, ...] = ()
-    step_error: float = 0.0
+    nonsmooth: bool = False
     drifts_in_phase: bool = False
     diagnosed: bool = True
     parts: Callable[[Mapping[str, float]], Parts] | None = None

@@ -107,9 +107,8 @@ def without_insignificant(
     """The explanation without causes that are not significant beside the others.
 
     What was missing when a cause was accepted pulled at it. Beside all others it has to be as
-    significant as it had to be then, and to explain more than the steps get wrong. It stays where
-    the fit without it loses more than the linear model foresees, or than the steps get wrong, and
-    where it is the only one: that was judged by the search.
+    significant as it had to be then. It stays where the fit without it loses more than the linear
+    model foresees, and where it is the only one: that was judged by the search.
 
     Args:
         current: causes with their fit.
@@ -120,20 +119,19 @@ def without_insignificant(
     if len(current.causes) < 2:
         return current
     needed: set[CauseId] = set()
-    rough = current.fit.likelihood_error
     while len(current.causes) > 1:
         own, judged = current.fit, [c for c in current.causes if c not in needed]
         lifted = sum(isinstance(name, Coefficient) for name in current.causes)
         enough = {c: threshold(lifted - 1 if isinstance(c, Coefficient) else 0) for c in judged}
         over = {c: log_p_of(own, c) - enough[c] for c in judged}
-        weak = [c for c in judged if over[c] >= 0.0 or from_off(own, off_values(own, c)) < rough]
+        weak = [c for c in judged if over[c] >= 0.0]
         if not weak:
             break
         weakest = max(weak, key=lambda cause: over[cause])
         report(f"fitting without {name_of(weakest)}, which is not significant any more")
         foreseen = allowed_loss(own, weakest, float(np.exp(enough[weakest])))
         smaller = without(current, (weakest,))
-        most = current.score + POLICY.evidence_doubt + max(foreseen, rough)
+        most = current.score + POLICY.evidence_doubt + foreseen
         if smaller is None or smaller.score > most:
             needed.add(weakest)
         else:

@@ -106,10 +106,6 @@ class Explanation:
         """The causes with another one in the place of one of them."""
         return tuple(other if c == cause else c for c in self.causes)
 
-    def extrapolated(self) -> Explanation:
-        """The same causes, with estimates as ever finer steps put them."""
-        return Explanation(self.causes, self.fit.extrapolated)
-
     @cached_property
     def score(self) -> float:
         """-2 log evidence (Laplace's approximation), but for a constant of the problem.
@@ -198,17 +194,14 @@ def reached(make: Callable[[], T]) -> T | None:
 def in_steps_of(problem: Problem, current: Explanation) -> Explanation:
     """An explanation as fits with other effects are made: in the steps of their problem.
 
-    A drive whose rate jumps is simulated in finer ones, and longer ones cost more than many a cause
-    gains.
+    Longer ones may cost more than many a cause gains.
 
     Args:
         problem: that of the other fits.
         current: the explanation.
     """
-    own, values = current.fit, current.fit.point.effects
-    steps = [(p.refines_steps(values), p.cuts_steps(values)) for p in (own.problem, problem)]
-    as_long = own.problem.longest_step == problem.longest_step
-    if steps[0] == steps[1] and (as_long or own.looks_alike(problem)):
+    own = current.fit
+    if own.problem.longest_step == problem.longest_step or own.looks_alike(problem):
         return current
     start = (own.effects, own.point, own.noise, own.released)
     again = reached(lambda: fit(problem, *start, rounds=2, iterations=FEWER_STEPS))

@@ -103,8 +103,8 @@ def asked_of_lags(
         report: told what is being done.
     """
     runs, pairs = current.fit.problem, _shown(late(current), shown)
-    if runs.is_coarse(current.fit.point.effects):
-        runs = runs.with_refinement()
+    if runs.is_coarse:
+        runs = runs.in_usual_steps()
     else:
         pairs = _within_reach(current.fit, pairs)
     leeway = POLICY.coarse_fit_leeway

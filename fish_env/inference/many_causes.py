@@ -31,7 +31,6 @@ def pursue(
     causes: Sequence[Cause],
     rng: np.random.Generator,
     report: Report,
-    least: float,
     relaxed_log_p: float,
 ) -> tuple[Explanation, Screen, list[tuple[CauseId, CauseId]]]:
     """The explanation with all further causes that are needed together, and its screen.
@@ -44,16 +43,15 @@ def pursue(
         causes: causes to consider.
         rng: for null distributions.
         report: told what is being done.
-        least: statistic below which a simulation error explains a cause.
         relaxed_log_p: added to the log p-value that makes a cause significant.
 
     Returns:
         The explanation, its screen, and causes that took the place of another effect on the way,
         each with that effect.
     """
-    if not shortlisted(current.fit.problem, shown, 1, least, relaxed_log_p):
+    if not shortlisted(current.fit.problem, shown, 1, relaxed_log_p):
         return current, shown, []
-    pursuit = Pursuit(causes, rng, report, least, relaxed_log_p)
+    pursuit = Pursuit(causes, rng, report, relaxed_log_p)
     first = current.causes
     current, shown = pursuit.simplified(current, shown)
     if disturbance_at_limit(current.fit):
@@ -72,7 +70,6 @@ class Pursuit:
     causes: Sequence[Cause]
     rng: np.random.Generator
     report: Report
-    least: float
     relaxed_log_p: float
 
     def screened(self, current: Explanation) -> Screen:
@@ -130,7 +127,7 @@ class Pursuit:
 
     def _pursued(self, current: Explanation, shown: Screen, **limits: int) -> Explanation:
         kept = beside(current, shown)
-        return pursued(current, kept, self.report, self.least, self.relaxed_log_p, **limits)
+        return pursued(current, kept, self.report, self.relaxed_log_p, **limits)
 
     def simplified(self, current: Explanation, shown: Screen) -> tuple[Explanation, Screen]:
         """The explanation, and its screen, with effects that act as a simpler one does replaced.

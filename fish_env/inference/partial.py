@@ -116,9 +116,8 @@ def independent(fit: Fit) -> frozenset[EffectName]:
     together they owe them a small share of what they are, seen from where the effect is off: nearly
     all of it is there with the coefficients as they were known too.
     """
-    own = fit.extrapolated
-    owed = owed_to_coefficients(own)
-    return frozenset(name for name in map(EffectName, own.effects) if _owes_little(own, name, owed))
+    owed = owed_to_coefficients(fit)
+    return frozenset(name for name in map(EffectName, fit.effects) if _owes_little(fit, name, owed))
 
 
 def _owes_little(own: Fit, name: EffectName, owed: Mapping[ParameterId, float]) -> bool:
@@ -178,7 +177,7 @@ class StandIns:
     """
 
     def __init__(self, found: Explanation, threshold: float) -> None:
-        self.fit, self.causes, self.threshold = found.fit.extrapolated, found.causes, threshold
+        self.fit, self.causes, self.threshold = found.fit, found.causes, threshold
         self.projector = Projector(self.fit)
 
     def replaced(self, judged: Sequence[CauseId]) -> list[CauseId]:

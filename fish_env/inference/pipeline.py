@@ -109,7 +109,7 @@ def investigate(
     attribution = attribute(problem, baseline, causes, rng, effort, report)
     shown = attribution.preconditions
     report("testing the residual")
-    left = adequacy(attribution.accepted.fit, rng, attribution.tolerated)
+    left = adequacy(attribution.accepted.fit, rng)
     if effort.retries and left.slight and describe:
         left = cross_validated(attribution, left, describe, report)
     # A weaker cause may explain what is left, but no disturbance of implausible strength.
@@ -122,7 +122,6 @@ def investigate(
     if effort.retries and partly_known:
         report("testing each cause beside generic forces")
         attribution, verdict = partly(attribution, left, verdict, rng, report)
-    attribution = attribution.extrapolated()
     gap = None
     if verdict.name in EXTENDING and held_out is not None:
         report("measuring the gain on final runs")
@@ -230,7 +229,7 @@ def described(
         describe: makes the model.
         held_out: runs that chose nothing, to judge the model on; None without such runs.
     """
-    accepted = attribution.extrapolated().accepted.fit
+    accepted = attribution.accepted.fit
     basis = attribution.baseline.fit if implausible_estimates(accepted) else accepted
     return describe(basis, left.threshold, held_out)
 
@@ -295,7 +294,7 @@ def with_weaker_causes(
     if more.accepted.causes == attribution.accepted.causes:
         return attribution, left
     report("testing the residual")
-    after = adequacy(more.accepted.fit, rng, more.tolerated)
+    after = adequacy(more.accepted.fit, rng)
     before = attribution.accepted
     more_explained = more.accepted.score < before.score - POLICY.evidence_doubt
     beside = bool(before.causes) and more_explained and not after.implausible
@@ -343,4 +342,4 @@ def with_slow_causes(
     if found.causes == before.causes or not better or disturbance_at_limit(found.fit):
         return attribution, left
     report("testing the residual")
-    return more, adequacy(found.fit, rng, more.tolerated)
+    return more, adequacy(found.fit, rng)

@@ -361,37 +361,15 @@ class Problem(Protocol):
         """The same problem in steps that will do to compare causes, with the same freedoms."""
         return self
 
-    def without_refinement(self) -> Problem:
-        """The same problem without finer steps for effects that are not smooth."""
+    def in_usual_steps(self) -> Problem:
+        """The same problem in the steps of published estimates."""
         return self
 
-    def with_refinement(self) -> Problem:
-        """The same problem in usual steps, finer for effects that are not smooth."""
-        return self
-
-    def is_coarse(self, effects: Iterable[EffectParameterId]) -> bool:
-        """Whether steps are longer than published estimates of effect parameters ask for."""
+    @property
+    def is_coarse(self) -> bool:
+        """Whether steps are longer than those of published estimates."""
         return False
-
-    def refined(self) -> tuple[Problem, int]:
-        """The same problem in finer steps, and how many times finer."""
-        return self, 1
-
-    def refines_steps(self, effects: Iterable[EffectParameterId]) -> bool:
-        """Whether one of these effect parameters has finer steps, since it makes a rate jump."""
-        return False
-
-    def cuts_steps(self, effects: Iterable[EffectParameterId]) -> bool:
-        """Whether steps are shorter than usual in a search, since a rate jumps or once jumped."""
-        return False
-
-    def in_steps_of(self, names: Iterable[str]) -> Problem:
-        """The same problem in the steps that it has with these effects, also without them.
-
-        What is compared is simulated in the same steps: finer ones gain more than many a cause.
-        """
-        return self
 
     def is_nonsmooth(self, names: Iterable[str]) -> bool:
-        """Whether one of these effects makes the motion's rate jump, whatever the steps."""
+        """Whether one of these effects makes the motion's rate jump."""
         return False

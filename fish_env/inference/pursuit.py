@@ -47,7 +47,7 @@ class Pick:
 
 
 def picked(
-    projector: Projector, shown: Screen, most: int, least: float = 0.0, relaxed_log_p: float = 0.0
+    projector: Projector, shown: Screen, most: int, relaxed_log_p: float = 0.0
 ) -> list[Pick]:
     """Effects that explain more each, beside those picked before, than chance would.
 
@@ -55,7 +55,6 @@ def picked(
         projector: of the fit that was screened.
         shown: all causes against it.
         most: effects to pick at most.
-        least: statistic below which a simulation error explains an effect.
         relaxed_log_p: added to the log p-value that makes an effect significant.
     """
     candidates, whole, score = _system(projector, shown)
@@ -64,7 +63,7 @@ def picked(
     while len(chosen) < most:
         taken = {s.cause.id for s, _, _ in chosen}
         tests = [
-            (_log_p(left[part], info[part, part], s, least), i)
+            (_log_p(left[part], info[part, part], s), i)
             for i, (s, part) in enumerate(candidates)
             if s.cause.id not in taken and _independent(info[part, part], s.projected)
         ]
@@ -100,9 +99,9 @@ def _system(
     return candidates, whole, np.concatenate([np.zeros(0), *(s.score for s in own.signals)])
 
 
-def _log_p(score: FloatArray, info: FloatArray, signal: Signal, least: float) -> float:
+def _log_p(score: FloatArray, info: FloatArray, signal: Signal) -> float:
     statistic = float(score @ np.linalg.solve(info, score)) / signal.variance_inflation
-    return signal.log_p_of(statistic) if statistic >= least else np.inf
+    return signal.log_p_of(statistic)
 
 
 def _sized(
@@ -134,7 +133,6 @@ def pursued(
     current: Explanation,
     shown: Screen,
     report: Report,
-    least: float = 0.0,
     relaxed_log_p: float = 0.0,
     most: int = POLICY.most_causes,
     fewest: int = 1,
@@ -145,13 +143,12 @@ def pursued(
         current: causes accepted so far.
         shown: all causes against it.
         report: told what is being done.
-        least: statistic below which a simulation error explains a cause.
         relaxed_log_p: added to the log p-value that makes a cause significant.
         most: further causes.
         fewest: causes that have to show; two where one alone was of no use.
     """
     room = min(most, POLICY.most_causes - len(current.causes))
-    picks = picked(Projector(current.fit.extrapolated), shown, room, least, relaxed_log_p)
+    picks = picked(Projector(current.fit), shown, room, relaxed_log_p)
     if len(picks) < fewest:
         return current
     for causes in _led([pick.signal.cause.effect for pick in picks], current, shown, report):
@@ -173,8 +170,7 @@ def _needed(
     coarse = _together(current, causes, picks, shown)
     if coarse is None:
         return current
-    problem = to_search(current.fit.problem.without_refinement(), coarse)
-    problem = problem.in_steps_of(coarse.effects)
+    problem = to_search(current.fit.problem, coarse)
     fitted = _fitted(problem, current, coarse)
     if fitted is None:
         return current
@@ -208,8 +204,7 @@ def _confusable(current: Explanation, cause: CauseId) -> tuple[str, ...]:
 def _fitted(problem: Problem, current: Explanation, coarse: CoarseFit) -> Fit | None:
     """The full fit from a coarse one, with the noise that it leaves.
 
-    In steps that are the same for all effects, but for lags too short for them: finer ones, for
-    effects that are not smooth, are for estimates to be published. What a coarse fit on a few runs
+    What a coarse fit on a few runs
     makes of the parameters that were known before may be worse on all of them than they were,
     and so may the further effects.
     """
@@ -311,7 +306,7 @@ def substitutes(found: Explanation, shown: Screen) -> list[Substitute]:
         found: causes with their fit.
         shown: all other causes against it.
     """
-    fit = found.fit.extrapolated
+    fit = found.fit
     projector = Projector(fit)
     others = [s for s in shown.signals if s.cause.is_effect and s.followed is not None]
     best: dict[tuple[EffectName, EffectName], float] = {}

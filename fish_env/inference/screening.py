@@ -96,7 +96,6 @@ def screen(
         keep_changes: whether the signals keep what each cause changes, which takes much memory;
             their products are kept in any case.
     """
-    fit = fit.extrapolated
     projector = Projector(fit)
     taken: set[str | Coefficient] = {*fit.effects, *fit.released}
     tested = [c for c in causes if c.id not in taken]

@@ -17,7 +17,6 @@ def shortlisted(
     problem: Problem,
     screen: Screen,
     count: int,
-    least: float = 0.0,
     relaxed_log_p: float = 0.0,
     found: int = 0,
 ) -> list[Signal]:
@@ -31,11 +30,10 @@ def shortlisted(
         problem: what is fitted.
         screen: all causes against the present explanation.
         count: how many effects to try.
-        least: statistic below which a simulation error explains a cause.
         relaxed_log_p: added to the log p-value that makes a cause significant.
         found: coefficients in the present explanation.
     """
-    strong = [s for s in screen.best() if s.statistic >= least]
+    strong = screen.best()
     effects = [
         s for s in strong if s.cause.is_effect and s.log_p < screen.threshold + relaxed_log_p
     ]

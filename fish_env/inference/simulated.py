@@ -125,7 +125,7 @@ def _regressed(found: Explanation, names: Sequence[CauseId]) -> tuple[FloatArray
         found: the causes with their fit.
         names: those to leave out, each alone.
     """
-    own = found.fit.extrapolated
+    own = found.fit
     settled, filtered = evaluated(own.problem, own.point, own.noise)
     windows, still, run_of_window = settled.without_feedback(filtered, own.noise)
     model = StandIns(found, 0.0)

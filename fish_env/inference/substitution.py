@@ -10,7 +10,7 @@ import numpy as np
 from fish_env.inference.effects import Parts
 from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
 from fish_env.inference.estimate.fit import Fit, fit
-from fish_env.inference.explanation import Explanation, in_steps_of, reached
+from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.hypotheses import (
     CauseId,
     Coefficient,
@@ -67,7 +67,7 @@ def substituted(
             continue
         if limit_at(own.problem, signal.cause.effect, coarse.point.effects) != name:
             found.append((coarse.objective, causes, coarse))  # else it would act as the cause does
-    others, problem = [], own.problem.in_steps_of([n for _, _, c in found for n in c.effects])
+    others, problem = [], own.problem
     # Beside a misfit the numbers of the runs have not settled yet, and no fit is hopeless.
     give_up_above = np.inf if beside_misfit else own.objective + POLICY.out_of_reach
     for _, causes, coarse in sorted(found, key=lambda f: f[0])[:most]:
@@ -75,7 +75,7 @@ def substituted(
         fitted = at_noise(problem, coarse, own.noise, 4, give_up_above)
         if fitted is not None:
             others.append(Explanation(causes, fitted))
-    found_all = [in_steps_of(problem, current) if others else current, *others]
+    found_all = [current, *others]
     if beside_misfit and others:
         report("fitting run-to-run variation")
         found_all = side_by_side([e.varied_to_the_end for e in found_all])

@@ -44,8 +44,8 @@ class Effect(Protocol):
         ...
 
     @property
-    def step_error(self) -> float:
-        """Share of its effect that the simulation gets wrong."""
+    def nonsmooth(self) -> bool:
+        """Whether it makes the motion's rate jump, so that slopes tell little of large sizes."""
         ...
 
     @property

@@ -147,7 +147,6 @@ def _kernels_of(effect: Effect) -> dict[str, Callable[..., Any]]:
         "initial": effect.initial_states,
         "turns": effect.turns,
         "corner": effect.corner,
-        "part": effect.part,
         "settling": effect.settling,
     }
     return {ending: kernel for ending, kernel in found.items() if kernel is not None}

@@ -72,14 +72,10 @@ class Composition:
         return [self.state_names[row].endswith("rate") for row in self.tail_rows]
 
     @property
-    def tail_memories(self) -> list[tuple[int, int]]:
-        """Of tails that remember where they were: the rows of that angle, and of the settled rate.
-
-        What else is remembered follows the angle, see :data:`fish_env.model.corners.MEMORY`.
-        """
+    def tail_memories(self) -> list[int]:
+        """First rows of what tails remember, see :data:`fish_env.model.corners.MEMORY`."""
         remembering = [e for e in self.effects if e.memory.get("tail", ())[: len(MEMORY)] == MEMORY]
-        rows = self.state_names.index
-        return [(rows(f"{e.name}.angle"), rows(f"{e.name}.settled_rate")) for e in remembering]
+        return [self.state_names.index(f"{e.name}.{MEMORY[0]}") for e in remembering]
 
     @property
     def corners(self) -> tuple[Effect, ...]:

@@ -102,7 +102,6 @@ class Effect(Switched):
             its phase as the hook gets them when a part of a step begins, and at its end, length (s)
             later -> when in it (s) the rate jumps first, infinite where it does not, and the memory
             with which the hook moves the tail until then.
-        part: hook of the tail for parts of a step without jumps; default: that in ``hooks``.
         settling: (tail, e, states) -> longest part of a step (s) that follows its states, for a
             tail whose states are its angle, or angle and rate.
         command_delay: name of the parameter (s) by which the tail's command is late.
@@ -118,8 +117,6 @@ class Effect(Switched):
         measure: (channel arrays by name, parameters) -> channel arrays, an affine function of each
             channel by itself (measurement).
         time_scale: parameters -> its fastest time constant (s); longer physics steps are divided.
-        step_error: share of its effect that the identification gets wrong, in its finer steps and
-            extrapolated, for an effect that makes the tail's rate jump. Above zero, it takes those.
         drifts_in_phase: whether the tail runs ever further out of step with its command, so that
             what a large size does says little of what a small one does.
         diagnosed: whether a diagnosis looks for it; else it is only simulated, and fitted if asked.
@@ -142,7 +139,6 @@ class Effect(Switched):
     initial_states: Callable[..., Any] | None = None
     turns: Callable[..., Any] | None = None
     corner: Callable[..., Any] | None = None
-    part: Callable[..., Any] | None = None
     settling: Callable[..., Any] | None = None
     command_delay: str | None = None
     loaded: bool = False
@@ -154,7 +150,6 @@ class Effect(Switched):
     geometry: Callable[..., Any] | None = None
     measure: Callable[..., Any] | None = None
     time_scale: Callable[[Mapping[str, float]], float] | None = None
-    step_error: float = 0.0
     drifts_in_phase: bool = False
     diagnosed: bool = True
     equals: tuple[str, ...] = ()
@@ -186,8 +181,8 @@ class Effect(Switched):
             raise EffectError(f"effect {self.name}: give initial_states for its states and memory")
         if self.loaded and "tail" not in self.hooks:
             raise EffectError(f"effect {self.name}: a loaded drive has a hook for the tail")
-        if (self.corner or self.part) and "tail" not in self.memory:
-            raise EffectError(f"effect {self.name}: corner and part are for a tail with memory")
+        if self.corner and "tail" not in self.memory:
+            raise EffectError(f"effect {self.name}: corner is for a tail with memory")
         if self.settling is not None and "tail" not in self.states:
             raise EffectError(f"effect {self.name}: settling is for a tail with states")
         if (self.turns is None) != (self.corner is None and self.settling is None):
@@ -204,6 +199,11 @@ class Effect(Switched):
     def needs(self) -> frozenset[str]:
         """Stages of its hooks, and :data:`LOAD` of a loaded drive."""
         return frozenset({*self.hooks, *((LOAD,) if self.loaded else ())})
+
+    @property
+    def nonsmooth(self) -> bool:
+        """Whether it makes the tail's rate jump, so that slopes tell little of large sizes."""
+        return self.corner is not None or self.command_delay is not None
 
     @property
     def acts_on_record(self) -> bool:

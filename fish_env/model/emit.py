@@ -44,7 +44,7 @@ class Emitter(LaneReader):
             f"LATE_TAIL = {bool(self.composition.delays)}\n"
             f"TAIL_ROWS = np.array({self.composition.tail_rows}, np.int64)\n"
             f"TAIL_RATES = np.array({self.composition.tail_rates}, np.bool_)\n"
-            f"TAIL_MEMORIES = np.array({self.composition.tail_memories}, np.int64).reshape(-1, 2)\n"
+            f"TAIL_MEMORIES = np.array({self.composition.tail_memories}, np.int64)\n"
             f"OWN_STEPS = {self.composition.own_steps}\n"
         )
         parts = (self.derivative, self.terms, self.initialise, self.command, self.memory)

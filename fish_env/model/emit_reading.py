@@ -153,9 +153,7 @@ class LaneReader:
         if stage in effect.memory:
             given.append(f"({''.join(rows[count:])}), since")
             targets.append(self.names("m", effect, effect.memory_names))
-        parted = stage == "tail" and effect.part is not None and self.composition.corners
-        hook = f"{effect.name}_{'part' if parted else stage}"
-        return f"{', '.join(targets)} = {hook}({', '.join(given)})"
+        return f"{', '.join(targets)} = {effect.name}_{stage}({', '.join(given)})"
 
     def names(self, letter: str, effect: Effect, values: Sequence[str]) -> str:
         """A tuple of variables of an effect."""

@@ -4,113 +4,56 @@ from __future__ import annotations
 
 import math
 
-from fish_env.model.corners import TOUCH, angle_at, cubic, follow, rises
+from fish_env.model.corners import TOUCH, cubic, rises
 from fish_env.model.jit import kernel
 from fish_env.model.records import Tail
-from fish_env.model.tail import spread_jumps, tail_arm, tail_velocity
-
-ROUNDING = 1e-9  # rad; a tail this close to its command is on it
+from fish_env.model.tail import tail_arm, tail_velocity
 
 
 @kernel
-def ahead_of_command(angle, tail, bent, since, at, limit):
-    """How far the tail is ahead of its command, a time ``at`` after the step's start (rad).
-
-    The exact solution of d(xi)/dt = clip(towards cmd, -limit, limit) from ``angle`` at the step's
-    start, for a command that bends little in a step. The tail moves at its limit until it meets
-    its command, and then follows it as far as the limit allows.
-    """
-    gap = angle_at(tail, bent, -since) - angle
-    behind = abs(gap) > ROUNDING
-    towards = limit if gap > 0.0 else -limit
-    closing = towards - (tail.rate - since * (tail.acceleration - 3.0 * since * bent))
-    approaching = behind & (closing * gap > 0.0)
-    meeting = gap / (closing if approaching else 1.0)
-    slowed = closing - 0.5 * tail.acceleration * meeting
-    meeting = gap / (slowed if approaching & (slowed * gap > 0.0) else 1.0)
-    apart = min(meeting, at) if approaching & (slowed * gap > 0.0) else at
-    chasing = apart if behind else 0.0
-    reached = angle + towards * chasing
-    reach = limit * (at - chasing)
-    goal = angle_at(tail, bent, at - since)
-    return reached + min(max(goal - reached, -reach), reach) - goal
-
-
-@kernel
-def chase(tail, limit, settled_rate, since, memory):
-    """The tail that follows its command at a rate of at most ``limit`` (rad/s).
-
-    Args:
-        tail: the command at present.
-        limit: largest rate (rad/s).
-        settled_rate: state of :func:`spread_jumps`.
-        since: time from the step's start (s).
-        memory: see :data:`fish_env.model.corners.MEMORY`.
-
-    Returns:
-        The tail, and what it gained in the second half of the step so far (rad).
-    """
-    ahead, rate, gained = follow(ahead_of_command, limit, tail, since, memory)
-    behind = (abs(ahead) > ROUNDING) | (abs(tail.rate) > limit)
-    limited, _ = spread_jumps(
-        Tail(
-            tail.angle + ahead,
-            min(max(rate, -limit), limit),
-            0.0 if behind else tail.acceleration,
-        ),
-        settled_rate,
-    )
-    return limited, gained
-
-
-@kernel
-def chase_in_part(tail, limit, now, settled_rate, since, memory):
-    """As :func:`chase`, in a part of a step in which the rate does not jump.
+def chase(tail, limit, now, angle, side, since):
+    """The tail that follows its command at a limited rate, in a part of a step without jumps.
 
     Args:
         tail: the command at present.
         limit: largest rate, its mean in this part (rad/s).
         now: the same at present.
-        settled_rate: state of :func:`spread_jumps`.
+        angle: of the tail at the start of the part (rad).
+        side: 0 where the tail moves with its command, 1 and -1 where it moves at its limit.
         since: time from the start of the part (s).
-        memory: see :data:`fish_env.model.corners.MEMORY`; ``side`` is 0 where the tail moves with
-            its command, 1 and -1 where it moves at its limit.
 
     Returns:
         The tail.
     """
-    side = memory[5]
     behind = side != 0.0
-    moved = Tail(
-        memory[0] + side * limit * since if behind else tail.angle,
+    return Tail(
+        angle + side * limit * since if behind else tail.angle,
         side * now if behind else min(max(tail.rate, -now), now),
         0.0 if behind else tail.acceleration,
     )
-    spread, _ = spread_jumps(moved, settled_rate)
-    return spread
 
 
 @kernel
-def met_or_left(tail, later, limit, memory, length):
+def met_or_left(tail, later, limit, angle, length):
     """When a tail of limited rate meets its command, or the command leaves it behind.
 
     Args:
         tail: the command when a part of a step begins.
         later: the command at its end.
         limit: largest rate (rad/s).
-        memory: see :data:`fish_env.model.corners.MEMORY`.
+        angle: of the tail when the part begins (rad).
         length: of the part (s).
 
     Returns:
-        The time from the start of the part (s), infinite where neither happens, and the memory for
-        the time until then.
+        The time from the start of the part (s), infinite where neither happens, and the angle and
+        the side with which the tail moves until then, see :func:`chase`.
     """
-    gap = tail.angle - memory[0]
+    gap = tail.angle - angle
     touching, reach = abs(gap) <= TOUCH, limit * length
     ahead = tail.rate if touching else gap
     way = 1.0 if ahead > 0.0 else -1.0
     side = 0.0 if touching & (abs(tail.rate) <= limit) else way
-    angle, b, c, d = cubic(tail, later, length)
+    first, b, c, d = cubic(tail, later, length)
     behind, fast = side != 0.0, 1.0 if later.rate > 0.0 else -1.0
     when = length * rises(
         -way * gap if behind else fast * b - reach,
@@ -118,7 +61,7 @@ def met_or_left(tail, later, limit, memory, length):
         -way * c if behind else 3.0 * fast * d,
         -way * d if behind else 0.0,
     )
-    return when, (memory[0] if behind else angle, tail.angle, tail.rate, 0.0, length, side)
+    return when, angle if behind else first, side
 
 
 @kernel

@@ -226,22 +226,9 @@ class WholeRunProblem(Problem):
             self._shown |= {one: one in shown for one in values}
         return self._shown[id]
 
-    def refines_steps(self, effects: Iterable[EffectParameterId]) -> bool:
-        """Whether one of these effect parameters makes the tail's rate jump."""
-        return self.series.refines_steps(effects)
-
     def is_nonsmooth(self, names: Iterable[str]) -> bool:
         """Whether one of these effects makes the tail's rate jump, whatever the steps."""
         return self.series.is_nonsmooth(names)
-
-    def refined(self) -> tuple[WholeRunProblem, int]:
-        """The same problem in finer steps."""
-        finer, times = self.series.refined()
-        return self._on(finer), times
-
-    def without_refinement(self) -> WholeRunProblem:
-        """The same problem without finer steps for effects that make the tail's rate jump."""
-        return self._on(self.series.without_refinement())
 
     def batch_key(self, names: Iterable[str]) -> object:
         """Stages of the quickest kernel for these effects."""

@@ -47,8 +47,7 @@ def simulation_errors(
         record[row] *= kind.pace(mine)
         lanes.append(np.ascontiguousarray(record))
         starts.append(kind.states(run, mine))
-    corners = series.cuts_steps(values)
-    still = [without_feedback(run, corners=corners) for run in series.runs]
+    still = [without_feedback(run) for run in series.runs]
     noise = series.default_noise()
     rows = judge.innovations(lanes, sensors, noise, still, pushes, starts=starts)
     edges = np.cumsum([run.measured.size for run in series.runs])[:-1]

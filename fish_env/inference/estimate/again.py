@@ -49,15 +49,15 @@ def finished(own: Fit) -> Fit:
 
 
 def refined(own: Fit, rounds: int = 1) -> Fit:
-    """The fit in finer steps where an effect asks for them, if it was made without."""
-    if not own.problem.is_coarse(own.point.effects):
+    """The fit in the steps of published estimates, if it was made in longer ones."""
+    if not own.problem.is_coarse:
         return own
-    problem, start = own.problem.with_refinement(), (own.point, own.noise, own.released)
+    problem, start = own.problem.in_usual_steps(), (own.point, own.noise, own.released)
     return fit(problem, own.effects, *start, rounds=rounds, iterations=FEWER_STEPS)
 
 
 def to_publish(own: Fit) -> Fit:
-    """The fit in the steps that its effects ask for, iterated to convergence.
+    """The fit in the steps of published estimates, iterated to convergence.
 
     Where runs have numbers of their own it is fitted once more at most: such a fit takes longest.
     """
@@ -88,7 +88,7 @@ def to_search(problem: Problem, begin: CoarseFit | None = None) -> Problem:
     """
     if not problem.drive.uneven:
         return problem
-    long = problem.without_refinement().with_long_steps()
+    long = problem.with_long_steps()
     return long if begin is None else following(long, begin)
 
 
@@ -106,9 +106,7 @@ def following(problem: Problem, begin: CoarseFit) -> Problem:
     vector = free.pack(begin.point)
     if not any(g.off < vector[g.number] <= AT_EDGE * g.least for g in free.bounds.gaps):
         return problem
-    usual = problem.with_refinement()
-    finer = usual.longest_step < problem.longest_step
-    return usual.without_refinement() if finer else problem
+    return problem.in_usual_steps()
 
 
 def run_variation(own: Fit) -> Spread:

@@ -65,29 +65,21 @@ class CoarseFitter:
 
     def __init__(self, fit: Fit, runs: int = POLICY.coarse_fit_runs) -> None:
         self.fit = fit
-        self._usual = self._few(fit.problem, runs)
-        self._long = self._few(fit.comparing, runs)
+        self._usual, self._long = fit.problem.subset(runs), fit.comparing.subset(runs)
         few = fit.problem.spread(runs)
         self.filtered = [fit.filtered[i] for i in few]
         whole = fit.linearised.marginal
         self.marginal = None if whole is None else whole.some(few)
 
-    def _few(self, problem: Problem, runs: int) -> Problem:
-        if not problem.refines_steps(self.fit.point.effects):
-            problem = (
-                problem.without_refinement()
-            )  # accurate enough to rank causes, and much quicker
-        return problem.subset(runs)
-
     def _problem_for(self, effects: Sequence[str]) -> Problem:
-        """In long steps, but for effects that make the motion's rate jump, and further lags.
+        """In long steps, but for further lags.
 
         A lag that the usual steps follow may diverge in long ones; those of the fit itself do not.
         """
         problem = self.fit.problem
         further = problem.freedoms([name for name in effects if name not in self.fit.effects])
         quick = any(freedom.least > -np.inf for freedom in further)
-        return self._usual if quick or problem.is_nonsmooth(effects) else self._long
+        return self._usual if quick else self._long
 
     @cached_property
     def base(self) -> float:

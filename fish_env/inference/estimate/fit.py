@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -17,9 +17,7 @@ from fish_env.inference.estimate.free import (
     Free,
     Linearised,
     objective,
-    objective_of,
     quadratic,
-    residuals_at,
     spread_of,
 )
 from fish_env.inference.estimate.gauss_newton import Linearise, Quadratic, descend
@@ -60,7 +58,6 @@ class Fit:
         condition: condition number of the information in prior units.
         filtered: filter results at the estimates.
         linearised: residuals and slopes at the estimates.
-        in_the_limit: whether estimates and residuals are those of steps ever finer.
         profiles: 95 % intervals by likelihood, of the parameters that have one.
     """
 
@@ -79,7 +76,6 @@ class Fit:
     condition: float
     filtered: Sequence[Any] = field(repr=False)
     linearised: Linearised = field(repr=False)
-    in_the_limit: bool = False
     profiles: Mapping[ParameterId, tuple[float, float]] = field(default_factory=dict)
 
     @cached_property
@@ -124,38 +120,6 @@ class Fit:
         (seen,) = other.innovations(self.point.z[:, None], effects, self.noise, self.filtered)
         off = np.sqrt(np.mean((self.marginalised(seen) - self.linearised.residuals) ** 2))
         return bool(off < SAME)
-
-    @cached_property
-    def extrapolated(self) -> Fit:
-        """This fit with residuals and estimates as ever finer steps have them.
-
-        Where the motion's rate jumps, the discretisation error is a small share of an effect, but
-        may be several standard deviations of its estimate and look like another cause. The error
-        is proportional to the step, so residuals in two step lengths give the limit (Richardson,
-        1911), and one Gauss-Newton step leads to its minimum. Slopes are as good in the usual
-        steps. A fit of smooth motion is returned unchanged.
-        """
-        if self.in_the_limit or not self.problem.refines_steps(self.point.effects):
-            return self
-        return _extrapolated(self)
-
-    @cached_property
-    def likelihood_error(self) -> float:
-        """How far steps may put -2 log likelihood off, where the motion's rate jumps; else zero.
-
-        As the difference to finer steps, of runs whose errors are independent of each other. Where
-        a corner lies in its step makes the likelihood rough: it has as many minima as there are
-        steps, and which of them a fit ends in changes the evidence by about as much.
-        """
-        if not self.problem.refines_steps(self.point.effects):
-            return 0.0
-        try:
-            finer = self.problem.refined()[0].filtered(self.point, self.noise)
-        except np.linalg.LinAlgError:
-            return np.inf
-        pairs = zip(self.filtered, finer, strict=True)
-        off = [2.0 * (usual.log_likelihood - fine.log_likelihood) for usual, fine in pairs]
-        return float(np.linalg.norm(off))
 
     def marginalised(self, residuals: FloatArray) -> FloatArray:
         """Residuals (D,) with what the runs differ in integrated out."""
@@ -203,7 +167,6 @@ def fit(
         report: told what is being done.
     """
     names = problem.effects if effects is None else tuple(effects)
-    problem = problem.in_steps_of(names)
     free = Free(problem, names, released)
     given = start or problem.start
     values = {**problem.beginning(names), **given.effects}
@@ -322,27 +285,6 @@ def gauss_newton(
     limits = (free.bounds.beside(vector), iterations, tolerance, give_up_above)
     exactly, quickly = modelled(slopes.exact), modelled(slopes.quick)
     return descend(vector, evaluate, exactly, *limits, quickly=quickly)
-
-
-def _extrapolated(own: Fit) -> Fit:
-    free = Free(own.problem, own.effects, own.released)
-    vector, lin = free.pack(own.point), own.linearised
-    problem = own.problem
-    fine, finer_by = problem.refined()
-    (finer,) = residuals_at(fine, free, vector[:, None], own.noise, own.filtered)
-    defect = (own.marginalised(finer) - lin.residuals) * finer_by / (finer_by - 1)
-    before = lin.residuals + defect
-    pull = gradient(lin.slopes, before, free.prior, vector)
-    bounds = free.bounds.beside(vector)
-    moved = bounds.clip(vector + bounds.step(information(lin.slopes, free.prior), pull, vector))
-    (usual,) = residuals_at(problem, free, moved[:, None], own.noise, own.filtered)
-    after = own.marginalised(usual) + defect
-    if objective_of(problem, free, moved, after) >= objective_of(problem, free, vector, before):
-        moved, after = vector, before
-    estimates, residuals = _physical(problem, moved), replace(lin, residuals=after)
-    return replace(
-        own, point=free.unpack(moved), estimates=estimates, linearised=residuals, in_the_limit=True
-    )
 
 
 def _physical(problem: Problem, vector: FloatArray) -> FloatArray:

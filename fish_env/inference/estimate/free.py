@@ -84,7 +84,6 @@ class Free:
             np.full(self.count, problem.coefficient_step), [f.step for f in self.freedoms]
         ]
         self.steps = self.largest_steps
-        self.nonsmooth = problem.refines_steps((*(f.id for f in self.freedoms), *self.held))
 
     def pack(self, point: Point) -> FloatArray:
         """The vector (n,) of a point; of what is infinite, the mildest plausible value."""
@@ -102,13 +101,9 @@ class Free:
     def suit_steps(self, hessian: FloatArray) -> None:
         """Take differences over one standard error: a longer secant is no slope.
 
-        Where the motion is not smooth the slope of a short step is noise, so those steps stay.
-
         Args:
             hessian: (n, n) information.
         """
-        if self.nonsmooth:
-            return
         told = 1.0 / np.sqrt(np.maximum(np.diag(hessian), 1e-300))
         steps = np.clip(told, SHORTEST * self.largest_steps, self.largest_steps)
         self.steps = np.r_[self.largest_steps[: self.count], steps[self.count :]]

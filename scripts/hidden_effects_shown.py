@@ -81,7 +81,7 @@ def table(fit: Fit, hidden: Values) -> Iterator[str]:
         fit: what they are shown beside.
         hidden: parameters by effect.
     """
-    own = fit.extrapolated
+    own = fit
     projector = Projector(own)
     seen = screen(own, causes_of(own.problem), np.random.default_rng(0)).by_effect()
     yield "| effect | log p, true size | multiple | absorbed | log p, screen | its settings |"

@@ -8,11 +8,9 @@ import pytest
 from fish_env.identification import SeriesProblem, fit
 from fish_env.identification.generic_forces import BoundForces, generic_forces
 from fish_env.inference.changes import residual_changes
-from fish_env.inference.estimate.coarse_fit import CoarseFitter
 from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
 from tests.identification.synthetic import PATHS, Setup, simulate
-from tests.inference.stated import Stated, apart, effect, size_of
 
 QUICK_LAG = ("servo_lag", {"time_constant": 0.01})
 SLOW_LAG = ("servo_lag", {"time_constant": 0.1})
@@ -81,38 +79,6 @@ def test_a_setting_that_long_steps_do_not_follow_takes_the_usual_ones(fitted):
     np.testing.assert_array_equal(quick, usual[0])
     assert np.linalg.norm(slow - usual[1]) < 0.01 * np.linalg.norm(usual[1])
     assert not np.array_equal(slow, usual[1])
-
-
-class Jumping(Stated):
-    """Two effects, one of which makes the rate jump; with long steps it is another problem."""
-
-    def __init__(self, **settings):
-        targets = {name: [3.0, 3.0] for name in ("lag", "backlash")}
-        super().__init__(apart(targets), [effect(name) for name in targets], **settings)
-
-    def is_nonsmooth(self, names):
-        return "backlash" in names
-
-    def with_long_steps(self):
-        return self.long
-
-
-def sketched_in(problem, name):
-    """Steps of the problems that a sketch of an effect asked for residuals."""
-    problem.long = Jumping(step=2.0 * problem.step)
-    fitter = CoarseFitter(fit(problem, refit_noise=False))
-    for part in (problem, problem.long):
-        part.log.simulated.clear()
-    fitter.coarse_fit((name,), (), [Point(np.zeros(1), {size_of(name): 1.0})])
-    return [part.step for part in (problem, problem.long) if part.log.simulated]
-
-
-def test_only_what_jumps_is_sketched_in_the_usual_steps(fitted):
-    assert sketched_in(Jumping(step=0.01), "lag") == [0.02]
-    assert sketched_in(Jumping(step=0.01), "backlash") == [0.01]
-    assert [fitted.problem.is_nonsmooth([name]) for name in ("servo_lag", "servo_backlash")] == [
-        False, True,
-    ]  # fmt: skip
 
 
 @pytest.fixture(scope="module")

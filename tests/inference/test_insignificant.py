@@ -1,7 +1,5 @@
 """Beside the others, a cause has to be as significant as the search asked for."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.stats import norm
@@ -86,50 +84,3 @@ def test_a_coefficient_that_a_fit_needs_stays():
     told = []
     assert without_insignificant(current, lambda others: THRESHOLD, told.append) is current
     assert told
-
-
-class Rough(Stated):
-    """Motion with corners: each run's likelihood depends on where in a step they lie."""
-
-    def __init__(self, *given, off=0.0):
-        super().__init__(*given)
-        self.off = off
-
-    def refines_steps(self, effects):
-        return True
-
-    def refined(self):
-        return Rough(self.residuals, self.known.values(), off=self.off), 4
-
-    def filtered(self, point, noise, near=()):
-        runs = super().filtered(point, noise, near)
-        off = [self.off, -self.off] * (len(runs) // 2)
-        pairs = zip(runs, off, strict=True)
-        return [replace(run, log_likelihood=run.log_likelihood + e) for run, e in pairs]
-
-
-class InUsualSteps(Rough):
-    """The same, before its steps are made finer."""
-
-    def filtered(self, point, noise, near=()):
-        return Stated.filtered(self, point, noise, near)
-
-
-@pytest.mark.parametrize(("off", "left"), [(0.1, (LAG, "weak")), (20.0, (LAG,))])
-def test_a_cause_has_to_explain_more_than_the_steps_get_wrong(off, left):
-    """It explains 59 in -2 log likelihood; the other 2e4. Four runs are off by twice as much."""
-    rng = np.random.default_rng(7)
-    x, y, noise = rng.standard_normal((3, RUNS, SAMPLES))
-
-    def residuals(z, effects):
-        lag, weak = (effects.get(size_of(name), 0.0) for name in (LAG, "weak"))
-        return noise + 20.0 * (0.5 - lag) * x + (0.5 - weak) * y
-
-    stated = InUsualSteps(residuals, [effect(LAG), effect("weak")], off=off)
-    current = Explanation((LAG, "weak"), fit(stated, (LAG, "weak")))
-    assert current.fit.likelihood_error == pytest.approx(4.0 * off)
-    assert without_insignificant(current, lambda others: THRESHOLD, [].append).causes == left
-
-
-def test_smooth_motion_has_no_error_of_steps():
-    assert explained(3.0).fit.likelihood_error == 0.0

@@ -112,10 +112,9 @@ class LongSteps(Stated):
 
     published: Stated
 
-    def is_coarse(self, effects):
-        return True
+    is_coarse = True
 
-    def with_refinement(self):
+    def in_usual_steps(self):
         return self.published
 
 

@@ -43,10 +43,9 @@ class LongSteps(BoatProblem):
     def disturbance_at_limit(self, noise):
         return ("a disturbance at its limit",)
 
-    def is_coarse(self, effects):
-        return True
+    is_coarse = True
 
-    def with_refinement(self):
+    def in_usual_steps(self):
         return BoatProblem(self.runs)
 
 

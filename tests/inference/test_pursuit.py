@@ -12,10 +12,9 @@ from fish_env.inference.effects import DeclaredEffect
 from fish_env.inference.elimination import backward_elimination, insignificant
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.explanation import Explanation
-from fish_env.inference.many_causes import beside, challenged, each_in_turn, pursue
+from fish_env.inference.many_causes import challenged, each_in_turn
 from fish_env.inference.pipeline import infer
 from fish_env.inference.probes import causes_of
-from fish_env.inference.problem import Point
 from fish_env.inference.progress import silent
 from fish_env.inference.projection import Projector
 from fish_env.inference.pursuit import picked, pursued, substitutes
@@ -98,7 +97,7 @@ def test_effects_are_found_together_and_nothing_else():
 def test_where_nothing_shows_nothing_is_fitted():
     baseline, shown = screened()
     nothing = Explanation((), baseline)
-    assert pursued(nothing, shown, silent, least=1e12) is nothing
+    assert pursued(nothing, shown, silent, relaxed_log_p=-1e12) is nothing
 
 
 def test_an_effect_that_does_nothing_is_not_significant_beside_the_others():
@@ -236,106 +235,3 @@ def test_what_the_linear_model_foresees_to_be_needed_is_not_fitted_without(size,
     kept, rivals = backward_elimination(current)
     assert (kept.causes, rivals) == (current.causes, ())
     assert any("small" not in effects for effects, _ in problem.log.simulated) == fitted
-
-
-class Jumping(Stated):
-    """An effect that makes the motion jump: without finer steps its simulation misses more."""
-
-    def __init__(self, coarse=False):
-        def residuals(z, effects):
-            jump, other = effects[size_of("jump")], effects[size_of("other")]
-            missed = 8.0 if coarse and jump else 0.0
-            return np.tile([jump - 30.0, other - 6.0, float(z.sum()), missed], (3, 1))
-
-        super().__init__(residuals, [effect("jump", 40.0), effect("other", 20.0)])
-        self.coarse = coarse
-
-    def without_refinement(self):
-        return Jumping(coarse=True)
-
-    def refines_steps(self, effects):
-        return not self.coarse and any(id.effect == "jump" for id in effects)
-
-    def refined(self):
-        return self, 2
-
-
-def test_a_further_cause_is_judged_in_the_steps_that_it_is_fitted_in():
-    """Finer steps gain more than the cause does, which is found nevertheless."""
-    fine = Jumping()
-    current = Explanation(("jump",), fit(fine, ("jump",)))
-    coarse = fit(fine.without_refinement(), ("jump", "other"))
-    assert Explanation(("jump", "other"), coarse).score > current.score + 6.0
-    shown = screen(current.fit, causes_of(fine), np.random.default_rng(0))
-    assert pursued(current, shown, silent).causes == ("jump", "other")
-
-
-class Cut(Stated):
-    """An effect that cuts all steps, and is worth little besides."""
-
-    def __init__(self, size=0.0, cut=False, cuts=True):
-        def residuals(z, effects):
-            jump, other = effects[size_of("jump")], effects[size_of("other")]
-            missed = 0.0 if cut or any(np.ravel(jump)) else 8.0
-            return np.tile([jump - size, other - 30.0, float(z.sum()), missed], (3, 1))
-
-        super().__init__(residuals, [effect("jump", 1e4), effect("other", 40.0)])
-        self.size, self.cut, self.cuts = size, cut, cuts
-
-    def in_steps_of(self, names):
-        return Cut(self.size, cut=True) if "jump" in names and self.cuts else self
-
-    def cuts_steps(self, effects):
-        return self.cut or any(id.effect == "jump" for id in effects)
-
-
-@pytest.mark.parametrize("cuts", [True, False])
-def test_finer_steps_are_no_evidence_for_the_effect_that_asks_for_them(cuts):
-    """Shown to fail where a fit without the effect goes back to long steps."""
-    start = Point(np.zeros(1), {size_of("jump"): 1.0, size_of("other"): 30.0})
-    own = fit(Cut(cuts=cuts), ("jump", "other"), start, refit_noise=False)
-    kept, _ = backward_elimination(Explanation(("jump", "other"), own))
-    assert (kept.causes == ("other",)) == cuts
-
-
-def test_finer_steps_that_explain_more_are_kept_without_the_effect():
-    long = Cut(size=2.6)
-    current = Explanation(("other",), fit(long, ("other",), refit_noise=False))
-    shown = screen(current.fit, causes_of(long), np.random.default_rng(0))
-    found = pursued(current, shown, silent)
-    assert found.causes == ("other",)
-    assert found.fit.problem.cut
-    assert found.score < current.score - 100.0
-
-
-def with_its_limit(declared: bool) -> Stated:
-    """Two effects that do the same, one of them declared as the other's limit, and a third."""
-    parts = (lambda values: {"simple": dict(values)}) if declared else None
-
-    def residuals(z, effects):
-        moved = effects[size_of("whole")] + effects[size_of("simple")]
-        return np.array([[moved - 6.0, effects[size_of("other")] - 9.0, z.sum()]] * 3)
-
-    known = [effect("whole", 10.0, parts=parts), effect("simple", 10.0), effect("other", 10.0)]
-    return Stated(residuals, known)
-
-
-@pytest.mark.parametrize(("declared", "kept"), [(True, "simple"), (False, "whole")])
-def test_an_effect_at_its_limit_is_replaced_by_it(declared, kept):
-    stated = with_its_limit(declared)
-    found = Explanation(("whole",), fit(stated, ("whole",), refit_noise=False))
-    rng, causes = np.random.default_rng(0), causes_of(stated)
-    shown = screen(found.fit, causes, rng)
-    more, _, _ = pursue(found, shown, causes, rng, silent, 0.0, 0.0)
-    assert set(more.causes) == {kept, "other"}
-
-
-def test_no_effect_is_searched_for_beside_its_limit():
-    """Each would make the other look unnecessary."""
-    stated = with_its_limit(True)
-    for there, other in (("whole", "simple"), ("simple", "whole")):
-        own = fit(stated, (there,), refit_noise=False)
-        shown = screen(own, causes_of(stated), np.random.default_rng(0))
-        left = {s.cause.id for s in beside(Explanation((there,), own), shown).signals}
-        assert "other" in left
-        assert other not in left

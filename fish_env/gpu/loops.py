@@ -53,12 +53,12 @@ if TYPE_CHECKING:  # what a composed module defines
         U,
         accept_actuators,
         accept_states,
-        find_turns,
         gather,
         gather_targets,
         judge,
         observe,
         plan_actuators,
+        prepare_parts,
         rk4_step,
         scatter,
         set_goal,
@@ -91,7 +91,7 @@ def advance_fish(
     late = LATE_TAIL & (history.shape[0] > 0)
     same_pace = work[:0]
     if OWN_STEPS:
-        find_turns(work, 1)
+        prepare_parts(work, 1)
     sample = trace_at % trace.shape[0] if trace.shape[0] > 0 else 0
     for segment in range(steps.shape[0]):
         h = sizes[segment]

@@ -20,7 +20,9 @@ from fish_env.model.composed import (
     FAILED,
     N_PARAMETERS,
     N_STATES,
+    NEXT,
     PAR,
+    SWITCH,
     TAIL_MEMORIES,
     TAIL_RATES,
     TAIL_ROWS,
@@ -29,10 +31,10 @@ from fish_env.model.composed import (
     X0,
     U,
     X,
-    find_turns,
     kernel,
     lane_initialise,
     past_matters,
+    prepare_parts,
     shared_kernel,
     step_in_parts,
     switch_effects,
@@ -54,8 +56,22 @@ are as long as those of motion with corners: a lag that these follow diverges in
 
 
 @kernel
-def set_commands(work, width, times, values, at, start, length, skew, delay, shared):
-    """Mean command over each lane's own interval on the commands' clock: switches act smoothly."""
+def set_commands(work, width, times, values, at, start, length, pace, skew, delay, shared):
+    """Commands of each lane in a step, and when in it they switch, on the commands' clock.
+
+    Args:
+        work: all lanes.
+        width: how many.
+        times: (m,) command times (s).
+        values: (m, 5) commands.
+        at: (width,) which command holds at the last step, updated.
+        start: when the step begins (s).
+        length: of the step (s).
+        pace: (width,) true seconds per recorded second.
+        skew: (width,) seconds of the commands' clock per recorded second.
+        delay: (width,) what the commands' clock is behind (s).
+        shared: whether these are the same for all lanes.
+    """
     for k in range(1 if shared else width):
         begin = skew[k] * start - delay[k]
         end = begin + skew[k] * length
@@ -66,20 +82,26 @@ def set_commands(work, width, times, values, at, start, length, skew, delay, sha
         last = row
         while (last + 1 < times.shape[0]) and (times[last + 1] < end - 1e-9):
             last += 1
+        switch = (times[row + 1] - begin) / skew[k] if last > row else np.inf
+        changed = False
         for j in range(5):
-            total = values[row, j]
-            if last > row:
-                total = 0.0
-                left = begin
-                for i in range(row, last + 1):
+            after = values[last, j]
+            if last > row + 1:  # their mean, behind the first of several switches
+                after = 0.0
+                for i in range(row + 1, last + 1):
                     right = times[i + 1] if i < last else end
-                    total += (right - left) / (end - begin) * values[i, j]
-                    left = right
-            work[(U + j) * width + k] = total
-    if shared:
+                    after += (right - times[i]) / (end - times[row + 1]) * values[i, j]
+            work[(U + j) * width + k] = values[row, j]
+            work[(NEXT + j) * width + k] = after
+            changed |= after != values[row, j]
+        work[SWITCH * width + k] = switch if changed else np.inf
+    for k in range(1, width if shared else 1):
         for j in range(5):
-            for k in range(1, width):
-                work[(U + j) * width + k] = work[(U + j) * width]
+            work[(U + j) * width + k] = work[(U + j) * width]
+            work[(NEXT + j) * width + k] = work[(NEXT + j) * width]
+        work[SWITCH * width + k] = work[SWITCH * width]
+    for k in range(width):
+        work[SWITCH * width + k] *= pace[k]
 
 
 @shared_kernel
@@ -250,7 +272,7 @@ def start_effects(work, lanes, width, begin, swimming, pace, late, history, tabl
     Only so many lanes will move; the others stay where they are.
     """
     switch_effects(whole_vectors(lanes, width), width, work)
-    find_turns(work, width)
+    prepare_parts(work, width)
     initialise_effects(work)
     if swimming & past_matters(width, work):
         base = work[X0 * width : (X0 + BASE) * width].copy()

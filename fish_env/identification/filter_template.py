@@ -81,7 +81,7 @@ def slopes_of_interval(
     move(work, width, error, late, history)
     for i in range(steps):
         start = begin + i * h
-        set_commands(work, width, times, values, at, start, h, skew, delay, True)
+        set_commands(work, width, times, values, at, start, h, pace, skew, delay, True)
         begin_step(work, width, 1, path, i)
         step_lanes_once(work, start, h, pace, late, history, tables)
         keep_step(work, width, 1, pace, path, i)
@@ -314,7 +314,7 @@ def filter_block(
                 push(work, width, push_basis, sample - 1, push_column, push_size, 1.0, first, count)
             for i in range(steps):
                 begin = clock[sample - 1] + i * h
-                set_commands(work, width, times, values, at, begin, h, skew, delay, shared)
+                set_commands(work, width, times, values, at, begin, h, pace, skew, delay, shared)
                 begin_step(work, width, lanes, path, i)
                 step_lanes_once(work, begin, h, pace, late, history, tables)
                 keep_step(work, width, lanes, pace, path, i)

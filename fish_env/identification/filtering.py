@@ -168,7 +168,8 @@ class RunFilter:
 
     def _history_rows(self, records: FloatArray, data: RunData) -> int:
         """Room for tail commands that come late."""
-        return history_rows(self.kernels.longest_delay(records), data.shortest_step)
+        # A command may switch in each step, and is told then too.
+        return history_rows(self.kernels.longest_delay(records), 0.5 * data.shortest_step)
 
     def _starts(
         self, data: RunData, measurement: Measurement, more: FloatArray | None = None

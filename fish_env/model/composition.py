@@ -37,7 +37,7 @@ class Composition:
         tables: coefficient curves may come from tables (slower: a search for each).
         templates: source files with the entry points; each may use what precedes it.
         blocks: lanes are computed in blocks, in which effects that are off take no time, and each
-            has its own pace.
+            has its own pace and its own times at which commands switch.
     """
 
     effects: tuple[Effect, ...] = ()

@@ -46,6 +46,7 @@ class Emitter(LaneReader):
             f"TAIL_RATES = np.array({self.composition.tail_rates}, np.bool_)\n"
             f"TAIL_MEMORIES = np.array({self.composition.tail_memories}, np.int64)\n"
             f"OWN_STEPS = {self.composition.own_steps}\n"
+            f"SWITCHES = {self.composition.blocks}\n"
         )
         parts = (self.derivative, self.terms, self.initialise, self.command, self.memory)
         return "\n".join([sizes, *(part() for part in parts)])

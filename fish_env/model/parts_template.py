@@ -1,9 +1,11 @@
-"""Steps of each lane: at its own pace, and parted where the rate of its tail jumps.
+"""Steps of each lane: at its own pace, and parted where the rate of its tail or a command jumps.
 
 Completed by :mod:`fish_env.model.compose` behind the rollout template, whose rows it uses.
 """
 
 from __future__ import annotations
+
+import numpy as np
 
 # --- completed by compose ---
 from fish_env.model.composed import (
@@ -15,14 +17,18 @@ from fish_env.model.composed import (
     N_MEMORY,
     N_SLOPES,
     N_STATES,
+    NEXT,
     PAST,
     PAST_END,
     RECORD,
     STEP,
     SUM,
+    SWITCH,
+    SWITCHES,
     TOLD,
     TURNS,
     X0,
+    U,
     X,
     accept_states,
     derive_lanes,
@@ -45,10 +51,12 @@ INSTANT = 1e-9  # s; what is told at a time is told this much later too
 
 
 @kernel
-def find_turns(work, width):
-    """Find the lanes whose tail's rate may jump; to be called when all have their parameters."""
+def prepare_parts(work, width):
+    """Find the lanes whose tail's rate may jump, when all have their parameters; none switches."""
     for k in range(lanes_in(width, work)):
         lane_turns(k, width, work)
+        if SWITCHES:
+            work[SWITCH * width + k] = np.inf
 
 
 @kernel
@@ -63,11 +71,9 @@ def recall_in_part(work, width, past, fraction, h, history, first, count):
 
 
 @kernel
-def look_ahead(work, width, elapsed, h, late, history, first, count, last):
-    """End each lane's part of the step where the rate of its tail jumps first."""
+def find_corners(work, width, elapsed, h, late, history, first, count):
+    """When in its present part the rate of each lane's tail jumps first."""
     lanes = lanes_in(width, work)
-    for k in range(lanes):
-        work[LENGTH * width + k] = work[STEP * width + k] - work[BEGUN * width + k]
     if late:
         recall_in_part(work, width, PAST, 0.0, h, history, first, count)
         recall_in_part(work, width, PAST_END, 1.0, h, history, first, count)
@@ -81,11 +87,45 @@ def look_ahead(work, width, elapsed, h, late, history, first, count, last):
             anew = told_anew(time, length, ago / work[STEP * width + k], history, lane)
             corner = work[CORNER * width + k]
             work[CORNER * width + k] = min(corner, anew) if ago > 0.0 else corner
+
+
+@kernel
+def look_ahead(work, width, elapsed, h, late, history, first, count, turns, last):
+    """End each lane's part of the step at the first corner of its tail or switch of its commands.
+
+    ``turns`` says whether there may be corners, ``last`` that the part has to be the last one.
+    """
+    lanes = lanes_in(width, work)
+    for k in range(lanes):
+        work[LENGTH * width + k] = work[STEP * width + k] - work[BEGUN * width + k]
+        work[CORNER * width + k] = np.inf
+    if turns:
+        find_corners(work, width, elapsed, h, late, history, first, count)
+    if SWITCHES:
+        for k in range(lanes):
+            left = work[SWITCH * width + k] - work[BEGUN * width + k]
+            work[CORNER * width + k] = min(work[CORNER * width + k], left)
     for k in range(lanes):
         length, least = work[LENGTH * width + k], SHORTEST * work[STEP * width + k]
         corner = work[CORNER * width + k]
         whole = last | (not (corner <= length - least))
         work[LENGTH * width + k] = length if whole else max(corner, least)
+
+
+@kernel
+def switch_commands(work, width, elapsed, late, history, first, count):
+    """Give each lane that has come to its switch the commands behind it, and tell its tail."""
+    switched = False
+    for k in range(lanes_in(width, work)):
+        near = work[SWITCH * width + k] - 0.5 * SHORTEST * work[STEP * width + k]
+        reached = work[BEGUN * width + k] >= near
+        switched |= reached
+        for j in range(5):
+            new, old = work[(NEXT + j) * width + k], work[(U + j) * width + k]
+            work[(U + j) * width + k] = new if reached else old
+        work[SWITCH * width + k] = np.inf if reached else work[SWITCH * width + k]
+    if late & switched:
+        tell_tail(work, width, elapsed, history, first, count)
 
 
 @kernel
@@ -96,20 +136,23 @@ def step_in_parts(work, width, elapsed, h, tables, late, history, first, count, 
     ``pace``, (width,), is how much faster the time of each lane runs; without entries it is one.
     """
     lanes = lanes_in(width, work)
-    turns = False
+    turns, parted = False, False
     for k in range(lanes):
         work[STEP * width + k] = h * pace[k] if pace.shape[0] > 0 else h
         work[BEGUN * width + k] = 0.0
         work[LENGTH * width + k] = work[STEP * width + k]
         turns |= work[TURNS * width + k] > 0.0
+    if SWITCHES:
+        for k in range(lanes):
+            parted |= work[SWITCH * width + k] < np.inf
     for n in range(N_STATES * width):
         work[X * width + n] = work[X0 * width + n]
     if late:
         tell_tail(work, width, elapsed, history, first, count)
     for part in range(MOST_PARTS):
-        if turns:
+        if turns | parted:
             last = part == MOST_PARTS - 1
-            look_ahead(work, width, elapsed, h, late, history, first, count, last)
+            look_ahead(work, width, elapsed, h, late, history, first, count, turns, last)
         rk4_part(work, width, elapsed, h, tables, late, history, first, count)
         accept_states(work, width, elapsed + h)
         unfinished = 0
@@ -123,6 +166,8 @@ def step_in_parts(work, width, elapsed, h, tables, late, history, first, count, 
             break
         for n in range(N_STATES * width):
             work[X * width + n] = work[X0 * width + n]
+        if SWITCHES:
+            switch_commands(work, width, elapsed, late, history, first, count)
 
 
 @kernel

@@ -18,8 +18,8 @@ from fish_env.model.composed import (
     N_PARAMETERS,
     N_STATES,
     OWN_STEPS,
+    SWITCHES,
     derive_lanes,
-    find_turns,
     lane_command,
     lane_corner,
     lane_derivative,
@@ -27,6 +27,7 @@ from fish_env.model.composed import (
     lane_remember,
     lane_terms,
     memory_matters,
+    prepare_parts,
     step_in_parts,
     switch_effects,
 )
@@ -59,7 +60,11 @@ BEGUN = STEP + OWN_STEPS  # how much of it has been done (s),
 LENGTH = BEGUN + OWN_STEPS  # the length of its present part (s),
 CORNER = LENGTH + OWN_STEPS  # when in it the tail's rate jumps (s),
 TURNS = CORNER + OWN_STEPS  # and whether it may jump at all
-KEPT = TURNS + OWN_STEPS  # what is on, and what effects hand on (see model.emit_blocks)
+SWITCH = (
+    TURNS + OWN_STEPS
+)  # when in its step a lane's commands switch (s), infinite if they do not,
+NEXT = SWITCH + SWITCHES  # and to what
+KEPT = NEXT + 5 * SWITCHES  # what is on, and what effects hand on (see model.emit_blocks)
 PAR = KEPT + N_KEPT
 WORK_ROWS = PAR + N_PARAMETERS
 LARGEST = 1e4  # a state beyond this many SI units has diverged
@@ -121,11 +126,14 @@ def plan_actuators(work, width, h):
 
 @kernel
 def tell_tail(work, width, elapsed, history, first, count):
-    """Remember what each tail is told in the step that begins now."""
+    """Remember what each tail is told from now on, at the start of a step or of a part of one."""
     for k in range(width):
-        work[BEGIN * width + k] = work[TIME * width + k] + elapsed
+        begun = work[BEGUN * width + k] if SWITCHES else 0.0
+        work[BEGIN * width + k] = work[TIME * width + k] + elapsed + begun
         lane_command(k, width, elapsed, work)
     remember(work, width, TOLD, BEGIN, history, first, count)
+    for k in range(width):
+        work[BEGIN * width + k] = work[TIME * width + k] + elapsed
 
 
 @kernel
@@ -222,7 +230,7 @@ def advance_block(
     late = LATE_TAIL & (history.shape[0] > 0)
     same_pace = work[:0]
     if OWN_STEPS:
-        find_turns(work, width)
+        prepare_parts(work, width)
     stored = trace_at
     for segment in range(steps.shape[0]):
         h = sizes[segment]

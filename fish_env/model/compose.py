@@ -20,7 +20,7 @@ from fish_env.files import write_text
 from fish_env.model import jit
 from fish_env.model.composition import Composition
 from fish_env.model.effect import STAGES, Effect
-from fish_env.model.emit_blocks import BlockEmitter
+from fish_env.model.emit_block_corners import BlockCornerEmitter
 from fish_env.model.kernel_cache import cache_root
 
 HEADER = '''"""Composed physics, generated: edit the sources in fish_env/model and effects."""
@@ -66,7 +66,7 @@ def source(composition: Composition) -> str:
     texts = [path.read_text(encoding="utf-8") for path in composition.templates]
     bodies = [text[text.index(_END) :] for text in texts]
     imports = [_kept_imports(text) for text in texts]
-    return "\n".join([HEADER, *imports, BlockEmitter(composition).text(), *bodies])
+    return "\n".join([HEADER, *imports, BlockCornerEmitter(composition).text(), *bodies])
 
 
 def cache_folder(composition: Composition) -> Path:

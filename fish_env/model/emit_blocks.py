@@ -30,6 +30,9 @@ KEPT: dict[str, type | None] = {
     "force": Vector,
     "arm": Vector,
     "total": Wrench,
+    "later_inputs": Inputs,
+    "later_phase": None,
+    "later_tail": Tail,
 }
 """What hooks hand on, by its name in the function of one lane, with its type (None: a float)."""
 READ = {
@@ -297,14 +300,14 @@ class BlockEmitter(CornerEmitter):
 
     def loops(self) -> str:
         """The derivative of all lanes."""
-        lines = [COUNT, *_loop("block_told"), *self.hooks("inputs")]
-        lines += _loop("block_drive")
+        lines = [COUNT, *loop_of("block_told"), *self.hooks("inputs")]
+        lines += loop_of("block_drive")
         for stage in ("water", "water_rate", "tail", "barycentre", "body_drag"):
             lines += self.hooks(stage)
-        lines += [*_loop("block_forces", "tables"), *self.hooks("tail_force", "wrench")]
-        end = _loop("block_rigid")
+        lines += [*loop_of("block_forces", "tables"), *self.hooks("tail_force", "wrench")]
+        end = loop_of("block_rigid")
         if self.has("inertia"):
-            full = [f"    {line}" for line in _loop("block_full")]
+            full = [f"    {line}" for line in loop_of("block_full")]
             bent = f"if work[(KEPT + {self.bent}) * width] > 0.0:"
             end = [bent, *full, "else:", *(f"    {line}" for line in end)]
         return self.function("derive_lanes", BLOCK, [*lines, *end])
@@ -315,7 +318,7 @@ class BlockEmitter(CornerEmitter):
         for effect in self.effects:
             for stage in stages:
                 if stage in effect.hooks:
-                    loop = _loop(f"block_{effect.name}_{stage}")
+                    loop = loop_of(f"block_{effect.name}_{stage}")
                     lines += [f"if {self.flag(effect)} > 0.0:", *(f"    {x}" for x in loop)]
         return lines
 
@@ -326,7 +329,7 @@ def _fields(kind: type | None) -> tuple[str, ...]:
     return fields
 
 
-def _loop(function: str, *more: str) -> list[str]:
+def loop_of(function: str, *more: str) -> list[str]:
     """A loop over the lanes that calls a function for each."""
     return [EACH, f"    {SHIFT}", f"    {function}({', '.join([ARGUMENTS, *more])})"]
 

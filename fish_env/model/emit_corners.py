@@ -42,27 +42,39 @@ class CornerEmitter(Emitter):
             "corner = np.inf",
         ]
         for effect in self.effects:
-            if "tail" in effect.hooks:
-                lines += self.look(effect) if effect.corner is not None else ()
-                lines += self.settle(effect) if effect.settling is not None else ()
-                lines += self.both(effect)
+            lines += self.at_corner(effect) if "tail" in effect.hooks else ()
         lines.append("work[CORNER * width + k] = corner")
         if not self.composition.corners:
             lines = ["pass"]
         return self.function("lane_corner", "k, width, elapsed, work", lines)
 
+    def at_corner(self, effect: Effect) -> list[str]:
+        """What one effect makes of the tail, now and later, and when it makes its rate jump."""
+        lines = self.look(effect) if effect.corner is not None else []
+        lines += self.settle(effect) if effect.settling is not None else ()
+        return [*lines, *self.both(effect)]
+
     def later_command(self) -> list[str]:
         """The command that reaches the tail when a part begins, and the one at its end."""
+        return [
+            *self.command_lines(self.recalled()),
+            self.ahead_line(),
+            *self.apply("inputs", "later_inputs", "time + length, fish"),
+            *self.tail_later(),
+        ]
+
+    def ahead_line(self) -> str:
+        """What the actuators will do at the end of a part."""
         ahead = ", ".join(f"u{i} + length * u{i}_rate" for i in range(5))
-        rates = ", ".join(f"u{i}_rate" for i in range(5))
+        return f"later_inputs = Inputs({ahead}, {', '.join(f'u{i}_rate' for i in range(5))})"
+
+    def tail_later(self) -> list[str]:
+        """The commanded tail at the end of a part."""
         turned = (
             f"{0.5 * TWO_PI!r} * length * (inputs.tail_frequency + later_inputs.tail_frequency)"
         )
         heard = "later_inputs, later_phase"
         return [
-            *self.command_lines(self.recalled()),
-            f"later_inputs = Inputs({ahead}, {rates})",
-            *self.apply("inputs", "later_inputs", "time + length, fish"),
             f"later_phase = phase + {turned}",
             *([f"{heard} = {self.recalled('PAST_END', heard)}"] if self.composition.delays else ()),
             "later_tail = commanded_tail(later_inputs, later_phase)",

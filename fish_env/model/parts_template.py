@@ -31,9 +31,9 @@ from fish_env.model.composed import (
     U,
     X,
     accept_states,
+    corner_lanes,
     derive_lanes,
     kernel,
-    lane_corner,
     lane_remember,
     lane_shift,
     lane_turns,
@@ -77,8 +77,7 @@ def find_corners(work, width, elapsed, h, late, history, first, count):
     if late:
         recall_in_part(work, width, PAST, 0.0, h, history, first, count)
         recall_in_part(work, width, PAST_END, 1.0, h, history, first, count)
-    for k in range(lanes):
-        lane_corner(k, width, elapsed, work)
+    corner_lanes(width, elapsed, h, work)
     if late:
         for k in range(lanes):
             lane = first + (k if k < count else count - 1)

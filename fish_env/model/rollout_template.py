@@ -26,6 +26,7 @@ from fish_env.model.composed import (
     lane_initialise,
     lane_remember,
     lane_terms,
+    lanes_in,
     memory_matters,
     prepare_parts,
     step_in_parts,
@@ -193,6 +194,17 @@ def accept_states(work, width, elapsed):
         now = work[TIME * width + k] + elapsed
         work[FAILED * width + k] = min(failed, now) if moved & (not good) else failed
         work[TAKEN * width + k] = 1.0 if good & moved else 0.0
+    if SWITCHES:  # in blocks, whose rows are many: nearly always all lanes are taken
+        every = True
+        for k in range(lanes_in(width, work)):
+            every &= work[TAKEN * width + k] > 0.0
+        if every:
+            for j in range(3, 7):
+                for k in range(width):
+                    work[(X + j) * width + k] *= work[SCALE * width + k]
+            for n in range(N_STATES * width):
+                work[X0 * width + n] = work[X * width + n]
+            return
     for j in range(N_STATES):
         turned = (j >= 3) & (j < 7)
         for k in range(width):

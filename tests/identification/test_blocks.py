@@ -17,6 +17,8 @@ NAMES = (
     "servo_delay",
     "servo_lag",
     "servo_backlash",
+    "servo_rate_limit",
+    "servo_torque_limit",
     "com_offset",
     "surface_drag",
     "wake_fraction",
@@ -108,6 +110,37 @@ def test_a_block_has_the_bits_of_its_lanes(module, effects, tables, share):
         expected = lane_by_lane(module, work, tables)
         assert np.isfinite(expected).all()
         np.testing.assert_array_equal(in_loops(module, work, tables), expected)
+
+
+def corners(module, work, tables, in_loops):
+    """When each lane's tail is at a corner, with what it remembers until then."""
+    work = work.copy()
+    module.switch_effects(WIDTH, WIDTH, work)
+    heard = work[module.PAST * WIDTH : module.PAST_END * WIDTH]
+    work[module.PAST_END * WIDTH :][: len(heard)] = heard + 0.001
+    states = module.N_STATES * WIDTH
+    work[module.X0 * WIDTH :][:states] = work[module.X * WIDTH :][:states]
+    if in_loops:
+        module.corner_lanes(WIDTH, 0.02, LENGTH, work)
+    else:
+        for k in range(WIDTH):
+            module.lane_corner(k, WIDTH, 0.02, work)
+    rows = work.reshape(-1, WIDTH)
+    memory = rows[: module.DX]
+    return np.vstack([rows[module.CORNER], memory])
+
+
+@pytest.mark.parametrize("share", [0.2, 0.6, 1.0])
+def test_a_block_has_the_corners_of_its_lanes(module, effects, tables, share):
+    rng = np.random.default_rng(int(10 * share))
+    found = []
+    for _ in range(5):
+        on = {name for name in NAMES if rng.random() < share}
+        work = block(module, effects, on, rng)
+        expected = corners(module, work, tables, in_loops=False)
+        np.testing.assert_array_equal(corners(module, work, tables, in_loops=True), expected)
+        found.append(np.isfinite(expected[0]).any())
+    assert any(found)
 
 
 @pytest.mark.parametrize("name", NAMES)

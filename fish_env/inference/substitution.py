@@ -65,8 +65,10 @@ def substituted(
         coarse = swapped(fitter, own, name, signal, enough)
         if coarse is None or coarse.objective >= enough:
             continue
-        if limit_at(own.problem, signal.cause.effect, coarse.point.effects) != name:
-            found.append((coarse.objective, causes, coarse))  # else it would act as the cause does
+        # Beside its limit either could be done without; in its place it would act as that does.
+        limit = limit_at(own.problem, signal.cause.effect, coarse.point.effects)
+        if limit not in current.causes:
+            found.append((coarse.objective, causes, coarse))
     others, problem = [], own.problem
     # Beside a misfit the numbers of the runs have not settled yet, and no fit is hopeless.
     give_up_above = np.inf if beside_misfit else own.objective + POLICY.out_of_reach

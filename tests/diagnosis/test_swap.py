@@ -71,10 +71,13 @@ def test_one_that_ends_switched_off_is_tried_from_each_size():
     assert best.fit.point.effects[size_of(LAG)] == pytest.approx(0.2, abs=0.01)
 
 
-@pytest.mark.parametrize(("near", "others"), [(True, 0), (False, 1)])
-def test_one_that_acts_as_the_cause_does_takes_no_place(near, others):
-    """A limit of torque that is never reached limits the speed, which is a cause already."""
-    parts = {SOFT: {"size": 1.0}} if near else {}
+@pytest.mark.parametrize(("limit", "others"), [(SOFT, 0), (CURRENT, 0), (None, 1)])
+def test_one_that_acts_as_a_cause_does_takes_no_place(limit, others):
+    """A limit of torque that is never reached limits the speed, which is a cause already.
+
+    Nor does it take that of another cause: beside a limit of the speed either can be done without.
+    """
+    parts = {limit: {"size": 1.0}} if limit else {}
     both = replace(KNOWN[LAG], parts=lambda values: parts)
     problem = swimming(SOFT, 1.5)
     problem.known = {**problem.known, LAG: both}

@@ -9,7 +9,7 @@ selection in a linear model (orthogonal matching pursuit; Pati, Rezaiifar and Kr
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -171,15 +171,15 @@ def _needed(
     if coarse is None:
         return current
     problem = to_search(current.fit.problem, coarse)
-    fitted = _fitted(problem, current, coarse)
-    if fitted is None:
-        return current
-    found = Explanation((*current.causes, *causes), fitted)
-    # Beside so many others an effect of implausible size stands in for something else.
-    wild: list[CauseId] = [name for name in causes if beyond_plausible(fitted, name)]
-    sober = [name for name in found.causes if name not in wild]
-    idle = (*wild, *insignificant(fitted, sober, shown.threshold))
-    if not set(causes) - set(idle):
+    for fitted in _fitted(problem, current, coarse):
+        found = Explanation((*current.causes, *causes), fitted)
+        # Beside so many others an effect of implausible size stands in for something else.
+        wild: list[CauseId] = [name for name in causes if beyond_plausible(fitted, name)]
+        sober = [name for name in found.causes if name not in wild]
+        idle = (*wild, *insignificant(fitted, sober, shown.threshold))
+        if set(causes) - set(idle):
+            break
+    else:
         return current
     report(f"fitting without {listed(idle)}" if idle else "fitting run-to-run variation")
     whole, found = found, found.varied(beside_misfit=True, dropped=idle)
@@ -201,25 +201,28 @@ def _confusable(current: Explanation, cause: CauseId) -> tuple[str, ...]:
     return () if isinstance(cause, Coefficient) else known[cause].confusable_with
 
 
-def _fitted(problem: Problem, current: Explanation, coarse: CoarseFit) -> Fit | None:
-    """The full fit from a coarse one, with the noise that it leaves.
+def _fitted(problem: Problem, current: Explanation, coarse: CoarseFit) -> Iterator[Fit]:
+    """Full fits from a coarse one, with the noise that they leave.
 
-    What a coarse fit on a few runs
-    makes of the parameters that were known before may be worse on all of them than they were,
-    and so may the further effects.
+    What a coarse fit on a few runs makes of the parameters that were known before may be worse on
+    all of them than they were, and so may the further effects. Then they begin where they hardly
+    act, which may lead nowhere: a lag that long steps do not follow stays off. The next fit begins
+    from the sizes of the coarse one all the same.
     """
     own = current.fit
-    faint = {**problem.beginning(coarse.effects), **own.point.effects}
-    as_known = {**coarse.point.effects, **own.point.effects}
+    faint = Point(own.point.z, {**problem.beginning(coarse.effects), **own.point.effects})
+    as_known = Point(own.point.z, {**coarse.point.effects, **own.point.effects})
 
     def left(point: Point) -> float:
         value = reached(partial(objective_at, problem, coarse.effects, point, own.noise))
         return np.inf if value is None else value
 
-    known = [Point(own.point.z, values) for values in (as_known, faint)]
-    begin = min((coarse.point, *known), key=left)
-    start = (coarse.effects, begin, own.noise, coarse.released)
-    return reached(lambda: fit(problem, *start, rounds=2, iterations=FEWER_STEPS))
+    best, second, _ = sorted((coarse.point, as_known, faint), key=left)
+    for begin in (best, second) if best is faint else (best,):
+        start = (coarse.effects, begin, own.noise, coarse.released)
+        fitted = reached(partial(fit, problem, *start, rounds=2, iterations=FEWER_STEPS))
+        if fitted is not None:
+            yield fitted
 
 
 def _led(

@@ -14,6 +14,7 @@ from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.many_causes import challenged, each_in_turn
 from fish_env.inference.pipeline import infer
+from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import causes_of
 from fish_env.inference.progress import silent
 from fish_env.inference.projection import Projector
@@ -235,3 +236,28 @@ def test_what_the_linear_model_foresees_to_be_needed_is_not_fitted_without(size,
     kept, rivals = backward_elimination(current)
     assert (kept.causes, rivals) == (current.causes, ())
     assert any("small" not in effects for effects, _ in problem.log.simulated) == fitted
+
+
+def hidden_in_a_trap(steep):
+    """An effect whose small sizes are far worse than none, in runs that a coarse fit leaves out."""
+    worse = ([0.0, 0.01, 3.6, 4.0], [0.0, 30.0 * steep, 30.0 * steep, 0.0])
+
+    def residuals(z, effects):
+        size, runs = effects[size_of("shy")], POLICY.coarse_fit_runs
+        few = [5.0 * (3.4 - size), 0.0, float(z.sum())]
+        other = [5.0 * (4.0 - size), float(np.interp(size, *worse)), float(z.sum())]
+        chosen = {*np.linspace(0, 2 * runs - 1, runs).round().astype(int).tolist()}
+        return np.array([few if run in chosen else other for run in range(2 * runs)])
+
+    return Stated(residuals, [effect("shy", 8.0)])
+
+
+@pytest.mark.parametrize("steep", [0.0, 1.0])
+def test_a_fit_that_ends_where_it_began_is_made_again_from_the_sizes_of_the_coarse_one(steep):
+    """From where the effect hardly acts no step leads to where it does."""
+    stated = hidden_in_a_trap(steep)
+    nothing = Explanation((), fit(stated, (), refit_noise=False))
+    shown = screen(nothing.fit, causes_of(stated), np.random.default_rng(0))
+    found = pursued(nothing, shown, silent)
+    assert found.causes == ("shy",)
+    assert found.fit.point.effects[size_of("shy")] == pytest.approx(3.8, abs=0.2)

@@ -75,7 +75,8 @@ def handed_on(on, tail, moved, settled_rate, side):
         spread.rate if on else tail.rate,
         spread.acceleration if on else tail.acceleration,
     )
-    return seen, (slope if on else 0.0,), (seen.angle, seen.rate, moved.acceleration, side)
+    acceleration = moved.acceleration if on else 0.0
+    return seen, (slope if on else 0.0,), (seen.angle, seen.rate, acceleration, side)
 
 
 @kernel

@@ -66,15 +66,12 @@ class BlockCornerEmitter(BlockEmitter):
         """When in its present part the rate of each lane's tail jumps first."""
         lines = [COUNT, NOW, *loop_of("block_told"), *self.hooks("inputs")]
         lines += loop_of("block_drive")
-        for effect in self.effects:
-            if effect.loaded:
-                water = [f"    {line}" for line in self.hooks("water", "water_rate")]
-                lines += [f"if {self.flag(effect)} > 0.0:", *water] if water else []
+        loaded = [effect for effect in self.effects if effect.loaded]
+        lines += self.where_on(loaded, self.hooks("water", "water_rate"))
         lines += loop_of("block_told_later")
         for stage, ending in (("inputs", "later"), ("tail", "corner")):
             lines += loop_of("block_drive_later") if stage == "tail" else []
             for effect in self.effects:
                 if stage in effect.hooks:
-                    loop = [f"    {x}" for x in loop_of(f"block_{effect.name}_{ending}")]
-                    lines += [f"if {self.flag(effect)} > 0.0:", *loop]
+                    lines += self.where_on([effect], loop_of(f"block_{effect.name}_{ending}"))
         return self.function("corner_lanes", LOOK, lines)

@@ -318,9 +318,13 @@ class BlockEmitter(CornerEmitter):
         for effect in self.effects:
             for stage in stages:
                 if stage in effect.hooks:
-                    loop = loop_of(f"block_{effect.name}_{stage}")
-                    lines += [f"if {self.flag(effect)} > 0.0:", *(f"    {x}" for x in loop)]
+                    lines += self.where_on([effect], loop_of(f"block_{effect.name}_{stage}"))
         return lines
+
+    def where_on(self, effects: Iterable[Effect], lines: Sequence[str]) -> list[str]:
+        """Some lines for a block in which any of some effects is on in any lane."""
+        on = " or ".join(f"({self.flag(effect)} > 0.0)" for effect in effects)
+        return [f"if {on}:", *(f"    {line}" for line in lines)] if on and lines else []
 
 
 def _fields(kind: type | None) -> tuple[str, ...]:

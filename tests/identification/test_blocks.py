@@ -26,6 +26,7 @@ NAMES = (
     "wake_memory",
     "tether",
     "added_mass",
+    "body_flexibility",
     "quadratic_damping",
 )
 """Effects that have a hook for each stage among them, states, a memory, and a late command."""

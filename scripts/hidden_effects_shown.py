@@ -81,20 +81,19 @@ def table(fit: Fit, hidden: Values) -> Iterator[str]:
         fit: what they are shown beside.
         hidden: parameters by effect.
     """
-    own = fit
-    projector = Projector(own)
-    seen = screen(own, causes_of(own.problem), np.random.default_rng(0)).by_effect()
+    projector = Projector(fit)
+    seen = screen(fit, causes_of(fit.problem), np.random.default_rng(0)).by_effect()
     yield "| effect | log p, true size | multiple | absorbed | log p, screen | its settings |"
     yield "| --- | --- | --- | --- | --- | --- |"
     for name, values in hidden.items():
-        if name not in own.problem.known:
+        if name not in fit.problem.known:
             continue
-        if name in own.effects:
+        if name in fit.effects:
             yield f"| {name} | in the fit | | | | |"
             continue
         best = seen.get(EffectName(name))
         settings = best.cause.probes[best.probe] if best else ""
-        shown = _shown(at_values(own, projector, name, values))
+        shown = _shown(at_values(fit, projector, name, values))
         yield f"| {name} | {shown} | {_log_p(best)} | {settings} |"
 
 

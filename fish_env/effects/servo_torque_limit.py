@@ -73,13 +73,8 @@ def turn_against_water(tail, inputs, phase, time, fish, motion, e, states, memor
     now = speed_now(tail, motion, angle, before * since, fish, e)
     moved = chase(tail, 0.5 * (before + now), now, angle, side, since)
     seen, slopes, kept = handed_on(on, tail, moved, settled_rate, side)
-    return seen, slopes, with_speed(kept, now if on else e.speed)
-
-
-@kernel
-def with_speed(kept, speed):
-    """What is remembered, with the speed (rad/s)."""
-    return kept[0], kept[1], kept[2], kept[3], speed
+    speed = now if on else e.speed
+    return seen, slopes, (kept[0], kept[1], kept[2], kept[3], speed)
 
 
 @kernel

@@ -103,7 +103,7 @@ def advance_fish(
             if OWN_STEPS:
                 step_in_parts(work, 1, elapsed, h, tables, late, history, first, 1, same_pace)
             else:
-                rk4_step(work, 1, elapsed, h, tables, late, history, first, 1)
+                rk4_step(work, 1, elapsed, h, tables, 1)
                 accept_states(work, 1, elapsed + h)
             accept_actuators(work, 1)
             until -= 1

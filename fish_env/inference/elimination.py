@@ -116,8 +116,6 @@ def without_insignificant(
             effect is the one beside none.
         report: told what is being done.
     """
-    if len(current.causes) < 2:
-        return current
     needed: set[CauseId] = set()
     while len(current.causes) > 1:
         own, judged = current.fit, [c for c in current.causes if c not in needed]

@@ -69,12 +69,12 @@ def substituted(
         limit = limit_at(own.problem, signal.cause.effect, coarse.point.effects)
         if limit not in current.causes:
             found.append((coarse.objective, causes, coarse))
-    others, problem = [], own.problem
+    others = []
     # Beside a misfit the numbers of the runs have not settled yet, and no fit is hopeless.
     give_up_above = np.inf if beside_misfit else own.objective + POLICY.out_of_reach
     for _, causes, coarse in sorted(found, key=lambda f: f[0])[:most]:
         report(f"fitting {listed(causes, ' and ')}")
-        fitted = at_noise(problem, coarse, own.noise, 4, give_up_above)
+        fitted = at_noise(own.problem, coarse, own.noise, 4, give_up_above)
         if fitted is not None:
             others.append(Explanation(causes, fitted))
     found_all = [current, *others]

@@ -37,7 +37,7 @@ from fish_env.model.coefficients import (
 )
 from fish_env.model.frames import quaternion_rate, rotation, to_body, to_inertial
 from fish_env.model.history import (
-    HEARD, RECORD, assume_running, late_command, recall, recall_at, remember, running_command,
+    HEARD, RECORD, assume_running, late_command, recall_at, remember, running_command,
     told_anew,
 )
 from fish_env.model.hydrostatics import buoyancy_force, gravity_wrench

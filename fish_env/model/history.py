@@ -53,21 +53,6 @@ def remember(work, width, told, start, history, first, count):
 
 
 @kernel
-def recall(work, width, told, past, start, shift, h, history, first, count):
-    """Set the ``past`` rows to what each fish was told its delay ago, ``shift`` into a step of h.
-
-    Where that is the very moment at which a command changed, the beginning of a step sees the
-    new command and its end the old one, as for commands that act at once.
-    """
-    edge = _ROUNDING if shift == 0.0 else -_ROUNDING
-    for k in range(width):
-        lane = first + (k if k < count else count - 1)
-        late = work[(told + RECORD - 1) * width + k]
-        time = work[start * width + k] + shift - late
-        recall_at(work, width, k, past, time, edge, late / h, history, lane)
-
-
-@kernel
 def recall_at(work, width, k, past, time, edge, ago, history, lane):
     """Set the ``past`` rows of one lane to what its fish was told at a time, some steps ago."""
     slots = (history.shape[0] - 1) // RECORD

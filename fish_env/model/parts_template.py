@@ -61,7 +61,11 @@ def prepare_parts(work, width):
 
 @kernel
 def recall_in_part(work, width, past, fraction, h, history, first, count):
-    """As ``recall``, at a fraction of each lane's part of the step."""
+    """Set the ``past`` rows to what each tail was told its delay ago, at a fraction of its part.
+
+    Where that is the very moment at which a command changed, the beginning of a part sees the new
+    command and its end the old one, as for commands that act at once.
+    """
     edge = INSTANT if fraction == 0.0 else -INSTANT
     for k in range(lanes_in(width, work)):
         lane = first + (k if k < count else count - 1)

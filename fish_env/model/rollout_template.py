@@ -32,7 +32,7 @@ from fish_env.model.composed import (
     step_in_parts,
     switch_effects,
 )
-from fish_env.model.history import HEARD, RECORD, assume_running, recall, remember
+from fish_env.model.history import HEARD, RECORD, assume_running, remember
 from fish_env.model.jit import entry_point, kernel, lean_entry_point
 
 # --- end ---
@@ -129,8 +129,7 @@ def plan_actuators(work, width, h):
 def tell_tail(work, width, elapsed, history, first, count):
     """Remember what each tail is told from now on, at the start of a step or of a part of one."""
     for k in range(width):
-        begun = work[BEGUN * width + k] if SWITCHES else 0.0
-        work[BEGIN * width + k] = work[TIME * width + k] + elapsed + begun
+        work[BEGIN * width + k] = work[TIME * width + k] + elapsed + work[BEGUN * width + k]
         lane_command(k, width, elapsed, work)
     remember(work, width, TOLD, BEGIN, history, first, count)
     for k in range(width):
@@ -138,20 +137,19 @@ def tell_tail(work, width, elapsed, history, first, count):
 
 
 @kernel
-def rk4_step(work, width, elapsed, h, tables, late, history, first, count):
-    """One classical Runge-Kutta step of every lane: X0 -> X. Memory follows from where it ends."""
+def rk4_step(work, width, elapsed, h, tables, count):
+    """One classical Runge-Kutta step of every lane: X0 -> X. Memory follows from where it ends.
+
+    For tails whose commands are not late; lanes of others have their own steps.
+    """
     for n in range(N_STATES * width):
         work[X * width + n] = work[X0 * width + n]
     for n in range(N_SLOPES * width):
         work[SUM * width + n] = 0.0
-    if late:
-        tell_tail(work, width, elapsed, history, first, count)
     for stage in range(4):
         fraction = 0.0 if stage == 0 else (1.0 if stage == 3 else 0.5)
         weight = 1.0 if (stage == 0) | (stage == 3) else 2.0
         ahead = 0.5 * h if stage < 2 else h
-        if late:
-            recall(work, width, TOLD, PAST, BEGIN, fraction * h, h, history, first, count)
         derive_lanes(width, elapsed, fraction, h, work, tables)
         if stage < 3:
             for n in range(N_SLOPES * width):
@@ -256,7 +254,7 @@ def advance_block(
                     work, width, elapsed, h, tables, late, history, first, count, same_pace
                 )  # fmt: skip
             else:
-                rk4_step(work, width, elapsed, h, tables, late, history, first, count)
+                rk4_step(work, width, elapsed, h, tables, count)
                 accept_states(work, width, elapsed + h)
             accept_actuators(work, width)
             if (trace.shape[0] > 0) & ((i + 1) % every[segment] == 0):

@@ -227,7 +227,7 @@ class WholeRunProblem(Problem):
         return self._shown[id]
 
     def is_nonsmooth(self, names: Iterable[str]) -> bool:
-        """Whether one of these effects makes the tail's rate jump, whatever the steps."""
+        """Whether one of these effects makes the tail's rate jump."""
         return self.series.is_nonsmooth(names)
 
     def batch_key(self, names: Iterable[str]) -> object:

@@ -22,9 +22,9 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
-# One thread a process: the processes are what runs side by side.
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
+from scripts.one_thread import ONE_THREAD  # noqa: E402
+
+os.environ.update(ONE_THREAD)
 
 from rich.progress import track  # noqa: E402
 

@@ -27,11 +27,9 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
+from scripts.one_thread import ONE_THREAD  # noqa: E402
 from scripts.results import RESULTS, kept, today, write_dated  # noqa: E402
 
-ONE_THREAD = dict.fromkeys(
-    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS", "ROBOFISH_THREADS"), "1"
-)
 HIDDEN = {"current": {"north": 0.04, "east": -0.04, "down": 0.01}}
 
 

@@ -18,8 +18,9 @@ from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "ROBOFISH_THREADS"):
-    os.environ.setdefault(variable, "1")
+from scripts.one_thread import ONE_THREAD  # noqa: E402
+
+os.environ.update(ONE_THREAD)
 
 import numpy as np  # noqa: E402
 from rich.progress import track  # noqa: E402

@@ -23,8 +23,9 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
+from scripts.one_thread import ONE_THREAD  # noqa: E402
+
+os.environ.update(ONE_THREAD)
 
 from fish_env.diagnosis.policy import POLICIES  # noqa: E402
 from fish_env.inference.policy_numbers import BY_HAND, EFFORT, Numbers  # noqa: E402

@@ -30,15 +30,16 @@ from pathlib import Path
 from typing import Any
 
 # Before anything is imported that makes threads: processes are forked from this one.
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
-    os.environ[variable] = "1"
+from scripts.one_thread import ONE_THREAD
 
-import numpy as np  # noqa: E402
+os.environ.update(ONE_THREAD)
 
-from fish_env.files import PART  # noqa: E402
-from scripts.bench import harness  # noqa: E402
-from scripts.reliability.crash_works import WORKS, Work  # noqa: E402
-from scripts.results import RESULTS, write_dated  # noqa: E402
+import numpy as np
+
+from fish_env.files import PART
+from scripts.bench import harness
+from scripts.reliability.crash_works import WORKS, Work
+from scripts.results import RESULTS, write_dated
 
 MOMENTS = ("at a random moment", "while writing")
 ERRORS = "errors.txt"

@@ -24,16 +24,17 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
+from scripts.one_thread import ONE_THREAD
 
-from fish_env.campaign import Options, find_cases, run_campaign  # noqa: E402
-from fish_env.campaign.cases import diagnosed, prepare  # noqa: E402
-from fish_env.cluster import ClusterSettings, Task, connected, run_tasks  # noqa: E402
-from fish_env.data import load_dataset, write_dataset  # noqa: E402
-from fish_env.files import write_bytes  # noqa: E402
-from scripts.bench import harness  # noqa: E402
-from scripts.results import RESULTS, write_dated  # noqa: E402
+os.environ.update(ONE_THREAD)
+
+from fish_env.campaign import Options, find_cases, run_campaign
+from fish_env.campaign.cases import diagnosed, prepare
+from fish_env.cluster import ClusterSettings, Task, connected, run_tasks
+from fish_env.data import load_dataset, write_dataset
+from fish_env.files import write_bytes
+from scripts.bench import harness
+from scripts.results import RESULTS, write_dated
 
 CORES = (1, 2, 16, 128, 1000)
 EMPTY = 300
@@ -153,7 +154,7 @@ def _child_s(cache: Path) -> float:
     """Processor seconds of a process that makes one quick diagnosis."""
     code = f"from fish_env.diagnosis import diagnose; diagnose({DATA!r}, quick=True)"
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    environment = {**os.environ, "ROBOFISH_CACHE_DIR": str(cache), "ROBOFISH_THREADS": "1"}
+    environment = {**os.environ, "ROBOFISH_CACHE_DIR": str(cache)}
     subprocess.run([sys.executable, "-c", code], check=True, env=environment)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
@@ -166,7 +167,6 @@ def costs_here(place: Path, cold: bool) -> tuple[Costs, dict[str, Any]]:
     (case,), options = find_cases([DATA]), Options(quick=True)
     out = place / "out"
     payload = prepare(case, options, out)
-    os.environ["ROBOFISH_THREADS"] = "1"
     result = diagnosed(payload)
     task_s = _timed(lambda: diagnosed(payload), 3)
 

@@ -60,7 +60,7 @@ def as_dict(diagnosis: Diagnosis) -> Plain:
         "gain": gain_entry(diagnosis.gain),
         "localisation": as_plain(diagnosis.localisation),
         "residual_model": residual_entry(diagnosis.residual),
-        "notes": [*diagnosis.dataset.notes, *_chance(diagnosis)],
+        "notes": [*diagnosis.dataset.notes, *_chance(diagnosis), *_minor(diagnosis)],
     }
     return {**answer, "doubts": doubts(answer)}
 
@@ -68,11 +68,11 @@ def as_dict(diagnosis: Diagnosis) -> Plain:
 def shared_entries(diagnosis: Diagnosed) -> Plain:
     """What ``diagnosis.json`` holds of every diagnosis."""
     verdict, attribution = diagnosis.verdict, diagnosis.attribution
-    alternatives = [
-        [cause_entry(rival.fit, cause) for cause in rival.causes]
-        for rival in (attribution.accepted, *attribution.rivals)
-        if rival.causes in verdict.alternatives
-    ]
+    alternatives = {
+        named: [cause_entry(rival.fit, cause) for cause in named]
+        for rival in reversed((attribution.accepted, *attribution.rivals))
+        if (named := verdict.named(rival.causes)) in verdict.alternatives
+    }
     screen = attribution.first
     sizes = coefficient_sizes(screen.signals, lambda s: smallest_detectable(s, 0, screen.threshold))
     return {
@@ -85,7 +85,7 @@ def shared_entries(diagnosis: Diagnosed) -> Plain:
         "runtime_s": diagnosis.runtime_s,
         "verdict": verdict.name,
         "causes": [cause_entry(diagnosis.accepted, cause) for cause in verdict.causes],
-        "alternatives": alternatives,
+        "alternatives": [alternatives[named] for named in verdict.alternatives],
         "parameters": coefficient_entries(diagnosis.accepted, sizes),
         "run_variation": run_variation_entry(diagnosis.accepted),
         "budget": budget_entry(diagnosis.budget),
@@ -192,6 +192,17 @@ def _chance(diagnosis: Diagnosis) -> list[str]:
         f"The fitted runs indicate {_wrench(asked)} ({asked['rms']:.2g} "
         f"{wrench_unit(asked['direction'])}), little more than chance would. It does not improve "
         f"the prediction of other runs (log likelihood {gain:+.2g}), so it counts as chance."
+    ]
+
+
+def _minor(diagnosis: Diagnosis) -> list[str]:
+    """Causes that the extended model holds and the verdict does not name."""
+    names = [name_of(cause) for cause in diagnosis.verdict.minor]
+    share = POLICY.least_named_share
+    return [
+        f"{name} is in the extended model but not named: beside the other causes it makes up less "
+        f"than {share:.0%} of the misfit in every channel, as errors of their models may."
+        for name in names
     ]
 
 

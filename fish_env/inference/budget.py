@@ -86,6 +86,21 @@ class Budget:
     left: float
     left_ci95: tuple[float, float] | None
 
+    @property
+    def minor(self) -> tuple[CauseId, ...]:
+        """Causes that make up next to nothing of any channel's misfit, beside others that do more.
+
+        What the models of larger causes and of sensors get wrong looks like a further small cause,
+        and with much data it is significant. Where no cause does more there is no such model.
+        """
+        largest = {
+            share.component: max(share.channels.values())
+            for share in self.shares
+            if not isinstance(share.component, Other)
+        }
+        minor = tuple(c for c, most in largest.items() if most < POLICY.least_named_share)
+        return minor if len(minor) < len(largest) else ()
+
 
 def error_budget(
     problem: Problem,

@@ -34,7 +34,7 @@ from fish_env.inference.progress import Report, silent
 from fish_env.inference.result import ResidualModel, Result
 from fish_env.inference.screening import screen
 from fish_env.inference.simulated import sustained
-from fish_env.inference.verdict import EXTENDING, Verdict, decide
+from fish_env.inference.verdict import EXTENDING, Verdict, decide, without_minor
 
 
 def infer(
@@ -132,6 +132,8 @@ def investigate(
         residual = described(attribution, left, describe, held_out)
     report("computing the error budget")
     budget = budget_of(attribution, verdict, left, held_out, rng)
+    if budget is not None:
+        verdict = without_minor(verdict, budget.minor)
     return Result(attribution, left, shown, verdict, gap, residual, budget)
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 
 from fish_env.inference.adequacy import Adequacy
 from fish_env.inference.attribution import Attribution
@@ -33,11 +34,17 @@ class Verdict:
         causes: accepted causes; of ``partial`` those that act for certain.
         alternatives: other sets of causes that explain the data alike; of ``partial`` all such
             sets, that of the extended model first.
+        minor: causes of the extended model that are too small to be named.
     """
 
     name: str
     causes: tuple[CauseId, ...] = ()
     alternatives: tuple[tuple[CauseId, ...], ...] = ()
+    minor: tuple[CauseId, ...] = ()
+
+    def named(self, causes: Sequence[CauseId]) -> tuple[CauseId, ...]:
+        """Those of some causes that are not too small to be named."""
+        return tuple(cause for cause in causes if cause not in self.minor)
 
 
 def decide(
@@ -78,3 +85,28 @@ def verdict_of(
         effects = [cause for cause in causes if not isinstance(cause, Coefficient)]
         return Verdict("cause" if effects else "parameters", causes)
     return Verdict("not_excited" if blind else "no_misfit")
+
+
+def without_minor(verdict: Verdict, minor: Collection[CauseId]) -> Verdict:
+    """The verdict without the names of causes that are too small to be named.
+
+    Explanations that differ from what is named in such causes alone are no alternatives.
+
+    Args:
+        verdict: verdict that may name them.
+        minor: the causes.
+    """
+    if not minor:
+        return verdict
+    quiet = replace(verdict, minor=tuple(minor))
+    causes = quiet.named(verdict.causes)
+    sets: dict[frozenset[CauseId], tuple[CauseId, ...]] = {}
+    for alternative in map(quiet.named, verdict.alternatives):
+        sets.setdefault(frozenset(alternative), alternative)
+    alternatives = tuple(sets.values())
+    if verdict.name == "partial":
+        return replace(quiet, causes=causes, alternatives=alternatives if len(sets) > 1 else ())
+    alternatives = tuple(rest for rest in alternatives if not {*causes} <= {*rest})
+    if verdict.name == "ambiguous" and not alternatives:
+        return replace(verdict_of(True, causes, (), False), minor=quiet.minor)
+    return replace(quiet, causes=causes, alternatives=alternatives)

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from fish_env.inference.budget import shares_of
+from fish_env.inference.budget import Budget, Other, Share, shares_of
+from fish_env.inference.policy import POLICY
 
 
 def energies(weights, interaction=0.0):
@@ -40,3 +41,32 @@ def test_two_parts_share_as_shapley_does():
 def test_a_part_that_does_nothing_has_no_share():
     shares, _, _ = shares_of(energies([5.0, 0.0]), 2)
     assert shares[1] == pytest.approx(0.0)
+
+
+def budget(**channels):
+    """A budget of components with these shares of the misfit of two channels."""
+    others = {other.value: other for other in Other}
+    shares = [
+        Share(others.get(name, name), 0.0, None, 0.0, 0.0, {"x": x, "z": z})
+        for name, (x, z) in channels.items()
+    ]
+    return Budget(("r1", "r2"), True, 100.0, tuple(shares), 0.0, None)
+
+
+LITTLE = 0.5 * POLICY.least_named_share
+
+
+def test_a_cause_is_minor_that_does_next_to_nothing_in_any_channel():
+    found = budget(coefficients=(0.0, 0.0), drag=(0.6, 0.1), play=(LITTLE, -0.3))
+    assert found.minor == ("play",)
+
+
+def test_a_cause_that_shows_in_one_channel_is_not_minor():
+    assert budget(drag=(0.6, 0.1), lag=(-0.2, 2.0 * POLICY.least_named_share)).minor == ()
+
+
+@pytest.mark.parametrize("causes", [("lag",), ("lag", "play")])
+def test_no_cause_is_minor_beside_none_that_does_more(causes):
+    """However much coefficients and what runs differ in explain: their models are not in doubt."""
+    shares = dict.fromkeys(causes, (LITTLE, 0.0))
+    assert budget(coefficients=(0.9, 0.9), run_variation=(0.1, 0.1), **shares).minor == ()

@@ -17,6 +17,7 @@ from fish_env.diagnosis.entries import (
     disturbance_entry,
     experiment_entry,
     gain_entry,
+    minor_notes,
     misfit_entry,
     precondition_entry,
     residual_entry,
@@ -60,7 +61,7 @@ def as_dict(diagnosis: Diagnosis) -> Plain:
         "gain": gain_entry(diagnosis.gain),
         "localisation": as_plain(diagnosis.localisation),
         "residual_model": residual_entry(diagnosis.residual),
-        "notes": [*diagnosis.dataset.notes, *_chance(diagnosis), *_minor(diagnosis)],
+        "notes": [*diagnosis.dataset.notes, *_chance(diagnosis), *minor_notes(diagnosis.verdict)],
     }
     return {**answer, "doubts": doubts(answer)}
 
@@ -192,17 +193,6 @@ def _chance(diagnosis: Diagnosis) -> list[str]:
         f"The fitted runs indicate {_wrench(asked)} ({asked['rms']:.2g} "
         f"{wrench_unit(asked['direction'])}), little more than chance would. It does not improve "
         f"the prediction of other runs (log likelihood {gain:+.2g}), so it counts as chance."
-    ]
-
-
-def _minor(diagnosis: Diagnosis) -> list[str]:
-    """Causes that the extended model holds and the verdict does not name."""
-    names = [name_of(cause) for cause in diagnosis.verdict.minor]
-    share = POLICY.least_named_share
-    return [
-        f"{name} is in the extended model but not named: beside the other causes it makes up less "
-        f"than {share:.0%} of the misfit in every channel, as errors of their models may."
-        for name in names
     ]
 
 

@@ -27,6 +27,7 @@ from fish_env.inference.hypotheses import (
 from fish_env.inference.policy import POLICY
 from fish_env.inference.preconditions import Precondition
 from fish_env.inference.vehicle import Coefficients, Effect
+from fish_env.inference.verdict import Verdict
 
 FORMAT = "robofish-diagnosis/1"
 Plain = dict[str, Any]
@@ -223,3 +224,14 @@ def experiment_entry(proposal: Proposal | None) -> Plain:
         "separates": list(proposal.separates),
         "separation": proposal.separation,
     }
+
+
+def minor_notes(verdict: Verdict) -> list[str]:
+    """Causes that the extended model holds and the verdict does not name."""
+    names = [name_of(cause) for cause in verdict.minor]
+    share = POLICY.least_named_share
+    return [
+        f"{name} is in the extended model but not named: beside the other causes it makes up less "
+        f"than {share:.0%} of the misfit in every channel, as errors of their models may."
+        for name in names
+    ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fish_env.diagnosis.answer import shared_entries
-from fish_env.diagnosis.entries import Plain, gain_entry
+from fish_env.diagnosis.entries import Plain, gain_entry, minor_notes
 from fish_env.diagnosis.result import TableDiagnosis
 from fish_env.identification.tables.problem import TableProblem
 from fish_env.identification.tables.table import UNITS
@@ -29,7 +29,7 @@ def as_dict(diagnosis: TableDiagnosis) -> Plain:
         "noise": _noise(diagnosis),
         "gain": gain_entry(diagnosis.gain, UNITS),
         "floor": _floor(diagnosis),
-        "notes": list(diagnosis.notes),
+        "notes": [*diagnosis.notes, *minor_notes(diagnosis.verdict)],
     }
 
 

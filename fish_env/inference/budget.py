@@ -88,13 +88,13 @@ class Budget:
 
     @property
     def minor(self) -> tuple[CauseId, ...]:
-        """Causes that make up next to nothing of any channel's misfit, beside others that do more.
+        """Causes that make up next to nothing of the misfit, beside others that do more.
 
         What the models of larger causes and of sensors get wrong looks like a further small cause,
         and with much data it is significant. Where no cause does more there is no such model.
         """
         largest = {
-            share.component: max(share.channels.values())
+            share.component: max(share.alone, share.last, *share.channels.values())
             for share in self.shares
             if not isinstance(share.component, Other)
         }

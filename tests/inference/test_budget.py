@@ -43,11 +43,11 @@ def test_a_part_that_does_nothing_has_no_share():
     assert shares[1] == pytest.approx(0.0)
 
 
-def budget(**channels):
-    """A budget of components with these shares of the misfit of two channels."""
+def budget(last=0.0, **channels):
+    """A budget of components with these shares of two channels, and of what is lost without."""
     others = {other.value: other for other in Other}
     shares = [
-        Share(others.get(name, name), 0.0, None, 0.0, 0.0, {"x": x, "z": z})
+        Share(others.get(name, name), 0.0, None, 0.0, last, {"x": x, "z": z})
         for name, (x, z) in channels.items()
     ]
     return Budget(("r1", "r2"), True, 100.0, tuple(shares), 0.0, None)
@@ -63,6 +63,13 @@ def test_a_cause_is_minor_that_does_next_to_nothing_in_any_channel():
 
 def test_a_cause_that_shows_in_one_channel_is_not_minor():
     assert budget(drag=(0.6, 0.1), lag=(-0.2, 2.0 * POLICY.least_named_share)).minor == ()
+
+
+def test_a_cause_that_others_need_is_not_minor():
+    """Beside another one alone it makes everything worse."""
+    own = {"drag": (0.6, 0.1), "marker": (-0.3, -0.3)}
+    assert budget(**own).minor == ("marker",)
+    assert budget(last=2.0 * POLICY.least_named_share, **own).minor == ()
 
 
 @pytest.mark.parametrize("causes", [("lag",), ("lag", "play")])

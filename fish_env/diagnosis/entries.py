@@ -232,6 +232,6 @@ def minor_notes(verdict: Verdict) -> list[str]:
     share = POLICY.least_named_share
     return [
         f"{name} is in the extended model but not named: beside the other causes it makes up less "
-        f"than {share:.0%} of the misfit, in every channel, as errors of their models may."
+        f"than {share:.1%} of the misfit, in every channel, as errors of their models may."
         for name in names
     ]

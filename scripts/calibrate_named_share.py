@@ -13,7 +13,6 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-import tempfile
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -27,6 +26,7 @@ os.environ.update(ONE_THREAD)
 from rich.progress import track  # noqa: E402
 
 from fish_env.inference.policy import POLICY  # noqa: E402
+from scripts.hidden_runs import hidden_runs  # noqa: E402
 from scripts.results import RESULTS, kept, write_dated  # noqa: E402
 from tests.hidden.realistic.cases import make_case  # noqa: E402
 
@@ -35,8 +35,7 @@ FIRST, TIER = 90001, "realistic_60"
 
 def measured(seed: int) -> dict[str, Any]:
     """Main effect of a case, and its largest share in a channel."""
-    with tempfile.TemporaryDirectory() as place:
-        truth = make_case(TIER, seed, Path(place) / "data")
+    truth, _ = hidden_runs(make_case, TIER, seed)
     (main,) = truth.main
     return {"seed": seed, "main": main, "most": max(truth.budget[main].values())}
 

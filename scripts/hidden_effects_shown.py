@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -25,7 +24,6 @@ os.environ.update(ONE_THREAD)
 import numpy as np  # noqa: E402
 from threadpoolctl import threadpool_limits  # noqa: E402
 
-from fish_env.data import Dataset, load_dataset  # noqa: E402
 from fish_env.diagnosis.pipeline import diagnose_runs  # noqa: E402
 from fish_env.inference.changes import residual_changes  # noqa: E402
 from fish_env.inference.estimate.fit import Fit  # noqa: E402
@@ -33,6 +31,7 @@ from fish_env.inference.hypotheses import EffectName, name_of  # noqa: E402
 from fish_env.inference.probes import Cause, causes_of  # noqa: E402
 from fish_env.inference.projection import Projector, Signal  # noqa: E402
 from fish_env.inference.screening import screen  # noqa: E402
+from scripts.hidden_runs import hidden_runs  # noqa: E402
 from tests.hidden.realistic.cases import make_case  # noqa: E402
 from tests.hidden.realistic.plans import TIERS  # noqa: E402
 from tests.hidden.realistic.truth import RealTruth  # noqa: E402
@@ -45,12 +44,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("tier", choices=TIERS)
     parser.add_argument("seed", type=int)
     options = parser.parse_args(arguments)
-    with tempfile.TemporaryDirectory() as place:
-        folder = Path(place) / "data"
-        truth = make_case(options.tier, options.seed, folder)
-        dataset = load_dataset(folder)
-        assert isinstance(dataset, Dataset)
-        found = diagnose_runs(dataset, seed=options.seed)
+    truth, dataset = hidden_runs(make_case, options.tier, options.seed)
+    found = diagnose_runs(dataset, seed=options.seed)
     attribution = found.attribution
     names = ", ".join(map(name_of, attribution.accepted.causes))
     print(f"{found.verdict.name}: {names or 'nothing'}")

@@ -69,7 +69,7 @@ def as_dict(diagnosis: Diagnosis) -> Plain:
 def shared_entries(diagnosis: Diagnosed) -> Plain:
     """What ``diagnosis.json`` holds of every diagnosis."""
     verdict, attribution = diagnosis.verdict, diagnosis.attribution
-    alternatives = {
+    alternatives = {  # of explanations that are named alike, the best comes last and stays
         named: [cause_entry(rival.fit, cause) for cause in named]
         for rival in reversed((attribution.accepted, *attribution.rivals))
         if (named := verdict.named(rival.causes)) in verdict.alternatives

@@ -228,10 +228,9 @@ def experiment_entry(proposal: Proposal | None) -> Plain:
 
 def minor_notes(verdict: Verdict) -> list[str]:
     """Causes that the extended model holds and the verdict does not name."""
-    names = [name_of(cause) for cause in verdict.minor]
     share = POLICY.least_named_share
     return [
-        f"{name} is in the extended model but not named: beside the other causes it makes up less "
-        f"than {share:.1%} of the misfit, in every channel, as errors of their models may."
-        for name in names
+        f"{name_of(cause)} is in the extended model but not named: beside the other causes it "
+        f"makes up less than {share:.1%} of the misfit, in every channel, as errors of their models may."
+        for cause in verdict.minor
     ]

@@ -13,7 +13,7 @@ and what was not known of the states that predictions begin from, beside what th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from typing import Any, TypeAlias
@@ -86,20 +86,22 @@ class Budget:
     left: float
     left_ci95: tuple[float, float] | None
 
-    @property
-    def minor(self) -> tuple[CauseId, ...]:
+    def minor(self, slow: Collection[CauseId] = ()) -> tuple[CauseId, ...]:
         """Causes that make up next to nothing of the misfit, beside others that do more.
 
         What the models of larger causes and of sensors get wrong looks like a further small cause,
         and with much data it is significant. Where no cause does more there is no such model.
+
+        Args:
+            slow: causes whose error hardly builds up within a prediction; none of them is minor.
         """
         largest = {
             share.component: max(share.alone, share.last, *share.channels.values())
             for share in self.shares
             if not isinstance(share.component, Other)
         }
-        minor = tuple(c for c, most in largest.items() if most < POLICY.least_named_share)
-        return minor if len(minor) < len(largest) else ()
+        small = [c for c, most in largest.items() if most < POLICY.least_named_share]
+        return tuple(c for c in small if c not in slow) if len(small) < len(largest) else ()
 
 
 def error_budget(

@@ -133,9 +133,7 @@ def investigate(
     report("computing the error budget")
     budget = budget_of(attribution, verdict, left, held_out, rng)
     if budget is not None:
-        # Within the length of a prediction an error of clock or beat hardly builds up.
-        minor = [cause for cause in budget.minor if cause not in problem.out_of_step]
-        verdict = without_minor(verdict, minor)
+        verdict = without_minor(verdict, budget.minor(slow=problem.out_of_step))
     return Result(attribution, left, shown, verdict, gap, residual, budget)
 
 

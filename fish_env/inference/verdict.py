@@ -90,23 +90,22 @@ def verdict_of(
 def without_minor(verdict: Verdict, minor: Collection[CauseId]) -> Verdict:
     """The verdict without the names of causes that are too small to be named.
 
-    Explanations that differ from what is named in such causes alone are no alternatives.
+    Explanations that differ from what is named in such causes alone are no alternatives. Where no
+    certain cause would be left, the verdict stays as it is.
 
     Args:
         verdict: verdict that may name them.
         minor: the causes.
     """
-    if not minor:
-        return verdict
     quiet = replace(verdict, minor=tuple(minor))
     causes = quiet.named(verdict.causes)
+    if not (minor and causes):
+        return verdict
     sets: dict[frozenset[CauseId], tuple[CauseId, ...]] = {}
     for alternative in map(quiet.named, verdict.alternatives):
         sets.setdefault(frozenset(alternative), alternative)
     alternatives = tuple(sets.values())
     if verdict.name == "partial":
         return replace(quiet, causes=causes, alternatives=alternatives if len(sets) > 1 else ())
-    alternatives = tuple(rest for rest in alternatives if not {*causes} <= {*rest})
-    if verdict.name == "ambiguous" and not alternatives:
-        return replace(verdict_of(True, causes, (), False), minor=quiet.minor)
-    return replace(quiet, causes=causes, alternatives=alternatives)
+    others = tuple(rest for rest in alternatives if not {*causes} <= {*rest})
+    return replace(verdict_of(True, causes, others, blind=False), minor=quiet.minor)

@@ -58,22 +58,28 @@ LITTLE = 0.5 * POLICY.least_named_share
 
 def test_a_cause_is_minor_that_does_next_to_nothing_in_any_channel():
     found = budget(coefficients=(0.0, 0.0), drag=(0.6, 0.1), play=(LITTLE, -0.3))
-    assert found.minor == ("play",)
+    assert found.minor() == ("play",)
 
 
 def test_a_cause_that_shows_in_one_channel_is_not_minor():
-    assert budget(drag=(0.6, 0.1), lag=(-0.2, 2.0 * POLICY.least_named_share)).minor == ()
+    assert budget(drag=(0.6, 0.1), lag=(-0.2, 2.0 * POLICY.least_named_share)).minor() == ()
 
 
 def test_a_cause_that_others_need_is_not_minor():
     """Beside another one alone it makes everything worse."""
     own = {"drag": (0.6, 0.1), "marker": (-0.3, -0.3)}
-    assert budget(**own).minor == ("marker",)
-    assert budget(last=2.0 * POLICY.least_named_share, **own).minor == ()
+    assert budget(**own).minor() == ("marker",)
+    assert budget(last=2.0 * POLICY.least_named_share, **own).minor() == ()
 
 
 @pytest.mark.parametrize("causes", [("lag",), ("lag", "play")])
 def test_no_cause_is_minor_beside_none_that_does_more(causes):
     """However much coefficients and what runs differ in explain: their models are not in doubt."""
     shares = dict.fromkeys(causes, (LITTLE, 0.0))
-    assert budget(coefficients=(0.9, 0.9), run_variation=(0.1, 0.1), **shares).minor == ()
+    assert budget(coefficients=(0.9, 0.9), run_variation=(0.1, 0.1), **shares).minor() == ()
+
+
+def test_what_builds_up_slowly_is_not_minor():
+    """A wrong clock changes little in a prediction of some seconds."""
+    found = budget(drag=(0.6, 0.1), clock=(LITTLE, 0.0), play=(LITTLE, 0.0))
+    assert found.minor(slow=["clock"]) == ("play",)

@@ -40,8 +40,19 @@ def test_coefficients_that_remain_are_parameters():
     [
         ((("drag", "lag"), ("drag", "play")), (("drag",), ("drag", "play"))),
         ((("drag", "lag"), ("drag",)), ()),
+        ((("drag", "lag"), ("drag", "play"), ("drag",)), (("drag",), ("drag", "play"))),
     ],
 )
 def test_a_partial_verdict_keeps_the_sets_that_still_differ(sets, left):
     found = without_minor(Verdict("partial", ("drag",), sets), ["lag"])
     assert found == Verdict("partial", ("drag",), left, minor=("lag",))
+
+
+def test_a_verdict_without_any_other_certain_cause_stays():
+    verdict = Verdict("partial", ("lag",), (("drag", "lag"), ("lag", "mass")))
+    assert without_minor(verdict, ["lag"]) is verdict
+
+
+def test_a_cause_that_leaves_coefficients_alone_leaves_parameters():
+    found = without_minor(Verdict("cause", (MASS, "lag")), ["lag"])
+    assert found == Verdict("parameters", (MASS,), minor=("lag",))

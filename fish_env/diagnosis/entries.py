@@ -228,9 +228,9 @@ def experiment_entry(proposal: Proposal | None) -> Plain:
 
 def minor_notes(verdict: Verdict) -> list[str]:
     """Causes that the extended model holds and the verdict does not name."""
-    share = POLICY.least_named_share
+    little = f"less than {POLICY.least_named_share:.1%} of the misfit, in every channel"
     return [
         f"{name_of(cause)} is in the extended model but not named: beside the other causes it "
-        f"makes up less than {share:.1%} of the misfit, in every channel, as errors of their models may."
+        f"makes up {little}, as errors of their models may."
         for cause in verdict.minor
     ]

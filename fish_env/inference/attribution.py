@@ -19,7 +19,7 @@ from fish_env.inference.elimination import (
 from fish_env.inference.estimate.again import finished
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.explanation import Explanation
-from fish_env.inference.hypotheses import CauseId, Coefficient
+from fish_env.inference.hypotheses import CauseId, Coefficient, listed
 from fish_env.inference.in_common import with_common_errors
 from fish_env.inference.many_causes import challenged, pursue
 from fish_env.inference.parallel import both, side_by_side
@@ -238,6 +238,7 @@ class Search:
 
     def together(self, found: Attribution) -> Attribution:
         """With further effects that are needed beside those found, and what the runs differ in."""
+        found = self.simplest_first(found)
         before = found.accepted
         current, after, replaced = pursue(
             before, found.shown, self.causes, self.rng, self.report, self.relaxed_log_p
@@ -252,6 +253,27 @@ class Search:
         return replace(
             found, accepted=current, rivals=rivals, shown=after, gain=gain,
             failed=frozenset(),
+        )  # fmt: skip
+
+    def simplest_first(self, found: Attribution) -> Attribution:
+        """With the rival of fewest numbers in the lead, where one cause is known and others show.
+
+        What more numbers explain then is often part of what is missing. They would go on to do so
+        beside the effects that are found next, whose fits take longer with each number.
+        """
+        best = found.accepted
+        others_show = shortlisted(best.fit.problem, found.shown, 1, self.relaxed_log_p)
+        if len(best.causes) != 1 or not others_show:
+            return found
+        simple = min((best, *found.rivals), key=lambda e: len(e.fit.ids))
+        if simple is best:
+            return found
+        self.report(f"going on with {listed(simple.causes)}, which explains as much")
+        leading = simple.varied()
+        others = tuple(e for e in (best, *found.rivals) if e is not simple)
+        return replace(
+            found, accepted=leading, rivals=others, gain=found.gain + best.score - leading.score,
+            shown=screen(leading.fit, self.causes, self.rng),
         )  # fmt: skip
 
     def in_common(self, found: Attribution) -> Attribution:

@@ -214,7 +214,8 @@ def residuals_and_rows(
     rows = innovations[1:]
     # In place: memory fresh from the system costs as much as the arithmetic.
     rows -= innovations[0]
-    rows /= steps[first:, None]
+    with np.errstate(over="ignore"):  # of a motion that is about to diverge
+        rows /= steps[first:, None]
     rows[diverged(rows)] = 0.0
     return innovations[0], rows
 

@@ -65,9 +65,7 @@ def substituted(
         coarse = swapped(fitter, own, name, signal, enough)
         if coarse is None or coarse.objective >= enough:
             continue
-        # Beside its limit either could be done without; in its place it would act as that does.
-        limit = limit_at(own.problem, signal.cause.effect, coarse.point.effects)
-        if limit not in current.causes:
+        if not _stands_for(own.problem, signal.cause.effect, coarse.point.effects, current.causes):
             found.append((coarse.objective, causes, coarse))
     others = []
     # Beside a misfit the numbers of the runs have not settled yet, and no fit is hopeless.
@@ -139,6 +137,19 @@ def in_parts(current: Explanation, cause: CauseId, report: Report) -> Explanatio
     further = partial(fit, refit_noise=False, iterations=4, give_up_above=enough)
     fitted = reached(partial(further, own.problem, *start))
     return None if fitted is None else Explanation(causes, fitted)
+
+
+def _stands_for(
+    problem: Problem, effect: EffectName, values: Values, causes: Collection[CauseId]
+) -> bool:
+    """Whether an effect acts as others do together, of which some but not all are causes.
+
+    What it adds to those would have shown as the others. Beside its limit either could be done
+    without. In the place of all of them, one effect is the simpler explanation.
+    """
+    parts = {*_parts(problem, effect, values)}
+    there = parts & {*causes}
+    return bool(there) and (len(parts) == 1 or there != parts)
 
 
 def limit_of(own: Fit, cause: CauseId) -> EffectName | None:

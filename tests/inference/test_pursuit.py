@@ -185,6 +185,27 @@ def test_a_cause_that_does_what_two_do_is_taken_apart():
     assert not rivals
 
 
+@pytest.mark.parametrize("takes_apart", [False, True])
+def test_what_a_cause_does_with_another_is_not_fitted_in_its_place(takes_apart):
+    """The other would have shown."""
+
+    def residuals(z, effects):
+        lag, delay, both = (effects[size_of(name)] for name in ("lag", "delay", "both"))
+        return np.tile([lag + both - 12.0, delay + 0.1 * both, float(z.sum())], (3, 1))
+
+    lag = effect("lag", 20.0, confusable_with=("both",))
+    both = effect("both", 20.0)
+    if takes_apart:
+        both = Both("both", both.parameters)
+    problem, said = Stated(residuals, [lag, effect("delay", 20.0), both]), []
+    current = Explanation(("lag",), fit(problem, ("lag",)))
+    shown = screen(current.fit, causes_of(problem), np.random.default_rng(0))
+    best, _ = challenged(current, shown, (), said.append)
+    assert best is current
+    assert "trying both instead of lag" in said
+    assert ("fitting both" in said) != takes_apart
+
+
 def test_what_is_like_a_cause_found_does_not_push_out_what_shows():
     """It comes beside what shows most, which is like none of both."""
 

@@ -8,15 +8,14 @@ from typing import Any
 from fish_env.data.place import Place, closest
 from fish_env.data.table import read_text
 from fish_env.reading import (
-    TextLoader,
     Unreadable,
     located,
-    parse_yaml,
     plain_number,
     printable_lines,
     short,
     shown,
 )
+from fish_env.yaml_text import TextLoader, parse_yaml
 
 
 class Section:

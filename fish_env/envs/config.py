@@ -17,7 +17,8 @@ from fish_env.envs.layout import Setup, empty_setup
 from fish_env.errors import ConfigError
 from fish_env.model.state import INPUTS as INPUTS  # open to what builds on environments
 from fish_env.params.io import config_root
-from fish_env.reading import Unreadable, is_number, located, printable, read_yaml, short, shown
+from fish_env.reading import Unreadable, is_number, located, printable, short, shown
+from fish_env.yaml_text import read_yaml
 
 DEFAULT_NAME = "robotic-fish-3d.yaml"
 OWN_WEIGHTS = {

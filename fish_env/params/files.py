@@ -9,8 +9,8 @@ import yaml
 from fish_env.errors import ParameterError
 from fish_env.files import write_text
 from fish_env.reading import Unreadable
-from fish_env.reading import read_yaml as read_any_yaml
 from fish_env.version import stamped
+from fish_env.yaml_text import read_yaml as read_any_yaml
 
 
 class PlainDumper(yaml.SafeDumper):

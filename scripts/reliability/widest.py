@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from functools import cache
 from typing import Any
 
 from fish_env.effects import catalogue
 from fish_env.envs.options import env_options
 from fish_env.errors import RoboticFishError
-from fish_env.params import load_fish
+from fish_env.params import FishParams, load_fish
 
 Ranges = dict[str, list[float]]
 FISH = "zheng-2021-a"
@@ -53,10 +54,15 @@ WATER: dict[str, Any] = {
 """Everything beside the draws: the longest delays, loud sensors."""
 
 
+@cache
+def _fish() -> FishParams:
+    return load_fish(FISH)
+
+
 def accepted(ranges: Ranges) -> bool:
     """Whether the environment takes these draws."""
     try:
-        env_options(randomization=ranges)
+        env_options(fish=_fish(), randomization=ranges)
     except RoboticFishError:
         return False
     return True
@@ -64,7 +70,7 @@ def accepted(ranges: Ranges) -> bool:
 
 def bounds() -> Ranges:
     """Each coefficient of the fish and each effect, as far as it may be drawn by itself."""
-    fish = load_fish(FISH)
+    fish = _fish()
     ranges = {
         path: [_end(path, value, end, i) for i, end in enumerate(_bounds(fish, path))]
         for path, value in fish.values().items()
@@ -78,7 +84,7 @@ def swimmable(factor: float = 3.0) -> Ranges:
     Of a fish with the coefficients of :func:`bounds` hardly one swims: within three steps most of
     them tumble or burst, and what is slow or rare is not reached.
     """
-    legal, fish = bounds(), load_fish(FISH)
+    legal, fish = bounds(), _fish()
     ranges = {}
     for path, value in fish.values().items():
         if path.startswith(("tail.", "body.")) and value != 0.0:

@@ -21,6 +21,7 @@ OPEN_TO_AGENTS = {
     "errors",
     "files",
     "reading",
+    "yaml_text",
     "params",
     "trajectory",
     "simulator",

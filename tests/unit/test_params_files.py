@@ -2,6 +2,8 @@
 
 import dataclasses
 import pickle
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -70,6 +72,18 @@ def test_a_saved_file_needs_no_base_and_names_no_folder(tmp_path):
     text = (tmp_path / "copy.yaml").read_text()
     assert "base" not in read_yaml(tmp_path / "copy.yaml")
     assert str(config_root()) not in text
+
+
+def test_without_libyaml_files_read_the_same():
+    """The parser in Python is there for a PyYAML that was built without the library."""
+    program = (
+        "import sys; sys.modules['yaml._yaml'] = None\n"
+        "import yaml; assert not yaml.__with_libyaml__\n"
+        "from fish_env.params import list_fish, load_fish\n"
+        "print(*(repr(load_fish(name)) for name in list_fish()), sep='\\n')"
+    )
+    plain = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert plain.stdout.splitlines() == [repr(load_fish(name)) for name in list_fish()]
 
 
 def test_save_refuses_another_ending(tmp_path):

@@ -11,7 +11,8 @@ from fish_env.envs.tasks import TASKS
 from fish_env.envs.vector import RoboticFish3DVectorEnv
 from fish_env.errors import ConfigError
 from fish_env.params.io import config_root, fish_files
-from fish_env.reading import Unreadable, is_number, located, read_yaml, shown
+from fish_env.reading import Unreadable, is_number, located, shown
+from fish_env.yaml_text import read_yaml
 
 MOST = {"version": 10**9, "seed": 10**12, "episodes": 100_000, "episode_steps": 100_000}
 RESERVED_SEEDS = range(1_000_000, 2_000_000)

@@ -14,7 +14,8 @@ from typing import Any
 
 from fish_env.errors import ConfigError
 from fish_env.files import file_name
-from fish_env.reading import Unreadable, parse_yaml, shown
+from fish_env.reading import Unreadable, shown
+from fish_env.yaml_text import parse_yaml
 from robofish_agents.evaluation.suites import TRUST
 from robofish_agents.training.config import TrainConfig, load_train_config
 from robofish_agents.training.schema import build

@@ -13,7 +13,8 @@ import yaml
 from fish_env.envs.options import env_options
 from fish_env.errors import ConfigError
 from fish_env.params.io import config_root
-from fish_env.reading import Unreadable, located, read_yaml
+from fish_env.reading import Unreadable, located
+from fish_env.yaml_text import read_yaml
 from robofish_agents.evaluation.suites import TRUST, environment_files, load_suite, suite_files
 from robofish_agents.policies.history import HistorySpec
 from robofish_agents.training.schema import build

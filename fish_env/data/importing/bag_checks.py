@@ -17,7 +17,8 @@ from urllib.parse import quote
 
 from fish_env.data.importing.limits import check_is_file
 from fish_env.data.place import Place
-from fish_env.reading import TextLoader, Unreadable, read_yaml
+from fish_env.reading import Unreadable
+from fish_env.yaml_text import TextLoader, read_yaml
 
 METADATA = "metadata.yaml"
 MOST_DEFINITION = 200_000

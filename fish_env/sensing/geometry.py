@@ -13,26 +13,16 @@ order in which they act, with R the true attitude (body to inertial) and p the p
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 import numpy.typing as npt
 
 from fish_env.arrays import FloatArray
 
-FIELDS = (
-    "mount_roll",
-    "mount_pitch",
-    "mount_yaw",
-    "marker_x",
-    "marker_y",
-    "marker_z",
-    "tilt_roll",
-    "tilt_pitch",
-    "refraction",
-    "iron_sine",
-    "iron_cosine",
-)
+MOUNT = ("mount_roll", "mount_pitch", "mount_yaw")
+CAMERA = ("marker_x", "marker_y", "marker_z", "tilt_roll", "tilt_pitch", "refraction")
+FIELDS = (*MOUNT, *CAMERA, "iron_sine", "iron_cosine")
 """rad, m, rad, 1/m, rad."""
 CALIBRATED_DEPTH = 0.5
 """m. Depth at which the scale of a camera above the water is right."""
@@ -61,7 +51,7 @@ def lens_of(geometry: Geometry, count: int) -> FloatArray:
     """The geometry of ``count`` lanes as kernels read it, shape (LENS_ROWS, count)."""
     given = [geometry.get(name, 0.0) for name in FIELDS]
     value = dict(zip(FIELDS, (np.broadcast_to(v, (count,)) for v in given), strict=True))
-    mount = turns_of(*(value[f"mount_{name}"] for name in ANGLES))
+    mount = turns_of(*(value[name] for name in MOUNT))
     tilt = turns_of(value["tilt_roll"], value["tilt_pitch"], 0.0)
     marker = [value[f"marker_{axis}"] for axis in PLACE]
     bent = value["refraction"]
@@ -88,11 +78,12 @@ def through_geometry(
     value = {name: np.asarray(geometry.get(name, 0.0), float) for name in FIELDS}
     if not all(name in channels for name in ANGLES):
         return seen
-    turns = turns_of(*(channels[name] for name in ANGLES))
-    if all(name in channels for name in PLACE):
-        seen |= _by_camera(channels, turns, value)
-    if any(np.any(value[f"mount_{name}"]) for name in ANGLES):
-        seen |= _mounted(channels, turns, value)
+    by_camera = all(name in channels for name in PLACE) and _any(value, CAMERA)
+    mounted = _any(value, MOUNT)
+    if by_camera or mounted:
+        turns = turns_of(*(channels[name] for name in ANGLES))
+        seen |= _by_camera(channels, turns, value) if by_camera else {}
+        seen |= _mounted(channels, turns, value) if mounted else {}
     if np.any(value["iron_sine"]) or np.any(value["iron_cosine"]):
         double = 2.0 * seen["yaw"]
         iron = value["iron_sine"] * np.sin(double) + value["iron_cosine"] * np.cos(double)
@@ -100,10 +91,14 @@ def through_geometry(
     return seen
 
 
+def _any(value: Mapping[str, FloatArray], names: Iterable[str]) -> bool:
+    return any(np.any(value[name]) for name in names)
+
+
 def _mounted(
     channels: Mapping[str, FloatArray], turns: FloatArray, value: Mapping[str, FloatArray]
 ) -> dict[str, FloatArray]:
-    mount = turns_of(*(value[f"mount_{name}"] for name in ANGLES))
+    mount = turns_of(*(value[name] for name in MOUNT))
     shown = np.einsum("ij...,jk...->ik...", turns, mount)
     yaw = np.arctan2(shown[1, 0], shown[0, 0])
     round_about = 2.0 * np.pi * np.round((channels["yaw"] - yaw) / (2.0 * np.pi))
@@ -123,9 +118,6 @@ def _by_camera(
     channels: Mapping[str, FloatArray], turns: FloatArray, value: Mapping[str, FloatArray]
 ) -> dict[str, FloatArray]:
     """x and y; the depth is not the camera's."""
-    fields = ("marker_x", "marker_y", "marker_z", "tilt_roll", "tilt_pitch", "refraction")
-    if not any(np.any(value[name]) for name in fields):
-        return {}
     marker = [value[f"marker_{axis}"] for axis in PLACE]
     place = [
         channels[axis] + sum(turns[i, j] * marker[j] for j in range(3))

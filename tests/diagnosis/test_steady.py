@@ -221,10 +221,22 @@ def test_too_few_conditions_are_refused():
         diagnose_steady(few)
 
 
+def at_frequencies(dataset, *frequencies):
+    at = np.flatnonzero(np.isin(dataset.commands[:, 2], frequencies))
+    return replace(
+        dataset,
+        ids=tuple(dataset.ids[i] for i in at),
+        conditions=tuple(dataset.conditions[i] for i in at),
+        commands=dataset.commands[at],
+        observations={name: values[at] for name, values in dataset.observations.items()},
+    )
+
+
 @pytest.mark.slow
 def test_a_hidden_cause_is_named_with_its_size(tmp_path):
     truth = make_case("steady", 1, tmp_path / "data")
-    answer = diagnose(tmp_path / "data", out=tmp_path / "out", quick=True)
+    rows = at_frequencies(load_dataset(tmp_path / "data"), 1.5, 2.2)  # half, a third of the time
+    answer = diagnose_steady(rows, out=tmp_path / "out", quick=True)
     assert answer["verdict"] == "cause"
     assert [cause["name"] for cause in answer["causes"]] == ["tail_bias"]
     low, high = answer["causes"][0]["parameters"]["offset"]["ci95"]

@@ -8,7 +8,7 @@ import numpy.typing as npt
 from fish_env.arrays import FloatArray
 from fish_env.identification.filtering import Measurement
 from fish_env.sensing import channels_from_states
-from fish_env.sensing.geometry import through_geometry
+from fish_env.sensing.geometry import ANGLES, through_geometry
 
 SENSED = ("x", "y", "z", "roll", "pitch", "yaw")
 """Channels that the averages are derived from, in the order of the measurement's rows."""
@@ -36,8 +36,9 @@ def beat_means(
     gain = {name: measurement.gain[i, lanes] for i, name in enumerate(SENSED)}
     bias = {name: measurement.bias[i, lanes] for i, name in enumerate(SENSED)}
     pace = measurement.pace[lanes]
-    mounted = through_geometry(channels, measurement.take(lanes).geometry)
-    angles = {n: mounted[n][1:] * gain[n] + bias[n] for n in ("roll", "pitch", "yaw")}
+    attitude = {name: channels[name] for name in ANGLES}
+    mounted = through_geometry(attitude, measurement.take(lanes).geometry)
+    angles = {name: mounted[name][1:] * gain[name] + bias[name] for name in ANGLES}
     body = np.stack([channels[name][1:] for name in "uvw"])
     true = to_inertial({n: channels[n][1:] for n in angles}, body)
     seen = true * np.stack([gain[name] for name in "xyz"])[:, None] * pace

@@ -70,11 +70,18 @@ def page(speed: Path = SPEED, diagnosis: Path = DIAGNOSIS) -> str:
 
 
 def _latest(folder: Path, name: str) -> str:
-    """The latest report of a folder, by the date in its name, its headings one level lower."""
-    reports = sorted(folder.glob(f"{name}-[0-9]*.md"))
-    if not reports:
+    """The reports of the latest date in a folder, one after another, headings one level lower.
+
+    The first of a day is named by its date alone; parts that ran later that day have a number.
+    """
+    dated: dict[str, list[Path]] = {}
+    for file in folder.glob(f"{name}-[0-9]*.md"):
+        date = "-".join(file.stem.removeprefix(f"{name}-").split("-")[:3])
+        dated.setdefault(date, []).append(file)
+    if not dated:
         return "No full run is published yet.\n"
-    return lowered(reports[-1].read_text(encoding="utf-8"))
+    parts = sorted(dated[max(dated)], key=lambda file: (len(file.stem), file.stem))
+    return "\n".join(lowered(file.read_text(encoding="utf-8")) for file in parts)
 
 
 def lowered(text: str) -> str:

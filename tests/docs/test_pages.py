@@ -38,12 +38,14 @@ def test_the_generated_parts_of_the_readme_are_up_to_date():
 
 def test_the_benchmarks_page_takes_the_latest_reports(tmp_path):
     for name, text in (
+        ("speed-2026-01-02-10", "Tenth"),
+        ("speed-2026-01-02-2", "Second"),
         ("speed-2026-01-02", "# New\n\n## Judged\n- met"),
         ("speed-2026-01-01", "Old"),
     ):
         (tmp_path / f"{name}.md").write_text(text)
     page = make_benchmarks_page.page(tmp_path, tmp_path)
-    assert "### New\n\n#### Judged\n\n- met\n" in page
+    assert "### New\n\n#### Judged\n\n- met\n\nSecond\n\nTenth\n" in page
     assert "Old" not in page
     assert "No full run is published yet." in page
 

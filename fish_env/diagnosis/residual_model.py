@@ -131,7 +131,8 @@ def residual_model(
         None where the data ask for no wrench beyond chance, or where they are not explained better
         with those that they ask for: then no sum of simple functions is what is missing.
     """
-    like = forces = generic_forces(series_of(explanation).runs, explanation.filtered)
+    series = series_of(explanation)
+    like = forces = generic_forces(series.runs, explanation.filtered, series.channels)
     state = _State(explanation, np.zeros(0, np.int64), np.zeros(0), np.zeros(0))
     differing = spread_of(explanation.problem, explanation.noise).any()
     beside = bool(explanation.effects) or differing
@@ -150,7 +151,7 @@ def residual_model(
         if again is None:
             break
         state = replace(chosen, fit=again)
-        forces = generic_forces(series_of(again).runs, again.filtered, like)
+        forces = generic_forces(series_of(again).runs, again.filtered, series.channels, like)
     if not len(state.columns):
         return None
     terms = tuple(
@@ -286,7 +287,7 @@ def _judged(explanation: Fit, state: _State, like: GenericForces, runs: Problem)
     final, before = evaluated(runs, explanation.point, explanation.noise)
     own, after = state.fit, before
     for _ in range(2):
-        forces = generic_forces(final.runs, after, like)
+        forces = generic_forces(final.runs, after, final.channels, like)
         carrying = final.with_runs(_carrying(final.runs, forces, state))
         _, after = evaluated(carrying, own.point, own.noise)
     scores = [

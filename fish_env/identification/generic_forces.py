@@ -6,8 +6,8 @@ described by them (:mod:`~fish_env.diagnosis.residual_model`).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -15,12 +15,20 @@ import numpy as np
 from fish_env.arrays import FloatArray, IntArray
 from fish_env.identification.filtering import Filtered, Pushes
 from fish_env.identification.noise_model import NoiseModel
+from fish_env.identification.parameters import VERTICAL
 from fish_env.identification.runs import RunData
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.sensing.channels import channels_from_states
 
 DIRECTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+LEVEL = ("surge", "sway", "yaw")
+"""Directions that channels show which see the fish from above."""
+UPRIGHT = frozenset(
+    {"w", "p", "q", "w|w|", "p|p|", "q|q|", "u w", "u q", "w q", "p r", "sin pitch", "sin roll"}
+    | {"depth", "depth^2", "depth^3"}
+)
+"""Functions of what such channels do not show."""
 
 
 def wrench_unit(direction: str) -> str:
@@ -38,16 +46,19 @@ class GenericForces:
         names: of the functions (J).
         scale: (J,) root mean square of each over the runs that define them, in SI units.
         bases: per run (T, J), divided by the scale.
+        directions: those that the channels show.
     """
 
     names: tuple[str, ...]
     scale: FloatArray
     bases: list[FloatArray]
+    directions: tuple[str, ...] = DIRECTIONS
 
     @property
     def columns(self) -> IntArray:
-        """Every wrench there is (6 J,)."""
-        return np.arange(6 * len(self.names))
+        """Every wrench that the channels show, increasing."""
+        shown = [DIRECTIONS.index(direction) for direction in self.directions]
+        return np.add.outer(6 * np.arange(len(self.names)), shown).ravel()
 
     def words(self, column: int) -> tuple[str, str]:
         """Function and direction of a wrench."""
@@ -55,24 +66,32 @@ class GenericForces:
 
 
 def generic_forces(
-    runs: Sequence[RunData], filtered: Sequence[Filtered], like: GenericForces | None = None
+    runs: Sequence[RunData],
+    filtered: Sequence[Filtered],
+    channels: Collection[str],
+    like: GenericForces | None = None,
 ) -> GenericForces:
     """The functions along runs.
 
     Args:
         runs: the runs.
         filtered: their motion.
+        channels: names of what was measured. Where none of them shows depth or inclination, neither
+            acts: of those the filter only guesses.
         like: functions and scales to take over; default: every one that is not zero throughout.
     """
+    level = not VERTICAL.intersection(channels)
     tables = [regressors(run, result) for run, result in zip(runs, filtered, strict=True)]
     names = list(tables[0]) if like is None else list(like.names)
     bases = [np.column_stack([table[name] for name in names]) for table in tables]
     if like is not None:
-        return GenericForces(like.names, like.scale, [b / like.scale for b in bases])
+        return replace(like, bases=[b / like.scale for b in bases])
     scale = np.sqrt(np.mean(np.concatenate(bases) ** 2, axis=0))
-    kept = np.flatnonzero(scale > 1e-9)
+    hidden = np.array([level and name in UPRIGHT for name in names])
+    kept = np.flatnonzero((scale > 1e-9) & ~hidden)
     scaled = [np.ascontiguousarray(basis[:, kept] / scale[kept]) for basis in bases]
-    return GenericForces(tuple(names[i] for i in kept), scale[kept], scaled)
+    shown = LEVEL if level else DIRECTIONS
+    return GenericForces(tuple(names[i] for i in kept), scale[kept], scaled, shown)
 
 
 def probes(columns: IntArray) -> FloatArray:
@@ -109,7 +128,7 @@ class BoundForces:
 
     @property
     def columns(self) -> IntArray:
-        """Every wrench there is (6 J,)."""
+        """Every wrench that the channels show, increasing."""
         return self.forces.columns
 
     def words(self, column: int) -> tuple[str, str]:

@@ -273,7 +273,7 @@ class SeriesProblem(Stepped):
 
     def generic_terms(self, fit: Any) -> BoundForces:
         """Forces and moments that depend on motion, attitude, depth, time, beat or commands."""
-        return BoundForces(fit, generic_forces(self.runs, fit.filtered))
+        return BoundForces(fit, generic_forces(self.runs, fit.filtered, self.channels))
 
     def freedoms(self, names: Iterable[str]) -> tuple[EffectFreedom, ...]:
         """Free parameters of effects."""

@@ -45,7 +45,7 @@ class Answering(Problem):
 
     def __init__(self, run, filtered):
         self.baseline, self.known = coefficients(()), {}
-        self.forces = generic_forces([run], [filtered])
+        self.forces = generic_forces([run], [filtered], ("z",))
 
     def disturbance_at_limit(self, noise):
         return disturbance_range(load_fish("zheng-2021-a")).left_by(noise)
@@ -211,3 +211,18 @@ def test_a_shape_that_is_finite_may_be_too_large():
     values = {**found.point.effects, EffectParameterId("wave", "frequency"): 9.0}
     (said,) = implausible_estimates(replace(found, point=Point(found.point.z, values)))
     assert "frequency" in said.words
+
+
+@pytest.mark.parametrize("more", [(), ("z",), ("q",)], ids=["camera", "depth", "gyro"])
+def test_what_no_channel_shows_is_not_blamed(more):
+    """A camera overhead sees neither depth nor inclination; the filter guesses them."""
+    run, filtered = swimming(np.random.default_rng(1))
+    forces = generic_forces([run], [filtered], ("x", "y", "yaw", "tail_angle", *more))
+    functions, directions = map(set, zip(*map(forces.words, forces.columns), strict=True))
+    assert {"u", "v", "u r", "sin 1 phase"} <= functions
+    assert {"surge", "sway", "yaw"} <= directions
+    upright = {"heave", "roll", "pitch"}, {"w", "u w", "depth", "sin pitch"}
+    for blamed, unseen in zip((directions, functions), upright, strict=True):
+        assert blamed & unseen == (unseen if more else set())
+    again = generic_forces([run], [filtered], (), forces)
+    assert again.columns.tolist() == forces.columns.tolist()

@@ -91,7 +91,7 @@ def limited():
     )
     held = {"refit_noise": False, "noise": setup.noise}
     own = fit(problem, ("servo_rate_limit",), limit, iterations=1, **held)
-    return own, generic_forces(problem.runs, own.filtered)
+    return own, generic_forces(problem.runs, own.filtered, problem.channels)
 
 
 def test_a_push_does_the_same_in_long_steps_where_the_tails_rate_jumps(limited):

@@ -124,7 +124,7 @@ def test_a_known_wrench_does_what_the_same_push_does():
     setup = Setup(runs=2)
     problem = SeriesProblem(simulate(setup), paths=PATHS)
     own = fit(problem, iterations=1, refit_noise=False, noise=setup.noise)
-    forces = generic_forces(problem.runs, own.filtered)
+    forces = generic_forces(problem.runs, own.filtered, problem.channels)
     [column] = [c for c in forces.columns if forces.words(c) == ("u|u|", "yaw")]
     push = BoundForces(own, forces).changes(np.array([column]))[:, 0]
     wrenches = [np.zeros((len(basis), 6)) for basis in forces.bases]

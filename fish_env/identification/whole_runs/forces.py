@@ -46,4 +46,4 @@ def forces_of(
         effects = {**fit.point.effects, scale: pace * fit.point.effects[scale]}
         alone = series.with_runs([replace(run, state0=state0, as_measured=False)])
         found += alone.filtered(Point(fit.point.z, effects), blind)
-    return BoundForces(fit, generic_forces(series.runs, found))
+    return BoundForces(fit, generic_forces(series.runs, found, series.channels))

@@ -22,6 +22,8 @@ demo: $(VENV)/.with-base  ## diagnose a small data set, compare a real fish, swi
 
 # Processes that share the cores must not wait for each other's threads.
 test test-long: export OMP_NUM_THREADS = 1
+# Tests import the package in hundreds of processes. Some environments keep no compiled modules.
+test test-long: export PYTHONDONTWRITEBYTECODE =
 
 test: setup  ## check style, types and layering, then run the tests
 	$(MAKE) --jobs=2 lint kernels

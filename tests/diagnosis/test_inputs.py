@@ -43,7 +43,6 @@ QUICK = (
     (NINE, "mirrored"),
     (NINE, "commands exchanged"),
     (NINE, "clock 2.1"),
-    (NINE, "clock of the commands 1.3"),
     (NINE, "clock of the measurements 0.5"),
     (NINE, "commands -0.4 s late"),
     (NINE, "beat 0.75"),

@@ -55,21 +55,28 @@ BEAT, SAG, START, WAVE = (
 )
 DEGREE = float(np.deg2rad(1.0))
 SENSOR_ERRORS = (
-    RunVariation("marker_x", "m", 0.01, shared=True),
-    RunVariation("marker_y", "m", 0.01, shared=True),
-    RunVariation("marker_z", "m", 0.01, shared=True),
-    RunVariation("mounting_roll", "rad", DEGREE, shared=True),
-    RunVariation("mounting_pitch", "rad", DEGREE, shared=True),
-    RunVariation("mounting_yaw", "rad", DEGREE, shared=True),
-    RunVariation("gyro_gain_p", "1", 0.01, shared=True),
-    RunVariation("gyro_gain_q", "1", 0.01, shared=True),
-    RunVariation("gyro_gain_r", "1", 0.01, shared=True),
+    *(
+        RunVariation(f"marker_{a}", "m", 0.01, shared=True, beside=Shared("marker_offset", a))
+        for a in "xyz"
+    ),
+    *(
+        RunVariation(
+            f"mounting_{a}", "rad", DEGREE, shared=True, beside=Shared("attitude_misalignment", a)
+        )
+        for a in ANGLES
+    ),
+    *(
+        RunVariation(f"gyro_gain_{a}", "1", 0.01, shared=True, beside=Shared("gyro_scale", a))
+        for a in "pqr"
+    ),
     RunVariation("compass_sin_yaw", "rad", DEGREE, shared=True),
     RunVariation("compass_cos_yaw", "rad", DEGREE, shared=True),
     RunVariation("compass_sin_2_yaw", "rad", DEGREE, shared=True),
     RunVariation("compass_cos_2_yaw", "rad", DEGREE, shared=True),
-    RunVariation("camera_roll", "rad", DEGREE, shared=True),
-    RunVariation("camera_pitch", "rad", DEGREE, shared=True),
+    *(
+        RunVariation(f"camera_{a}", "rad", DEGREE, shared=True, beside=Shared("camera_tilt", a))
+        for a in ("roll", "pitch")
+    ),
     RunVariation("camera_scale_per_depth", "1/m", 0.15, shared=True),
     RunVariation("inertial_smoothing", "1", 1.0, shared=True, positive=True),
     RunVariation("current_north", "m/s", 4e-3, beside=Shared("current", "north")),

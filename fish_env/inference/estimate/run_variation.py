@@ -93,6 +93,21 @@ def shown_spread(values: FloatArray, variance: FloatArray) -> FloatArray:
     return np.asarray(np.where(shown & told, np.sqrt(np.maximum(squares, 0.0)), 0.0))
 
 
+def in_proportion(slopes: FloatArray, pairs: Iterable[tuple[int, FloatArray]]) -> FloatArray:
+    """Slopes (D, K) of which some are in proportion to others, nothing else of them left.
+
+    Args:
+        slopes: (D, K).
+        pairs: number of a column, and what (D,) it is a multiple of.
+    """
+    slopes = slopes.copy()
+    for column, shared in pairs:
+        size = shared @ shared
+        if size > 0.0:
+            slopes[:, column] = shared * (shared @ slopes[:, column] / size)
+    return slopes
+
+
 @dataclass(frozen=True, eq=False)
 class Marginal:
     """Residuals with the runs' own numbers integrated out.
@@ -140,12 +155,7 @@ class Marginal:
         Args:
             pairs: number of a column, and slopes (D,) by the parameter that it is beside.
         """
-        slopes = self.slopes.copy()
-        for column, shared in pairs:
-            size = shared @ shared
-            if size > 0.0:
-                slopes[:, column] = shared * (shared @ slopes[:, column] / size)
-        return replace(self, slopes=slopes)
+        return replace(self, slopes=in_proportion(self.slopes, pairs))
 
     def rows(self, rows: FloatArray) -> FloatArray:
         """Rows (m, D) of residuals or of their changes, whitened with the variation in place."""

@@ -7,9 +7,11 @@ import pytest
 
 from fish_env.effects import catalogue
 from fish_env.identification.variation import EVERY
+from fish_env.inference.estimate.again import own_likelihoods
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.estimate.profile import profiled
 from fish_env.inference.estimate.run_variation import RunVariation
+from fish_env.inference.problem import Point
 from tests.inference.stated import Numbered, White, effect, size_of
 
 RUNS, SAMPLES = 6, 100
@@ -84,9 +86,20 @@ def test_the_shared_number_is_the_mean_over_runs():
     assert max(off(seed, declared=False) for seed in range(6)) > 0.1
 
 
+@pytest.mark.parametrize("declared", [True, False])
+def test_numbers_that_undo_an_effect_are_seen_to_be_unneeded(declared):
+    """Where they are not known to do the same, the error of their slopes seems to need them."""
+    problem = Drifting(0, spread=0.0, declared=declared)
+    problem.own[:] = -0.5
+    begin = Point(np.zeros(1), {DRIFT: problem.MEAN + 0.5})
+    own = fit(problem, ["drift"], begin, Spreading(), refit_noise=False, iterations=0)
+    spread = own_likelihoods(own)(())
+    assert (spread(np.zeros(1)) < spread(np.ones(1))) is declared
+
+
 def test_what_runs_differ_in_beside_an_effect_names_a_parameter_of_it():
     named = [v.beside for v in EVERY if v.beside is not None]
-    assert len(named) == len(set(named)) == 13
+    assert len(named) == len(set(named)) == 24
     for id in named:
         assert id.name in {p.name for p in catalogue()[id.effect].parameters}
 

@@ -10,7 +10,7 @@ CLEANRL := .venv-cleanrl
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test kernels test-long lint docs bench bench-gpu benchmark-diagnosis benchmark-realistic benchmark-power benchmark-time benchmark-agents benchmark-loop clients measure-export fuzz check-release walks clone-to-verdict clean
+.PHONY: help setup demo test kernels compiled-tests test-long lint docs bench bench-gpu benchmark-diagnosis benchmark-realistic benchmark-power benchmark-time benchmark-agents benchmark-loop clients measure-export fuzz check-release walks clone-to-verdict clean
 
 help:  ## list the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 28
@@ -26,11 +26,15 @@ test test-long: export OMP_NUM_THREADS = 1
 test test-long: export PYTHONDONTWRITEBYTECODE =
 
 test: setup  ## check style, types and layering, then run the tests
-	$(MAKE) --jobs=2 lint kernels
+	$(MAKE) --jobs=2 lint kernels compiled-tests
 	$(BIN)/python -m pytest -n $(JOBS) --dist loadfile --no-loadscope-reorder
 
 kernels: setup  ## compile what the tests share
 	$(BIN)/python -m scripts.warm_kernels --processes $(JOBS)
+
+# Else each process of the tests compiles all of them. What is wrong with one is said when they run.
+compiled-tests: setup  ## compile the tests
+	$(BIN)/python -m pytest --collect-only --quiet > /dev/null || true
 
 test-long: setup  ## the tests of ten seconds and more that make test leaves out
 	$(BIN)/python -m pytest -n $(JOBS) -m long

@@ -270,7 +270,7 @@ def test_the_packaged_table_names_no_cause():
     assert isinstance(load_dataset("msu-steady"), SteadyDataset)
 
 
-@pytest.mark.parametrize("frequency", [0.0, 1.0])
+@pytest.mark.parametrize("frequency", [0.0, pytest.param(1.0, marks=pytest.mark.long)])
 def test_a_table_whose_tail_never_beats_is_answered(frequency):
     """It says nothing of the tail, so the next condition lets it beat."""
     commands = np.array([(o, 0.0, frequency, 0.0, 0.0) for o in (-0.3, 0.0, 0.3) for _ in range(3)])

@@ -27,7 +27,12 @@ from tests.inference.test_boat import BIAS, EAST, FITTED, NORTH, problems, wind
 THRESHOLD = -10.0
 
 
-@pytest.mark.parametrize("seed", [3, 4, 5])
+LONG = pytest.mark.long
+SEEDS = [3, pytest.param(4, marks=LONG), pytest.param(5, marks=LONG)]
+"""Of whole searches, of which `make test` makes one."""
+
+
+@pytest.mark.parametrize("seed", SEEDS)
 def test_a_cause_beside_an_unknown_force_is_named(seed):
     result = infer(*problems(seed, {NORTH: 0.15, EAST: -0.2}, foreign=wind), seed=seed)
     assert result.verdict.name == "partial"
@@ -56,7 +61,7 @@ def test_what_is_published_of_it_is_fitted_in_usual_steps():
     assert type(result.attribution.accepted.fit.problem) is BoatProblem
 
 
-@pytest.mark.parametrize("seed", [3, 4, 5])
+@pytest.mark.parametrize("seed", SEEDS)
 def test_a_cause_that_a_force_of_no_origin_replaces_is_not_named(seed):
     """A rudder askew makes a moment with the square of the speed."""
     result = infer(*problems(seed, {BIAS: 0.06}, foreign=wind), seed=seed)

@@ -151,7 +151,7 @@ def residual_model(
         if again is None:
             break
         state = replace(chosen, fit=again)
-        forces = generic_forces(series_of(again).runs, again.filtered, series.channels, like)
+        forces = like.along(series_of(again).runs, again.filtered)
     if not len(state.columns):
         return None
     terms = tuple(
@@ -287,7 +287,7 @@ def _judged(explanation: Fit, state: _State, like: GenericForces, runs: Problem)
     final, before = evaluated(runs, explanation.point, explanation.noise)
     own, after = state.fit, before
     for _ in range(2):
-        forces = generic_forces(final.runs, after, final.channels, like)
+        forces = like.along(final.runs, after)
         carrying = final.with_runs(_carrying(final.runs, forces, state))
         _, after = evaluated(carrying, own.point, own.noise)
     scores = [

@@ -6,6 +6,7 @@ described by them (:mod:`~fish_env.diagnosis.residual_model`).
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Protocol
@@ -22,13 +23,11 @@ from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.sensing.channels import channels_from_states
 
 DIRECTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
+WORD = re.compile("[a-z]+")
 LEVEL = ("surge", "sway", "yaw")
 """Directions that channels show which see the fish from above."""
-UPRIGHT = frozenset(
-    {"w", "p", "q", "w|w|", "p|p|", "q|q|", "u w", "u q", "w q", "p r", "sin pitch", "sin roll"}
-    | {"depth", "depth^2", "depth^3"}
-)
-"""Functions of what such channels do not show."""
+UPRIGHT = frozenset({"w", "p", "q", "roll", "pitch", "depth"})
+"""What such channels do not show, as functions of it are named."""
 
 
 def wrench_unit(direction: str) -> str:
@@ -64,30 +63,32 @@ class GenericForces:
         """Function and direction of a wrench."""
         return self.names[column // 6], DIRECTIONS[column % 6]
 
+    def along(self, runs: Sequence[RunData], filtered: Sequence[Filtered]) -> GenericForces:
+        """The same functions, of the same scales, along other runs or another motion of them."""
+        tables = [regressors(run, result) for run, result in zip(runs, filtered, strict=True)]
+        bases = [np.column_stack([table[name] for name in self.names]) for table in tables]
+        return replace(self, bases=[basis / self.scale for basis in bases])
+
 
 def generic_forces(
     runs: Sequence[RunData],
     filtered: Sequence[Filtered],
     channels: Collection[str],
-    like: GenericForces | None = None,
 ) -> GenericForces:
-    """The functions along runs.
+    """The functions along runs, every one that is not zero throughout.
 
     Args:
         runs: the runs.
         filtered: their motion.
         channels: names of what was measured. Where none of them shows depth or inclination, neither
             acts: of those the filter only guesses.
-        like: functions and scales to take over; default: every one that is not zero throughout.
     """
     level = not VERTICAL.intersection(channels)
     tables = [regressors(run, result) for run, result in zip(runs, filtered, strict=True)]
-    names = list(tables[0]) if like is None else list(like.names)
+    names = list(tables[0])
     bases = [np.column_stack([table[name] for name in names]) for table in tables]
-    if like is not None:
-        return replace(like, bases=[b / like.scale for b in bases])
     scale = np.sqrt(np.mean(np.concatenate(bases) ** 2, axis=0))
-    hidden = np.array([level and name in UPRIGHT for name in names])
+    hidden = np.array([level and bool(UPRIGHT & {*WORD.findall(name)}) for name in names])
     kept = np.flatnonzero((scale > 1e-9) & ~hidden)
     scaled = [np.ascontiguousarray(basis[:, kept] / scale[kept]) for basis in bases]
     shown = LEVEL if level else DIRECTIONS

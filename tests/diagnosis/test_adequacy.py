@@ -224,5 +224,5 @@ def test_what_no_channel_shows_is_not_blamed(more):
     upright = {"heave", "roll", "pitch"}, {"w", "u w", "depth", "sin pitch"}
     for blamed, unseen in zip((directions, functions), upright, strict=True):
         assert blamed & unseen == (unseen if more else set())
-    again = generic_forces([run], [filtered], (), forces)
+    again = forces.along([run], [filtered])
     assert again.columns.tolist() == forces.columns.tolist()

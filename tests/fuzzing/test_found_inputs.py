@@ -5,6 +5,7 @@ import warnings
 
 import numpy as np
 import pytest
+import yaml
 
 from fish_env.comparison import compare
 from fish_env.data import load_dataset
@@ -136,7 +137,8 @@ def test_ids_that_cannot_name_files_are_refused(ids, tmp_path):
 def test_a_unit_is_not_worked_out(unit, tmp_path):
     channels = DESCRIPTION["channels"] | {"x": unit}
     message = str(fault(load_dataset, good_folder(tmp_path, channels=channels)))
-    assert "x" in message or "line 6:" in message  # half a surrogate pair is no YAML
+    # Half a surrogate pair is no YAML for libyaml, and the line is named, not the channel.
+    assert ("line 6:" if unit == "\ud800" and yaml.__with_libyaml__ else "x") in message
 
 
 @pytest.mark.parametrize("option", OPTIONS)

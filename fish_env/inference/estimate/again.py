@@ -12,7 +12,7 @@ from fish_env.inference.estimate.fit import FEWER_STEPS, USUAL_STEPS, Fit, fit
 from fish_env.inference.estimate.free import DIFFERENCE, Free, linearise, spread_of
 from fish_env.inference.estimate.gauss_newton import predicted_decrease
 from fish_env.inference.estimate.information import gradient, information
-from fish_env.inference.estimate.run_variation import in_proportion
+from fish_env.inference.estimate.run_variation import in_proportion, pairs_beside
 from fish_env.inference.estimate.spread import Likelihood, Spread, fit_spread
 from fish_env.inference.hypotheses import CauseId, of_effects
 from fish_env.inference.policy import POLICY
@@ -138,9 +138,8 @@ def own_likelihoods(own: Fit) -> Callable[[Collection[int]], Likelihood]:
     steps = DIFFERENCE * usual
     slopes = problem.variation_slopes(own.point, own.noise, own.filtered, steps) * usual
     # As in a descent: two ways to work out the same slope differ by more than noise.
-    shared = dict(zip(free.ids, lin.slopes.T, strict=True))
-    beside = [(i, v.beside) for i, v in enumerate(problem.variations)]
-    slopes = in_proportion(slopes, [(i, shared[id]) for i, id in beside if id in shared])
+    beside = pairs_beside(problem.variations, free.ids)
+    slopes = in_proportion(slopes, [(own, lin.slopes[:, i]) for own, i in beside])
     prior = information(lin.slopes, free.prior), free.prior * vector
     at = problem.variation / usual
 

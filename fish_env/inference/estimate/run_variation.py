@@ -20,7 +20,7 @@ from scipy.special import chdtrc
 
 from fish_env.arrays import FloatArray, IntArray
 from fish_env.inference.estimate.box_qp import minimise_in_box
-from fish_env.inference.hypotheses import EffectParameterId
+from fish_env.inference.hypotheses import EffectParameterId, ParameterId
 from fish_env.inference.policy import POLICY
 
 FARTHEST = 30.0
@@ -91,6 +91,19 @@ def shown_spread(values: FloatArray, variance: FloatArray) -> FloatArray:
     unsure = np.minimum(variance, 1.0 - 1e-9)
     squares = np.mean((values / (1.0 - unsure)) ** 2 - unsure / (1.0 - unsure), axis=0)
     return np.asarray(np.where(shown & told, np.sqrt(np.maximum(squares, 0.0)), 0.0))
+
+
+def pairs_beside(
+    variations: Sequence[RunVariation], ids: Sequence[ParameterId]
+) -> list[tuple[int, int]]:
+    """Numbers of runs that are beside a free parameter, each with the place of that.
+
+    Args:
+        variations: what runs differ in.
+        ids: of the free parameters.
+    """
+    at = {id: i for i, id in enumerate(ids)}
+    return [(own, at[v.beside]) for own, v in enumerate(variations) if v.beside in at]
 
 
 def in_proportion(slopes: FloatArray, pairs: Iterable[tuple[int, FloatArray]]) -> FloatArray:

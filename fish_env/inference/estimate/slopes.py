@@ -25,7 +25,7 @@ from fish_env.inference.estimate.free import (
     residuals_and_rows,
     spread_of,
 )
-from fish_env.inference.estimate.run_variation import Marginal
+from fish_env.inference.estimate.run_variation import Marginal, pairs_beside
 from fish_env.inference.evaluation import Evaluation
 from fish_env.inference.problem import Problem
 
@@ -125,6 +125,4 @@ class Slopes:
     def _beside(self, problem: Problem) -> list[tuple[int, int]]:
         """Pairs of an active number of runs and the free parameter that it is beside."""
         active = np.flatnonzero(spread_of(problem, self.noise)).tolist()
-        at = {id: i for i, id in enumerate(self.free.ids)}
-        beside = enumerate(problem.variations[i].beside for i in active)
-        return [(own, at[id]) for own, id in beside if id is not None and id in at]
+        return pairs_beside([problem.variations[i] for i in active], self.free.ids)

@@ -46,6 +46,8 @@ from fish_env.inference.substitution import swapped, what_may_lack
 
 Pair = tuple[EffectName, EffectName]
 """A cause, and what looks like it."""
+Swap = tuple[CauseId, EffectName, CoarseFit]
+"""A cause, what looks like it, and where a fit with that in its place begins, or has led."""
 
 
 def late(current: Explanation) -> list[Pair]:
@@ -104,11 +106,11 @@ def asked_of_lags(
     """
     runs, pairs = current.fit.problem, _shown(late(current), shown)
     if runs.is_coarse:
-        runs = runs.in_usual_steps()
+        runs, swaps = runs.in_usual_steps(), _swaps(current.fit, pairs)
     else:
-        pairs = _within_reach(current.fit, pairs)
+        swaps = _within_reach(current.fit, pairs)
     leeway = POLICY.coarse_fit_leeway
-    best, rivals = _asked(runs, current, pairs, POLICY.swap_steps, leeway, report)
+    best, rivals = _asked(runs, current, swaps, POLICY.swap_steps, leeway, report)
     if best is not current:
         best = Explanation(best.causes, finished(best.fit))
     return best, rivals
@@ -126,7 +128,8 @@ def asked_of_rates(
     if pairs:
         current = _on_equal_terms(current)
     leeway = POLICY.evidence_doubt + POLICY.linear_doubt
-    return _asked(current.fit.problem, current, pairs, POLICY.rate_steps, leeway, report)
+    swaps = _swaps(current.fit, pairs)
+    return _asked(current.fit.problem, current, swaps, POLICY.rate_steps, leeway, report)
 
 
 def _without_what_runs_explain(current: Explanation, report: Report) -> Explanation:
@@ -179,12 +182,22 @@ def _put_back(before: Explanation, cause: CauseId, fitted: Fit) -> Explanation |
     return None if again is None else Explanation(before.causes, again)
 
 
-def _within_reach(
-    own: Fit, pairs: Sequence[tuple[CauseId, Signal]]
-) -> list[tuple[CauseId, Signal]]:
+def _swaps(own: Fit, pairs: Sequence[tuple[CauseId, Signal]]) -> list[Swap]:
+    """Pairs with where a fit with the look-alike begins.
+
+    Args:
+        own: fit with the causes.
+        pairs: causes, each with the signal of what looks like it.
+    """
+    return [(c, signal.cause.effect, with_lookalike(own, c, signal)) for c, signal in pairs]
+
+
+def _within_reach(own: Fit, pairs: Sequence[tuple[CauseId, Signal]]) -> list[Swap]:
     """Pairs whose look-alike makes up for most of what the cause explains, in a coarse fit.
 
-    That holds what runs differ in, and is given the leeway of one beside a misfit.
+    A fit with it begins where that has led: from the mildest plausible size, which may be several
+    times too large, its few steps would not come as far. The coarse fit holds what runs differ in,
+    and is given the leeway of one beside a misfit.
 
     Args:
         own: fit with the causes.
@@ -192,11 +205,13 @@ def _within_reach(
     """
     fitter = CoarseFitter(own)
     lack = _lacks(fitter, pairs)
-    return [
-        (cause, signal)
-        for cause, signal in pairs
-        if _in_place_of(fitter, cause, signal, max(POLICY.coarse_fit_leeway, lack[cause]))
-    ]
+    found = list[Swap]()
+    for cause, signal in pairs:
+        enough = max(POLICY.coarse_fit_leeway, lack[cause])
+        coarse = _in_place_of(fitter, cause, signal, enough)
+        if coarse is not None:
+            found.append((cause, signal.cause.effect, coarse))
+    return found
 
 
 def _lacks(fitter: CoarseFitter, pairs: Sequence[tuple[CauseId, Signal]]) -> dict[CauseId, float]:
@@ -216,7 +231,7 @@ def _in_place_of(
 def _asked(
     runs: Problem,
     current: Explanation,
-    pairs: Sequence[tuple[CauseId, Signal]],
+    swaps: Sequence[Swap],
     steps: int,
     leeway: float,
     report: Report,
@@ -226,7 +241,7 @@ def _asked(
     Args:
         runs: those of the explanation, in the steps to compare in.
         current: causes with their fit; where it was made in other steps it does not compete.
-        pairs: causes, each with the signal of what looks like it.
+        swaps: causes, each with what looks like it and where a fit with that begins.
         steps: most Gauss-Newton steps of each fit.
         leeway: by how much the objective of a rival may be larger. Of residuals with a colour the
             evidence tells less than their objectives do.
@@ -235,7 +250,7 @@ def _asked(
     own, found = current.fit, list[Explanation]()
     coarse = runs is not own.problem
     enough = np.inf if coarse else own.objective + leeway
-    closest = _closest(runs, current, pairs, steps, leeway, report)
+    closest = _closest(runs, current, swaps, steps, leeway, report)
     for cause, other, begin in closest[: POLICY.most_lookalikes]:
         causes = current.causes_with(other, cause)
         report(f"fitting {listed(causes, ' and ')}")
@@ -253,23 +268,22 @@ def _asked(
 def _closest(
     runs: Problem,
     current: Explanation,
-    pairs: Sequence[tuple[CauseId, Signal]],
+    swaps: Sequence[Swap],
     steps: int,
     leeway: float,
     report: Report,
-) -> list[tuple[CauseId, EffectName, CoarseFit]]:
+) -> list[Swap]:
     """Causes, each with a look-alike that explains as much in a few runs and its fit, best first.
 
     See :func:`_asked`.
     """
     own, few = current.fit, runs.subset(POLICY.few_runs)
-    usual = at_noise(few, own, own.noise, steps) if pairs else None
+    usual = at_noise(few, own, own.noise, steps) if swaps else None
     least = usual.objective if usual else np.inf
-    behind, found = leeway * few.run_count / runs.run_count, []
-    for cause, signal in pairs:
-        other = signal.cause.effect
+    behind, found = leeway * few.run_count / runs.run_count, list[Swap]()
+    for cause, other, begin in swaps:
         report(f"trying {other} instead of {name_of(cause)}")
-        tried = _fitted(few, own, cause, with_lookalike(own, cause, signal), steps, least + behind)
+        tried = _fitted(few, own, cause, begin, steps, least + behind)
         if tried is not None:
             found.append((cause, other, where_ended(tried)))
             least = min(least, tried.objective)

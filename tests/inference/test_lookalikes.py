@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from fish_env.inference.effects import EffectParameter
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.explanation import Explanation
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.lookalikes import (
     asked_of_lags,
     asked_of_rates,
@@ -20,7 +22,7 @@ from fish_env.inference.problem import Point
 from fish_env.inference.rivals import rivals_of
 from fish_env.inference.screening import screen
 from fish_env.inference.vehicle import Drive
-from tests.inference.stated import Stated, effect, size_of
+from tests.inference.stated import DeclaredEffect, Stated, effect, size_of
 
 RUNS, SAMPLES = 4, 60
 LAG, LIMIT = "lag", "limit"
@@ -89,6 +91,24 @@ def test_a_lag_that_explains_much_less_is_not_fitted(share, fitted):
 def test_lags_that_fit_alike_are_rivals():
     best, alike = asked_of_lags(*explained(problem(1.0 - 1e-6), LAG), [].append)
     assert {best.causes, *(e.causes for e in alike)} == {(LAG,), (LIMIT,)}
+
+
+def test_a_fit_with_another_lag_begins_where_a_coarse_one_has_led():
+    """From the mildest probe, several times too large, its few steps did not come so far."""
+    stated, time = problem(1.0 - 1e-6, lag=0.07), EffectParameterId(LIMIT, "time")
+    plain, begun = stated.residuals, []
+    timed = EffectParameter("time", "s", 0.0, plausible=(0.0, 1.0))
+    stated.known = {
+        **stated.known, LIMIT: DeclaredEffect(LIMIT, (timed,), confusable_with=(LAG,))
+    }  # fmt: skip
+    stated.residuals = lambda z, of: plain(z, {**of, size_of(LIMIT): of.get(time, 0.0)})
+    stated.filtered = lambda point, *args: (
+        begun.append(dict(point.effects)), Stated.filtered(stated, point, *args))[1]  # fmt: skip
+    current, shown = explained(stated, LAG)
+    begun.clear()
+    asked_of_lags(current, shown, [].append)
+    effects = next(effects for effects in begun if time in effects)
+    assert effects[time] == pytest.approx(0.07, abs=0.02)
 
 
 def test_all_that_fit_alike_are_rivals():

@@ -29,7 +29,7 @@ import numpy as np  # noqa: E402
 from rich.progress import track  # noqa: E402
 
 from fish_env.identification.series import SeriesProblem  # noqa: E402
-from fish_env.inference.adequacy import strongest_alarm  # noqa: E402
+from fish_env.inference.adequacy import strongest_alarms  # noqa: E402
 from fish_env.inference.estimate.fit import fit  # noqa: E402
 from scripts.hidden_runs import hidden_runs  # noqa: E402
 from scripts.results import RESULTS, write_dated  # noqa: E402
@@ -40,11 +40,12 @@ LEVELS = (0.8, 0.9, 0.95, 0.98)
 
 
 def ratio(seed: int) -> dict[str, object]:
-    """Smallest log p-value of a case over the threshold for white residuals."""
+    """Smallest log p-values of a case over the threshold for white residuals."""
     truth, dataset = hidden_runs(make_case, "null_strong", seed)
     fitted = fit(SeriesProblem(dataset, None, dataset.ids[:6]), rounds=2)
-    smallest, threshold = strongest_alarm(fitted, np.random.default_rng(seed))
-    return {"seed": seed, **truth.disturbance, "ratio": smallest / threshold}
+    steady, changing, threshold = strongest_alarms(fitted, np.random.default_rng(seed))
+    ratios = {"ratio": steady / threshold, "changing": changing / threshold}
+    return {"seed": seed, **truth.disturbance, **ratios}
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -56,11 +57,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
     with ProcessPoolExecutor(options.processes) as pool:
         jobs = pool.map(ratio, range(FIRST, FIRST + options.cases))
         rows = list(track(jobs, f"{options.cases} cases", total=options.cases))
-    ratios = np.array([row["ratio"] for row in rows], float)
-    quantiles = {str(level): float(np.quantile(ratios, level)) for level in LEVELS}
+    quantiles = {
+        kind: {
+            str(level): float(np.quantile([np.array(row[kind], float) for row in rows], level))
+            for level in LEVELS
+        }
+        for kind in ("ratio", "changing")
+    }
     write_dated(options.out, "adequacy", {"quantiles": quantiles, "cases": rows})
-    for level, value in quantiles.items():
-        print(f"{level}: {value:.2f}")
+    for kind, values in quantiles.items():
+        print(kind, ", ".join(f"{level}: {value:.2f}" for level, value in values.items()))
 
 
 if __name__ == "__main__":

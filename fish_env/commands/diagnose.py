@@ -14,7 +14,7 @@ from rich.table import Table
 
 from fish_env.commands.numbers import write_json
 from fish_env.data import dataset_files
-from fish_env.diagnosis.answer import holds_elsewhere
+from fish_env.diagnosis.answer import dependence, holds_elsewhere
 from fish_env.diagnosis.headline import facts, headline
 from fish_env.diagnosis.pipeline import diagnose
 from fish_env.diagnosis.writing import EXTENDED
@@ -164,5 +164,5 @@ def _unexplained(answer: dict[str, Any]) -> Table:
     table = _table("Forces indicated beyond every known cause", "direction", "depends on", "rms")
     for item in answer["unexplained"][:5]:
         size = f"{item['rms']:.2g} {wrench_unit(item['direction'])}"
-        table.add_row(item["direction"], item["depends_on"], size)
+        table.add_row(item["direction"], dependence(item), size)
     return table

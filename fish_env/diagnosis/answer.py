@@ -178,7 +178,13 @@ def _own_beats(fit: Fit) -> list[Plain]:
 def _unexplained(diagnosis: Diagnosed) -> list[Plain]:
     """Generic forces that the data still indicate beside the best explanation."""
     return [
-        {"depends_on": m.function, "direction": m.direction, "rms": float(m.size), "log_p": m.log_p}
+        {
+            "depends_on": m.function,
+            "direction": m.direction,
+            "rms": float(m.size),
+            "log_p": m.log_p,
+            "changing": m.changing,
+        }
         for m in diagnosis.adequacy.misfits
     ]
 
@@ -200,6 +206,12 @@ def _wrench(term: Plain) -> str:
     """One wrench in words."""
     kind = "force" if wrench_unit(term["direction"]) == "N" else "moment"
     return f"a {kind} in {term['direction']} that depends on {term['depends_on']}"
+
+
+def dependence(item: Plain) -> str:
+    """What a generic force that is indicated depends on, and whether its size stays."""
+    changing = ", with a size or sign that changes every few seconds"
+    return str(item["depends_on"]) + (changing if item.get("changing") else "")
 
 
 def holds_elsewhere(answer: Plain) -> bool:

@@ -24,6 +24,8 @@ from fish_env.sensing.channels import channels_from_states
 
 DIRECTIONS = ("surge", "sway", "heave", "roll", "pitch", "yaw")
 WORD = re.compile("[a-z]+")
+PHASE = "phase"
+"""Last word of the name of a function that goes with the tail's phase."""
 LEVEL = ("surge", "sway", "yaw")
 """Directions that channels show which see the fish from above."""
 UPRIGHT = frozenset({"w", "p", "q", "roll", "pitch", "depth"})
@@ -62,6 +64,10 @@ class GenericForces:
     def words(self, column: int) -> tuple[str, str]:
         """Function and direction of a wrench."""
         return self.names[column // 6], DIRECTIONS[column % 6]
+
+    def swings(self, column: int) -> bool:
+        """Whether a wrench goes with the tail's phase."""
+        return self.names[column // 6].endswith(PHASE)
 
     def along(self, runs: Sequence[RunData], filtered: Sequence[Filtered]) -> GenericForces:
         """The same functions, of the same scales, along other runs or another motion of them."""
@@ -136,6 +142,10 @@ class BoundForces:
         """Function and direction of a wrench."""
         return self.forces.words(column)
 
+    def swings(self, column: int) -> bool:
+        """Whether a wrench goes with the tail's phase."""
+        return self.forces.swings(column)
+
     def unit(self, column: int) -> float:
         """Size (N or N m) of the wrench behind one unit of :meth:`changes`."""
         return float(probes(np.array([column]))[0])
@@ -190,5 +200,5 @@ def regressors(run: RunData, filtered: Filtered) -> dict[str, FloatArray]:
     )
     for harmonic in (1, 2, 3):
         for name, function in waves:
-            plain[f"{name} {harmonic} phase"] = beat**2 * function(harmonic * phase)
+            plain[f"{name} {harmonic} {PHASE}"] = beat**2 * function(harmonic * phase)
     return plain

@@ -3,11 +3,16 @@
 A generic force is added, one function of the motion and one direction at a time; the problem
 provides them. If one of them is significant after everything that is free has been refitted, the
 model lacks something.
+
+Such a force has one size in all runs. What depends on the past, as a wake that leans to one side
+for a while, has one that comes and goes: on average it is nothing. So where no steady force is
+certain, sizes of its own are asked for in each block of some seconds. A disturbance of any colour
+does not go with the motion, and asks for none.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +20,7 @@ import numpy as np
 from fish_env.inference.changes import SETTINGS_AT_ONCE
 from fish_env.inference.effects import EffectParameter
 from fish_env.inference.estimate.fit import Fit
+from fish_env.inference.estimate.information import block_index, sums_over
 from fish_env.inference.evaluation import GenericTerms, LackOfFit
 from fish_env.inference.hypotheses import CauseId, Coefficient, EffectName, EffectParameterId
 from fish_env.inference.policy import POLICY
@@ -36,12 +42,14 @@ class Misfit:
         direction: which force or moment.
         log_p: of this one test, in logarithm.
         amount: root mean square of the force indicated (N or N m), with its sign.
+        changing: whether its size comes and goes; the amount is then its root mean square, too.
     """
 
     function: str
     direction: str
     log_p: float
     amount: float
+    changing: bool = False
 
     @property
     def size(self) -> float:
@@ -124,7 +132,8 @@ def implausible_estimates(fit: Fit) -> tuple[Implausible, ...]:
     that does the same as an effect may go as far as the effect.
 
     An effect is implausible with a sign that it cannot have, ``implausible_prior_sd`` times as
-    strong as the strongest plausible one, or with a shape far from the plausible ones.
+    strong as the strongest plausible one, or with a shape far from the plausible ones, or with one
+    that nothing depends on.
     """
     effects_too = {Coefficient(p) for effect in fit.problem.known.values() for p in effect.equals}
     farthest = POLICY.extreme_prior_sd if fit.effects else POLICY.implausible_prior_sd
@@ -139,7 +148,7 @@ def implausible_estimates(fit: Fit) -> tuple[Implausible, ...]:
             id = EffectParameterId(name, parameter.name)
             value, unit = fit.point.effects[id], parameter.unit
             beyond = (
-                _out_of_place(parameter, value)
+                _out_of_place(parameter, value) or _is_lost(fit, id, parameter)
                 if parameter.shapes
                 else _beyond(parameter, fit.interval(id))
             )
@@ -179,6 +188,15 @@ def _out_of_place(parameter: EffectParameter, value: float) -> bool:
     return bool(abs(off) > POLICY.shape_reach * (high - low))
 
 
+def _is_lost(fit: Fit, id: EffectParameterId, parameter: EffectParameter) -> bool:
+    """Whether no residual depends on a shape of plausible size: the simulation diverges beside it.
+
+    Such a fit has ended at the edge of where its model has a motion, and not at a minimum.
+    """
+    (low, high), value = parameter.plausible, fit.point.effects[id]
+    return low <= value <= high and not fit.linearised.slopes[:, fit.ids.index(id)].any()
+
+
 def _beyond(
     parameter: EffectParameter,
     interval: tuple[float, float],
@@ -206,6 +224,9 @@ def adequacy(fit: Fit, rng: np.random.Generator) -> Adequacy:
     for column, signal in signals:
         amount = float(signal.score[0] / signal.projected[0, 0] * forces.unit(column))
         found.append(Misfit(*forces.words(column), signal.log_p, amount))
+    certain = POLICY.adequacy_certain * threshold
+    if not any(m.log_p < certain for m in found):
+        found += [m for m in _changing(fit, forces, signals) if m.log_p < certain]
     found.sort(key=lambda m: m.log_p)
     reached = not found or found[0].log_p >= threshold
     estimates = (one.words for one in implausible_estimates(fit))
@@ -215,16 +236,58 @@ def adequacy(fit: Fit, rng: np.random.Generator) -> Adequacy:
     return replace(left, reached=reached and not implausible and not left.short)
 
 
-def strongest_alarm(fit: Fit, rng: np.random.Generator) -> tuple[float, float]:
-    """The smallest log p-value, and the threshold it has in white residuals: to calibrate by."""
-    signals = [signal for _, signal in _indicated(fit)[1]]
-    return min(s.log_p for s in signals), null_threshold(signals, rng, POLICY.adequacy_level)
+def strongest_alarms(fit: Fit, rng: np.random.Generator) -> tuple[float, float, float]:
+    """The smallest log p-value of a steady force and of a changing one: to calibrate by.
+
+    With the threshold of the first in white residuals.
+    """
+    forces, signals = _indicated(fit)
+    steady = min(signal.log_p for _, signal in signals)
+    changing = min((m.log_p for m in _changing(fit, forces, signals)), default=0.0)
+    only = [signal for _, signal in signals]
+    return steady, changing, null_threshold(only, rng, POLICY.adequacy_level)
 
 
 def _indicated(fit: Fit) -> tuple[GenericTerms, list[tuple[int, Signal]]]:
     """Generic forces along the fitted runs, and the test of each."""
     forces = fit.problem.generic_terms(fit)
     return forces, list(generic_signals(forces, Projector(fit)))
+
+
+def _changing(
+    fit: Fit, forces: GenericTerms, signals: Sequence[tuple[int, Signal]]
+) -> list[Misfit]:
+    """Generic forces each with a size of its own in every block of time.
+
+    In white residuals what the sizes of n blocks explain is chi-squared with n degrees of freedom.
+    None where no run is longer than a block, and none that swings with the drive: small errors of
+    the drive have a size that follows its beat.
+
+    Args:
+        fit: the explanation.
+        forces: along the fitted runs.
+        signals: the test of each, with its column.
+    """
+    lin = fit.linearised
+    if lin.time_of.max(initial=0.0) <= POLICY.long_score_block_s:
+        return []
+    blocks = block_index(lin.run_of, lin.time_of, POLICY.long_score_block_s)
+    found = []
+    for column, signal in signals:
+        if forces.swings(column):
+            continue
+        left = signal.left[:, 0].astype(float)
+        products = np.column_stack([-left * lin.residuals, left**2])
+        score, info = sums_over(blocks, products).T
+        shows = info > POLICY.smallest_signal
+        score, info = score[shows], info[shows]
+        explained = float(np.sum(score**2 / info))
+        # By noise alone the estimate of a size has the inverse of its information for a variance.
+        square = max(explained - len(info), 0.0) / max(float(info.sum()), 1e-300)
+        amount = float(np.sqrt(square)) * forces.unit(column)
+        log_p = float(chi2_log_tail(explained, max(len(info), 1)))
+        found.append(Misfit(*forces.words(column), log_p, amount, changing=True))
+    return found
 
 
 def generic_signals(forces: GenericTerms, projector: Projector) -> Iterator[tuple[int, Signal]]:

@@ -55,6 +55,10 @@ class GenericTerms(Protocol):
         """What a term depends on, and its direction."""
         ...
 
+    def swings(self, column: int) -> bool:
+        """Whether a term swings with what drives the vehicle: its size then follows the drive."""
+        ...
+
     def unit(self, column: int) -> float:
         """Root mean square of a term (SI) for each unit of its change."""
         ...

@@ -60,6 +60,9 @@ class Answering(Problem):
     def words(self, column):
         return self.forces.words(column)
 
+    def swings(self, column):
+        return self.forces.swings(column)
+
     def unit(self, column):
         return UNIT[column % 6]
 
@@ -75,13 +78,17 @@ QUIET = NoiseModel(np.ones(6), 3e-3, 1e-4, 1.0)
 
 
 def fit_with(missing, seed=0, noise=QUIET):
-    """A fit whose residuals hold noise and a missing wrench: (function, channel, size)."""
+    """A fit whose residuals hold noise and a missing wrench: (function, channel, size).
+
+    A size may be a function of time.
+    """
     rng = np.random.default_rng(seed)
     run, filtered = swimming(np.random.default_rng(1))
     residuals = rng.standard_normal((SAMPLES, 6))
     for function, channel, size in missing:
         basis = regressors(run, filtered)[function]
-        residuals[:, channel] += size * basis / np.sqrt(np.mean(basis**2))
+        sizes = size(run.clock) if callable(size) else size
+        residuals[:, channel] += sizes * basis / np.sqrt(np.mean(basis**2))
     flat = residuals.ravel()
     lin = Linearised(flat, np.zeros((len(flat), 0)), np.zeros(len(flat), np.int64),
                      np.repeat(run.clock, 6))  # fmt: skip
@@ -113,6 +120,34 @@ def test_a_missing_wrench_is_found_with_what_it_depends_on(function, channel, di
     unit = UNIT[channel]
     best = next(m for m in found.misfits if m.function == function)
     assert best.size == pytest.approx(0.6 * unit, rel=0.4)
+
+
+def turning(size):
+    """A size that changes its sign after half of a run."""
+    return lambda clock: size * np.where(clock < 8.0, 1.0, -1.0)
+
+
+def test_a_wrench_whose_size_comes_and_goes_is_found():
+    missing = [("u|u|", 5, turning(0.7))]
+    found = adequacy(fit_with(missing), np.random.default_rng(0))
+    assert not found.reached
+    assert not found.slight
+    first = found.misfits[0]
+    assert (first.direction, first.changing) == ("yaw", True)
+    own = next(m for m in found.misfits if m.function == "u|u|" and m.changing)
+    assert own.size == pytest.approx(0.7 * UNIT[5], rel=0.4)
+
+
+def test_what_swings_with_the_tail_may_change():
+    """Its size follows the beat: small errors of the drive would show as such wrenches."""
+    missing = [("cos 3 phase", 5, turning(0.7))]
+    found = adequacy(fit_with(missing), np.random.default_rng(0))
+    assert not any(m.changing and "phase" in m.function for m in found.misfits)
+
+
+def test_a_steady_wrench_is_not_said_to_change():
+    found = adequacy(fit_with([("depth", 2, 0.6)]), np.random.default_rng(0))
+    assert not any(m.changing for m in found.misfits)
 
 
 def test_a_wrench_below_the_noise_is_left_alone():
@@ -151,7 +186,11 @@ def named(
     values = dict.fromkeys(problem.neutral(effects), sum(interval) / 2)
     point, intervals = Point(np.array([z, 0.0]), values), dict.fromkeys(values, interval)
     released, at_bounds = (tuple(map(Coefficient, paths)) for paths in (released, at_bounds))
-    return fit_of(problem, effects, released, point, at_bounds=at_bounds, profiles=intervals)
+    sample = np.zeros(1)
+    slopes = np.ones((1, 2 + len(values)))  # all that is free moves it
+    lin = Linearised(sample, slopes, sample.astype(np.int64), sample)
+    told = {"at_bounds": at_bounds, "profiles": intervals, "linearised": lin}
+    return fit_of(problem, effects, released, point, **told)
 
 
 def test_a_coefficient_far_outside_its_prior_is_no_explanation():
@@ -211,6 +250,21 @@ def test_a_shape_that_is_finite_may_be_too_large():
     values = {**found.point.effects, EffectParameterId("wave", "frequency"): 9.0}
     (said,) = implausible_estimates(replace(found, point=Point(found.point.z, values)))
     assert "frequency" in said.words
+
+
+@pytest.mark.parametrize(("share", "believed"), [(1.0, True), (0.0, False)])
+def test_a_shape_beside_which_the_simulation_diverges_is_not_believed(share, believed):
+    """Its slope is zero then, though it is of a size at which it should act."""
+    found = named(effects=("wave",))
+    id = EffectParameterId("wave", "frequency")
+    low, high = next(p.plausible for p in catalogue()["wave"].parameters if p.name == id.name)
+    lin = found.linearised
+    slopes = lin.slopes.copy()
+    slopes[:, found.ids.index(id)] *= share
+    values = {**found.point.effects, id: 0.5 * (low + high)}
+    point = Point(found.point.z, values)
+    lost = replace(found, point=point, linearised=replace(lin, slopes=slopes))
+    assert (implausible_estimates(lost) == ()) is believed
 
 
 @pytest.mark.parametrize("more", [(), ("z",), ("q",)], ids=["camera", "depth", "gyro"])

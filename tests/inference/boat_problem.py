@@ -248,6 +248,10 @@ class BoatForces:
         """Function and direction."""
         return list(self.functions)[column // 3], self.DIRECTIONS[column % 3]
 
+    def swings(self, column: int) -> bool:
+        """No term does: a propeller's thrust is that of its commands."""
+        return False
+
     def unit(self, column: int) -> float:
         """Root mean square of the probe."""
         return self.PROBES[column % 3]

@@ -30,6 +30,9 @@ class Pushes:
     def words(self, column):
         return f"sample {column}", "heave"
 
+    def swings(self, column):
+        return False
+
     def unit(self, column):
         return 1.0
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from fish_env.diagnosis.answer import dependence
 from fish_env.diagnosis.report.html import number, paragraph, table, text
 from fish_env.identification.generic_forces import wrench_unit
 
@@ -16,7 +17,7 @@ def asked_for(answer: Answer) -> str:
     rows = []
     for item in answer.get("unexplained", []):
         size = f"{number(item['rms'])} {wrench_unit(item['direction'])}"
-        rows.append((text(item["direction"]), text(item["depends_on"]), size))
+        rows.append((text(item["direction"]), text(dependence(item)), size))
     caption = "Forces and moments that the data indicate beyond the best explanation"
     return table(("force or moment in", "depends on", "rms"), rows, caption)
 

@@ -41,6 +41,10 @@ class HeldWrenches:
         """Function and direction of a wrench."""
         return list(self.functions)[column // 6], DIRECTIONS[column % 6]
 
+    def swings(self, column: int) -> bool:
+        """No wrench swings: each is constant in a condition."""
+        return False
+
     def unit(self, column: int) -> float:
         """Root mean square (N or N m) of the wrench behind one unit of :meth:`changes`."""
         return float(probes(np.array([column]))[0])

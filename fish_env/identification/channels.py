@@ -17,6 +17,14 @@ from fish_env.identification.state_blocks import first_column
 from fish_env.model.state import BASE_STATES
 from fish_env.sensing.devices import devices_of
 
+VERTICAL = frozenset({"z", "roll", "pitch", "w", "p", "q"})
+"""Channels that show more than motion in a horizontal plane, and how a fish floats."""
+
+
+def from_above(channels: Iterable[str]) -> bool:
+    """Whether some channels are those of a camera above the tank, and show no more."""
+    return VERTICAL.isdisjoint(channels)
+
 
 class Kind(IntEnum):
     """How a channel follows from the state."""

@@ -14,9 +14,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from fish_env.arrays import FloatArray, IntArray
+from fish_env.identification.channels import from_above
 from fish_env.identification.filtering import Filtered, Pushes
 from fish_env.identification.noise_model import NoiseModel
-from fish_env.identification.parameters import VERTICAL
 from fish_env.identification.runs import RunData
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.hypotheses import EffectParameterId
@@ -89,7 +89,7 @@ def generic_forces(
         channels: names of what was measured. Where none of them shows depth or inclination, neither
             acts: of those the filter only guesses.
     """
-    level = not VERTICAL.intersection(channels)
+    level = from_above(channels)
     tables = [regressors(run, result) for run, result in zip(runs, filtered, strict=True)]
     names = list(tables[0])
     bases = [np.column_stack([table[name] for name in names]) for table in tables]

@@ -11,6 +11,7 @@ from fish_env.data.schema import Dataset
 from fish_env.data.vocabulary import COMMANDS
 from fish_env.effects.extended import ExtendedModel
 from fish_env.errors import ParameterError
+from fish_env.identification.channels import from_above
 from fish_env.identification.filtering import Measurement
 from fish_env.inference.hypotheses import Coefficient, EffectParameterId, effects_of
 from fish_env.inference.vehicle import Coefficients
@@ -59,8 +60,6 @@ The beat rolls the fish, and a camera sees that by a marker above the axis: with
 held, predictions of a real fish are worse by a third to a half in x and in y."""
 HELD = 1e-3
 """Share of its prior standard deviation that is left to a coefficient that is held."""
-VERTICAL = frozenset({"z", "roll", "pitch", "w", "p", "q"})
-"""Channels that show more than motion in a horizontal plane."""
 
 
 class Baseline(Coefficients):
@@ -102,7 +101,7 @@ def shows_level_swimming(dataset: Dataset) -> bool:
     """Whether a camera overhead saw a fish whose weight block was never moved."""
     block = ["block" in name for name in COMMANDS]
     still = not any(run.commands.values[:, block].any() for run in dataset.runs)
-    return still and not VERTICAL.intersection(dataset.channels)
+    return still and from_above(dataset.channels)
 
 
 def baseline_of(dataset: Dataset, fish: FishParams, paths: Sequence[str] | None = None) -> Baseline:

@@ -15,6 +15,7 @@ import numpy as np
 
 from fish_env.arrays import FloatArray
 from fish_env.effects.refraction import INDEX
+from fish_env.identification.channels import from_above
 from fish_env.identification.policy import IDENTIFICATION
 from fish_env.inference.estimate.run_variation import CommonEffect, RunVariation
 from fish_env.inference.hypotheses import EffectParameterId as Shared
@@ -160,8 +161,6 @@ COMMON = (
 """What is wrong in all runs alike. Runs keep delays of their inertial unit, but for what all
 devices share: a filter inside it delays no other."""
 USUAL = np.array([variation.usual for variation in EVERY])
-UPRIGHT = ("z", "roll", "pitch", "w", "p", "q")
-"""Channels that show how a fish floats. A camera above the tank alone sees none of them."""
 _MASS, _BUOYANCY = RECORD_FIELDS.index("mass_total"), RECORD_FIELDS.index("mass_buoyancy")
 _STATIC = {f"trim_{axis}": RECORD_FIELDS.index(f"static_{axis}") for axis in "xyz"}
 _GYROS = {"gyro_zero_p": "p", "gyro_zero_q": "q", "gyro_zero_r": "r"}
@@ -194,7 +193,7 @@ def unseen(channels: Sequence[str]) -> list[int]:
     """Numbers of runs that none of the channels would show: they stay zero, and nobody is told."""
     devices = devices_of(channels)
     hidden = [_INDEX[_DELAYS[device]] for device in _DELAYS if device not in devices]
-    if not set(UPRIGHT).isdisjoint(channels):
+    if not from_above(channels):
         return hidden
     return [i for name, i in _INDEX.items() if name.startswith(("trim_", "buoyancy"))] + hidden
 

@@ -170,7 +170,9 @@ class DecisionPolicy(Numbers):
     largest_disturbance: float = number(20.0, 1.0, 100.0, BY_HAND)
     relaxed_log_p: float = number(float(np.log(10.0)), 0.0, 10.0, BY_HAND)
     adequacy_level: float = number(0.003, 1e-4, 0.1, "scripts/calibrate_adequacy.py")
-    adequacy_certain: float = number(2.0, 1.0, 10.0, "scripts/calibrate_adequacy.py: 1.0 at most")
+    adequacy_certain: float = number(
+        2.0, 1.0, 10.0, "scripts/calibrate_adequacy.py: chance reached 1.23"
+    )
     force_pool: int = number(16, 1, 1000, EFFORT)
     most_forces: int = number(8, 1, 100, EFFORT)
     prior_reach_sd: float = number(5.0, 3.0, 12.0, BY_HAND)

@@ -17,8 +17,9 @@ import numpy as np
 from fish_env.arrays import BoolArray, FloatArray, IntArray
 from fish_env.data.schema import Dataset
 from fish_env.identification.beats import beats_of, by_run
+from fish_env.identification.channels import from_above
 from fish_env.identification.filtering import Pushes
-from fish_env.identification.parameters import ALIKE, PLANAR_PATHS, VERTICAL
+from fish_env.identification.parameters import ALIKE, PLANAR_PATHS
 from fish_env.identification.runs import RunData
 from fish_env.identification.series import SeriesProblem
 from fish_env.identification.whole_runs.evaluation import RunEvaluation
@@ -77,7 +78,7 @@ class WholeRunProblem(Problem):
         user_effects: Iterable[Effect] = (),
         dt: float = DT_S,
     ) -> None:
-        if paths is None and not VERTICAL.intersection(dataset.channels):
+        if paths is None and from_above(dataset.channels):
             paths = PLANAR_PATHS
         self.effects = tuple(dict.fromkeys((FREQUENCY_SCALE, *effects)))
         self.series = SeriesProblem(

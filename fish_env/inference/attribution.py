@@ -277,7 +277,11 @@ class Search:
         )  # fmt: skip
 
     def in_common(self, found: Attribution) -> Attribution:
-        """With what runs share as effects, and further effects that show beside these."""
+        """With what runs share as effects, and further effects that show beside these.
+
+        Where the disturbance is at its limit and runs share nothing, none was of use, and none will
+        be: only numbers of runs have gone.
+        """
         before = found.accepted
         current = with_common_errors(before, found.shown.threshold, self.report)
         if current is before:
@@ -285,11 +289,11 @@ class Search:
         after = screen(current.fit, self.causes, self.rng)
         gain = found.gain + before.score - current.score
         rivals = rivals_of(current, found.rivals)
-        return self.together(
-            replace(
-                found, accepted=current, rivals=rivals, shown=after, gain=gain, failed=frozenset()
-            )
+        more = replace(
+            found, accepted=current, rivals=rivals, shown=after, gain=gain, failed=frozenset()
         )
+        same = current.causes == before.causes
+        return more if same and disturbance_at_limit(current.fit) else self.together(more)
 
     def in_step(self, begun: Attribution, best: Explanation) -> Attribution | None:
         """With a cause and what puts the drive in step; None where one cause explains more.

@@ -218,11 +218,13 @@ def challenged(
         shown: all other causes against it.
         rivals: explanations that were as good before the last causes were found.
         report: told what is being done.
-        replaced: causes with the effects whose place they took then.
+        replaced: causes with the effects whose place they took then, also some that have been
+            dropped since.
     """
     if disturbance_at_limit(current.fit):
         return current, ()
-    known = current.fit.problem.known  # a coefficient takes no effect's place
+    # A coefficient takes no effect's place.
+    effects = {*current.causes}.intersection(current.fit.problem.known)
     signals = shown.by_effect()
     close = _close(current, shown)
     earlier = [pair for e in rivals for pair in exchanged(current, e)]
@@ -231,7 +233,7 @@ def challenged(
     # Where each run has a drive of its own, these are asked of estimates to be published.
     uneven = current.fit.problem.drive.uneven
     tried = [pair for pair in tried if pair not in kinds] if uneven else [*kinds, *tried]
-    pairs = [(c, signals[n]) for c, n in dict.fromkeys(tried) if n in signals and c in known]
+    pairs = [(c, signals[n]) for c, n in dict.fromkeys(tried) if n in signals and c in effects]
     best, *others = substituted(current, pairs, POLICY.most_challenges, report)
     apart = [in_parts(best, cause, report) for cause in best.causes]
     best, *others = ranked([best, *others, *filter(None, apart)])

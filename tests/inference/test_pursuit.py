@@ -25,7 +25,7 @@ from fish_env.inference.tails import chi2_log_tail
 from fish_env.inference.vehicle import Drive
 from tests.inference.boat import sail, split
 from tests.inference.boat_problem import BoatProblem
-from tests.inference.stated import SIZE, Stated, effect, size_of
+from tests.inference.stated import SIZE, Stated, apart, effect, size_of
 from tests.inference.test_boat import BIAS, EAST, FITTED, NORTH, WALK
 
 HIDDEN = {BIAS: 0.03, NORTH: 0.05, EAST: -0.1}
@@ -158,6 +158,18 @@ def test_what_was_measured_of_a_drive_is_doubted_first():
     assert "trying clock instead of slow" in said
     assert best is measured
     assert not rivals
+
+
+def test_a_cause_that_has_been_dropped_is_not_doubted():
+    """It took the place of another, and was dropped beside causes found later."""
+    problem = Stated(apart({"lag": [3.0] * 3, "gain": [0.0] * 3}), [effect("lag"), effect("gain")])
+    problem.known = {**problem.known, "play": effect("play")}
+    current = Explanation(("lag",), fit(problem, ("lag",)))
+    shown, said = screen(current.fit, causes_of(problem), np.random.default_rng(0)), []
+    dropped, taken = "play", "gain"
+    best, _ = challenged(current, shown, (), said.append, [(dropped, taken)])
+    assert best is current
+    assert f"trying {taken} instead of {dropped}" not in said
 
 
 class Both(DeclaredEffect):

@@ -5,10 +5,12 @@ Run it as ``python -m scripts.make_benchmarks_page``.
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
 from scripts import agents_report
+from tests.hidden.suite import SUITES
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "benchmarks.md"
@@ -72,16 +74,39 @@ def page(speed: Path = SPEED, diagnosis: Path = DIAGNOSIS) -> str:
 def _latest(folder: Path, name: str) -> str:
     """The reports of the latest date in a folder, one after another, headings one level lower.
 
+    Parts of a hidden suite are summed up as one.
+    """
+    parts = _parts(folder, name)
+    if not parts:
+        return "No full run is published yet.\n"
+    if len(parts) > 1 and name in (suite.result for suite in SUITES.values()):
+        return lowered(_summed(parts, name))
+    return "\n".join(lowered(file.read_text(encoding="utf-8")) for file in parts)
+
+
+def _parts(folder: Path, name: str) -> list[Path]:
+    """The reports of the latest date in a folder, in the order in which they were made.
+
     The first of a day is named by its date alone; parts that ran later that day have a number.
     """
     dated: dict[str, list[Path]] = {}
     for file in folder.glob(f"{name}-[0-9]*.md"):
         date = "-".join(file.stem.removeprefix(f"{name}-").split("-")[:3])
         dated.setdefault(date, []).append(file)
-    if not dated:
-        return "No full run is published yet.\n"
-    parts = sorted(dated[max(dated)], key=lambda file: (len(file.stem), file.stem))
-    return "\n".join(lowered(file.read_text(encoding="utf-8")) for file in parts)
+    latest = dated[max(dated)] if dated else []
+    return sorted(latest, key=lambda file: (len(file.stem), file.stem))
+
+
+def _summed(parts: list[Path], name: str) -> str:
+    """One report of all cases of some parts, each case as its own commit answered it."""
+    suite = next(suite for suite in SUITES.values() if suite.result == name)
+    found = [json.loads(p.with_suffix(".json").read_text(encoding="utf-8")) for p in parts]
+    rows = [suite.row_of({"row": row}) for part in found for row in part["rows"]]
+    rows.sort(key=lambda row: (row.tier, row.seed))
+    commits = ", ".join(f"{len(part['rows'])} at {part['commit']}" for part in found)
+    said = f"{len(rows)} cases, each diagnosed once: {commits}."
+    title = f"# {suite.title}, {found[0]['date']}"
+    return f"{title}\n\n{said}\n\n{suite.markdown(suite.summarise(rows))}"
 
 
 def lowered(text: str) -> str:

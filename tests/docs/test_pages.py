@@ -50,6 +50,21 @@ def test_the_benchmarks_page_takes_the_latest_reports(tmp_path):
     assert "No full run is published yet." in page
 
 
+def test_parts_of_a_suite_are_summed_up_as_one(tmp_path):
+    row = {"tier": "suspects", "truth": "outliers", "verdict": "no_misfit", "told": True}
+    blank = {"named": [], "claimed": [], "false_names": [], "alternatives": []}
+    for part, commit in (("", "abc"), ("-2", "def")):
+        file = tmp_path / f"realistic-2026-01-02{part}"
+        rows = [{**row, **blank, "strength": 1.0, "seed": len(part)}]
+        content = {"date": "2026-01-02", "commit": commit, "rows": rows}
+        file.with_suffix(".json").write_text(json.dumps(content))
+        file.with_suffix(".md").write_text(f"# Part{part}")
+    page = make_benchmarks_page.page(tmp_path, tmp_path)
+    assert "2 cases, each diagnosed once: 1 at abc, 1 at def." in page
+    assert "| suspect named or told by `inputs` | 100 % (16-100), 2/2 |" in page
+    assert "# Part" not in page
+
+
 def test_every_effect_has_an_entry_with_its_parameters():
     page = make_effects_page.page()
     for name, effect in catalogue().items():

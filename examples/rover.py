@@ -123,6 +123,10 @@ class Forces:
         """Function and direction."""
         return list(self.functions)[column], "ahead"
 
+    def swings(self, column):
+        """Whether the force swings with the drive. None does."""
+        return False
+
     def unit(self, column):
         """Size (N)."""
         return 0.1

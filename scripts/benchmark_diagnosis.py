@@ -115,7 +115,7 @@ def write(rows: list[Any], options: argparse.Namespace) -> None:
     suite, seed0 = SUITES[options.suite], options.seed0
     summary = suite.summarise(rows)
     said = f"{len(rows)} cases, numbered from {seed0} in each tier, diagnosed at {commit()}."
-    page = f"# {suite.title}, {today()}\n\n{said}\n\n{suite.markdown(summary)}"
+    page = suite.page(today(), said, summary)
     content = {"seed0": seed0, **summary, "rows": [asdict(row) for row in rows]}
     write_dated(
         options.out, f"{suite.result}-quick" if options.quick else suite.result, content, page

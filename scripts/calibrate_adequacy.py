@@ -3,7 +3,7 @@
 The filter takes a disturbance to forget exponentially. Gusts, swell and 1/f noise leave colour in
 its residuals, and a test that counts on white ones then asks for forces that are not there. For
 made-up measurements without any effect, under disturbances of four colours, the smallest p-value
-is set against the threshold for white residuals, which `fish_env/diagnosis/adequacy.py` uses as it
+is set against the threshold for white residuals, which `fish_env/inference/adequacy.py` uses as it
 is: it would have to be multiplied by a high quantile of their ratio, were that above one. Cases are
 numbered from 1000 on, so that none of them is one that judges.
 
@@ -37,6 +37,8 @@ from tests.hidden.cases import make_case  # noqa: E402
 
 FIRST = 1000
 LEVELS = (0.8, 0.9, 0.95, 0.98)
+KINDS = ("ratio", "changing")
+"""Of forces of one size, and of those whose size comes and goes."""
 
 
 def ratio(seed: int) -> dict[str, object]:
@@ -57,12 +59,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     with ProcessPoolExecutor(options.processes) as pool:
         jobs = pool.map(ratio, range(FIRST, FIRST + options.cases))
         rows = list(track(jobs, f"{options.cases} cases", total=options.cases))
+    ratios = {kind: np.array([row[kind] for row in rows], float) for kind in KINDS}
     quantiles = {
-        kind: {
-            str(level): float(np.quantile([np.array(row[kind], float) for row in rows], level))
-            for level in LEVELS
-        }
-        for kind in ("ratio", "changing")
+        kind: {str(level): float(np.quantile(values, level)) for level in LEVELS}
+        for kind, values in ratios.items()
     }
     write_dated(options.out, "adequacy", {"quantiles": quantiles, "cases": rows})
     for kind, values in quantiles.items():

@@ -10,7 +10,7 @@ import re
 from pathlib import Path
 
 from scripts import agents_report
-from tests.hidden.suite import SUITES
+from tests.hidden.suite import SUITES, Suite
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "benchmarks.md"
@@ -79,8 +79,9 @@ def _latest(folder: Path, name: str) -> str:
     parts = _parts(folder, name)
     if not parts:
         return "No full run is published yet.\n"
-    if len(parts) > 1 and name in (suite.result for suite in SUITES.values()):
-        return lowered(_summed(parts, name))
+    suite = next((suite for suite in SUITES.values() if suite.result == name), None)
+    if suite is not None and len(parts) > 1:
+        return lowered(_summed(parts, suite))
     return "\n".join(lowered(file.read_text(encoding="utf-8")) for file in parts)
 
 
@@ -97,16 +98,14 @@ def _parts(folder: Path, name: str) -> list[Path]:
     return sorted(latest, key=lambda file: (len(file.stem), file.stem))
 
 
-def _summed(parts: list[Path], name: str) -> str:
+def _summed(parts: list[Path], suite: Suite) -> str:
     """One report of all cases of some parts, each case as its own commit answered it."""
-    suite = next(suite for suite in SUITES.values() if suite.result == name)
     found = [json.loads(p.with_suffix(".json").read_text(encoding="utf-8")) for p in parts]
     rows = [suite.row_of({"row": row}) for part in found for row in part["rows"]]
     rows.sort(key=lambda row: (row.tier, row.seed))
     commits = ", ".join(f"{len(part['rows'])} at {part['commit']}" for part in found)
     said = f"{len(rows)} cases, each diagnosed once: {commits}."
-    title = f"# {suite.title}, {found[0]['date']}"
-    return f"{title}\n\n{said}\n\n{suite.markdown(suite.summarise(rows))}"
+    return suite.page(found[0]["date"], said, suite.summarise(rows))
 
 
 def lowered(text: str) -> str:

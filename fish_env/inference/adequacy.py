@@ -280,12 +280,14 @@ def _changing(
         products = np.column_stack([-left * lin.residuals, left**2])
         score, info = sums_over(blocks, products).T
         shows = info > POLICY.smallest_signal
+        if not shows.any():
+            continue
         score, info = score[shows], info[shows]
         explained = float(np.sum(score**2 / info))
         # By noise alone the estimate of a size has the inverse of its information for a variance.
-        square = max(explained - len(info), 0.0) / max(float(info.sum()), 1e-300)
+        square = max(explained - len(info), 0.0) / float(info.sum())
         amount = float(np.sqrt(square)) * forces.unit(column)
-        log_p = float(chi2_log_tail(explained, max(len(info), 1)))
+        log_p = float(chi2_log_tail(explained, len(info)))
         found.append(Misfit(*forces.words(column), log_p, amount, changing=True))
     return found
 

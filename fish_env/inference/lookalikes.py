@@ -108,7 +108,7 @@ def asked_of_lags(
     if runs.is_coarse:
         runs, swaps = runs.in_usual_steps(), _swaps(current.fit, pairs)
     else:
-        swaps = _within_reach(current.fit, pairs)
+        swaps = _within_reach(current.fit, pairs, POLICY.coarse_fit_leeway)
     leeway = POLICY.coarse_fit_leeway
     best, rivals = _asked(runs, current, swaps, POLICY.swap_steps, leeway, report)
     if best is not current:
@@ -192,7 +192,9 @@ def _swaps(own: Fit, pairs: Sequence[tuple[CauseId, Signal]]) -> list[Swap]:
     return [(c, signal.cause.effect, with_lookalike(own, c, signal)) for c, signal in pairs]
 
 
-def _within_reach(own: Fit, pairs: Sequence[tuple[CauseId, Signal]]) -> list[Swap]:
+def _within_reach(
+    own: Fit, pairs: Sequence[tuple[CauseId, Signal]], least: float = -np.inf
+) -> list[Swap]:
     """Pairs whose look-alike makes up for most of what the cause explains, in a coarse fit.
 
     A fit with it begins where that has led: from the mildest plausible size, which may be several
@@ -202,30 +204,17 @@ def _within_reach(own: Fit, pairs: Sequence[tuple[CauseId, Signal]]) -> list[Swa
     Args:
         own: fit with the causes.
         pairs: causes, each with the signal of what looks like it.
+        least: what a coarse fit may lack in any case.
     """
     fitter = CoarseFitter(own)
-    lack = _lacks(fitter, pairs)
+    lack = {c: max(least, what_may_lack(fitter, c)) for c in dict.fromkeys(c for c, _ in pairs)}
     found = list[Swap]()
     for cause, signal in pairs:
-        enough = max(POLICY.coarse_fit_leeway, lack[cause])
-        coarse = _in_place_of(fitter, cause, signal, enough)
-        if coarse is not None:
+        enough = fitter.base + lack[cause]
+        coarse = swapped(fitter, own, cause, signal, enough)
+        if coarse is not None and coarse.objective < enough:
             found.append((cause, signal.cause.effect, coarse))
     return found
-
-
-def _lacks(fitter: CoarseFitter, pairs: Sequence[tuple[CauseId, Signal]]) -> dict[CauseId, float]:
-    """Of each cause, what a fit with a look-alike in its place may lack."""
-    return {cause: what_may_lack(fitter, cause) for cause in dict.fromkeys(c for c, _ in pairs)}
-
-
-def _in_place_of(
-    fitter: CoarseFitter, cause: CauseId, signal: Signal, lack: float
-) -> CoarseFit | None:
-    """The coarse fit with a look-alike in a cause's place; None if it lacks more than it may."""
-    enough = fitter.base + lack
-    coarse = swapped(fitter, fitter.fit, cause, signal, enough)
-    return coarse if coarse is not None and coarse.objective < enough else None
 
 
 def _asked(
@@ -360,13 +349,8 @@ def undecided(current: Explanation, shown: Screen, report: Report) -> tuple[Expl
         shown: causes that are not among them.
         report: told what is being done.
     """
-    own, found, fitter = current.fit, list[Explanation](), CoarseFitter(current.fit)
-    pairs = _shown(late(current), shown)
-    lack = _lacks(fitter, pairs)
-    for cause, signal in pairs:
-        other, coarse = signal.cause.effect, _in_place_of(fitter, cause, signal, lack[cause])
-        if coarse is None:
-            continue
+    own, found = current.fit, list[Explanation]()
+    for cause, other, coarse in _within_reach(own, _shown(late(current), shown)):
         report(f"fitting {other}, which explains nearly as much as {name_of(cause)}")
         fitted = at_noise(own.problem, coarse, own.noise, POLICY.swap_steps)
         if fitted is not None:

@@ -71,6 +71,10 @@ class Suite:
     summarise: Callable[[Sequence[Any]], dict[str, Any]]
     markdown: Callable[[dict[str, Any]], str]
 
+    def page(self, date: str, said: str, summary: dict[str, Any]) -> str:
+        """The summary as the page of a day, under a sentence on where it comes from."""
+        return f"# {self.title}, {date}\n\n{said}\n\n{self.markdown(summary)}"
+
 
 @dataclass(frozen=True)
 class Job:

@@ -13,7 +13,12 @@ from fish_env.model.effect import Effect
 SCALE = EffectParameterId("frequency_scale", "scale")
 RATE = EffectParameterId("battery_sag", "rate")
 LATE = effect_names(
-    "servo_lag", "servo_delay", "servo_rate_limit", "tail_flexibility", "wake_memory"
+    "servo_lag",
+    "servo_delay",
+    "servo_rate_limit",
+    "servo_torque_limit",
+    "tail_flexibility",
+    "wake_memory",
 )
 """Effects that make the tail or its force late."""
 LATE_SENSORS = effect_names("sensor_delay", "imu_lowpass")

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 
 import numpy as np
 from scipy.special import chdtri
 
-from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.coarse_fit import CoarseFitter
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.explanation import Explanation
@@ -15,14 +14,13 @@ from fish_env.inference.hypotheses import (
     CauseId,
     Coefficient,
     EffectName,
-    EffectParameterId,
-    ParameterId,
     name_of,
 )
 from fish_env.inference.policy import POLICY
 from fish_env.inference.progress import Report
 from fish_env.inference.rivals import rivals_of
 from fish_env.inference.substitution import coarse_without, without
+from fish_env.inference.switched_off import distance, from_off, off_values
 from fish_env.inference.tails import chi2_log_tail
 
 
@@ -236,35 +234,6 @@ def insignificant(fit: Fit, causes: Sequence[CauseId], threshold: float) -> tupl
         covariance -= pull @ covariance[own]
         dropped.append(weakest)
     return tuple(dropped)
-
-
-def from_off(fit: Fit, off: Mapping[ParameterId, float]) -> float:
-    """Squared distance of estimates from where a cause is off, in standard errors."""
-    at = [fit.ids.index(id) for id in off]
-    gap = fit.estimates[at] - np.array(list(off.values()))
-    return distance(gap, fit.covariance[np.ix_(at, at)])
-
-
-def distance(gap: FloatArray, covariance: FloatArray) -> float:
-    """Square of a distance (k,) in standard errors."""
-    return float(gap @ np.linalg.solve(covariance, gap))
-
-
-def off_values(fit: Fit, cause: CauseId) -> dict[ParameterId, float]:
-    """Values of what switches a cause on, at which it is off in the linear model.
-
-    What is off at infinity acts by its inverse, such as the time of a lag: that of a value v is
-    zero, to first order, at 2 v.
-    """
-    if isinstance(cause, Coefficient):
-        baseline = fit.problem.baseline
-        return {cause: float(baseline.mean[baseline.ids.index(cause)])}
-    switching = fit.problem.known[cause].switching
-    neutral = {EffectParameterId(cause, p.name): p.neutral for p in switching}
-    return {
-        id: off if np.isfinite(off) else 2.0 * float(fit.estimates[fit.ids.index(id)])
-        for id, off in neutral.items()
-    }
 
 
 def _is_linear(fit: Fit, name: EffectName) -> bool:

@@ -17,7 +17,7 @@ from fish_env.inference.estimate.coarse_fit import CoarseFit
 from fish_env.inference.estimate.fit import FEWER_STEPS, Fit, fit
 from fish_env.inference.estimate.information import information, prior_precision
 from fish_env.inference.hypotheses import CauseId, EffectName, EffectParameterId
-from fish_env.inference.in_place import in_step_without, without_causes
+from fish_env.inference.in_place import begun_without
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Problem
 
@@ -64,7 +64,8 @@ class Explanation:
             dropped: effects that are no longer among the causes.
         """
         if dropped:
-            found = reached(lambda: with_run_variation(self.fit, dropped, self._in_step(dropped)))
+            own = self.fit
+            found = reached(lambda: with_run_variation(own, *begun_without(own, dropped, True)))
             if found is None:
                 return self
             return Explanation(tuple(c for c in self.causes if c not in dropped), found)
@@ -73,9 +74,6 @@ class Explanation:
         if found is None or found is self.fit or (stands_in and not beside_misfit):
             return self
         return Explanation(self.causes, found)
-
-    def _in_step(self, dropped: Collection[CauseId]) -> Problem:
-        return in_step_without(self.fit, dropped, without_causes(self.fit, dropped))
 
     def varied_to_the_end(self) -> Explanation:
         """With what the runs differ in also beside a misfit, again while that tells much more.

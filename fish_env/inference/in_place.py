@@ -8,13 +8,14 @@ So the numbers take on what a cause leaves behind, and give up what a look-alike
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import chdtrc
 
 from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.coarse_fit import CoarseFit
-from fish_env.inference.estimate.fit import Fit
+from fish_env.inference.estimate.fit import Fit, objective_at
 from fish_env.inference.estimate.free import spread_of
 from fish_env.inference.hypotheses import (
     CauseId,
@@ -27,6 +28,7 @@ from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
 from fish_env.inference.projection import Signal
 from fish_env.inference.starts import probed
+from fish_env.inference.switched_off import where_others_follow
 
 
 def with_lookalike(own: Fit, cause: CauseId, signal: Signal) -> CoarseFit:
@@ -75,6 +77,38 @@ def without_causes(own: Fit, dropped: Collection[CauseId]) -> CoarseFit:
     released = tuple(c for c in own.released if c not in dropped)
     point = Point(own.point.z, of_effects(own.point.effects, effects))
     return CoarseFit(effects, released, point, np.inf)
+
+
+def begun_without(
+    own: Fit, dropped: Collection[CauseId], keep_in_step: bool
+) -> tuple[Problem, CoarseFit]:
+    """The runs of a fit, and where a fit to them begins without some of its causes.
+
+    The others begin where the linear model leads, if that is better than where they are. What it
+    says of others is not used where numbers of runs take on what a cause leaves.
+
+    Args:
+        own: fit with the causes.
+        dropped: the causes.
+        keep_in_step: whether numbers of runs do that.
+
+    Raises:
+        LinAlgError: the simulation diverges there.
+    """
+    begin = without_causes(own, dropped)
+    runs = in_step_without(own, dropped, begin) if keep_in_step else own.problem
+    if runs is not own.problem:
+        return runs, begin
+    points = [begin.point, where_others_follow(own, begin)]
+    values = [_left_at(own, begin, point) for point in points]
+    return runs, replace(begin, point=points[int(np.argmin(values))])
+
+
+def _left_at(own: Fit, begin: CoarseFit, point: Point) -> float:
+    try:
+        return objective_at(own.problem, begin.effects, point, own.noise, begin.released)
+    except np.linalg.LinAlgError:
+        return np.inf
 
 
 def in_step(runs: Problem, own: Fit, cause: CauseId, at: CoarseFit) -> Problem:

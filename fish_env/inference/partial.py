@@ -20,7 +20,6 @@ from fish_env.inference.adequacy import (
     generic_signals,
     implausible_estimates,
 )
-from fish_env.inference.elimination import distance, from_off, off_values
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.free import Free
 from fish_env.inference.estimate.products import inner
@@ -39,6 +38,7 @@ from fish_env.inference.progress import Report, silent
 from fish_env.inference.projection import Projector, Signal
 from fish_env.inference.result import ResidualModel
 from fish_env.inference.substitution import without_in_step
+from fish_env.inference.switched_off import distance, from_off, off_values
 from fish_env.inference.tails import chi2_log_tail
 
 Describe = Callable[[Fit, float, Problem | None], ResidualModel | None]

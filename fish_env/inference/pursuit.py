@@ -17,7 +17,7 @@ import numpy as np
 
 from fish_env.arrays import FloatArray
 from fish_env.inference.adequacy import beyond_plausible, implausible_estimates
-from fish_env.inference.elimination import allowed_loss, insignificant, off_values
+from fish_env.inference.elimination import allowed_loss, insignificant
 from fish_env.inference.estimate.again import to_search
 from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
 from fish_env.inference.estimate.fit import FEWER_STEPS, Fit, fit, objective_at
@@ -29,6 +29,7 @@ from fish_env.inference.progress import Report
 from fish_env.inference.projection import Projector, Signal
 from fish_env.inference.screening import Screen, zoomed
 from fish_env.inference.starts import linear_estimate, probed, starts
+from fish_env.inference.switched_off import off_values
 
 
 @dataclass(frozen=True, eq=False)

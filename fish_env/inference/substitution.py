@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import partial
 
 import numpy as np
@@ -20,7 +20,7 @@ from fish_env.inference.hypotheses import (
     name_of,
     of_effects,
 )
-from fish_env.inference.in_place import in_step_without, replaced, without_causes
+from fish_env.inference.in_place import begun_without, replaced, without_causes
 from fish_env.inference.parallel import side_by_side
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
@@ -28,6 +28,7 @@ from fish_env.inference.progress import Report
 from fish_env.inference.projection import Signal
 from fish_env.inference.search import at_noise, is_off
 from fish_env.inference.starts import baselines, probed
+from fish_env.inference.switched_off import where_others_follow
 
 Values = Mapping[EffectParameterId, float]
 
@@ -191,7 +192,7 @@ def without(
         dropped: those to drop.
         least: growth of the score from which the fit is of no use, and may stop early.
     """
-    return _smaller(current, dropped, lambda begin: current.fit.problem, least)
+    return _smaller(current, dropped, False, least)
 
 
 def without_in_step(current: Explanation, dropped: Collection[CauseId]) -> Explanation | None:
@@ -203,23 +204,22 @@ def without_in_step(current: Explanation, dropped: Collection[CauseId]) -> Expla
         current: all causes.
         dropped: those to drop.
     """
-    return _smaller(current, dropped, partial(in_step_without, current.fit, dropped), np.inf)
+    return _smaller(current, dropped, True, np.inf)
 
 
 def _smaller(
-    current: Explanation,
-    dropped: Collection[CauseId],
-    runs: Callable[[CoarseFit], Problem],
-    least: float,
+    current: Explanation, dropped: Collection[CauseId], keep_in_step: bool, least: float
 ) -> Explanation | None:
-    own = current.fit
-    begin, enough = without_causes(own, dropped), _enough(current, dropped, least)
-    smaller = reached(
-        lambda: fit(
-            runs(begin), begin.effects, begin.point, own.noise, begin.released,
+    own, enough = current.fit, _enough(current, dropped, least)
+
+    def fitted() -> Fit:
+        runs, begin = begun_without(own, dropped, keep_in_step)
+        return fit(
+            runs, begin.effects, begin.point, own.noise, begin.released,
             refit_noise=False, iterations=4, give_up_above=enough,
-        )
-    )  # fmt: skip
+        )  # fmt: skip
+
+    smaller = reached(fitted)
     if smaller is None:
         return None
     return Explanation(tuple(c for c in current.causes if c not in dropped), smaller)
@@ -250,5 +250,6 @@ def coarse_without(
         give_up_above: stop early where the objective will not get below this.
     """
     begin = without_causes(fitter.fit, (cause,))
-    trying = partial(fitter.coarse_fit, begin.effects, begin.released, [begin.point])
+    points = [begin.point, where_others_follow(fitter.fit, begin)]
+    trying = partial(fitter.coarse_fit, begin.effects, begin.released, points)
     return reached(partial(trying, give_up_above))

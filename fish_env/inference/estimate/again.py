@@ -7,16 +7,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from fish_env.inference.estimate.coarse_fit import CoarseFit
+from fish_env.inference.estimate.coarse_fit import CoarseFit, where_ended
 from fish_env.inference.estimate.fit import FEWER_STEPS, USUAL_STEPS, Fit, fit
 from fish_env.inference.estimate.free import DIFFERENCE, Free, linearise, spread_of
 from fish_env.inference.estimate.gauss_newton import predicted_decrease
 from fish_env.inference.estimate.information import gradient, information
 from fish_env.inference.estimate.run_variation import in_proportion, pairs_beside
 from fish_env.inference.estimate.spread import Likelihood, Spread, fit_spread
-from fish_env.inference.hypotheses import CauseId, of_effects
 from fish_env.inference.policy import POLICY
-from fish_env.inference.problem import Point, Problem
+from fish_env.inference.problem import Problem
 
 AT_EDGE = 1.001
 """A lag is at the shortest that steps can have up to so many times that."""
@@ -152,7 +151,7 @@ def own_likelihoods(own: Fit) -> Callable[[Collection[int]], Likelihood]:
 
 
 def with_run_variation(
-    own: Fit, dropped: Collection[CauseId] = (), runs: Problem | None = None
+    own: Fit, runs: Problem | None = None, begin: CoarseFit | None = None
 ) -> Fit:
     """The fit, made again where its runs differ by more, or less, than it allows for.
 
@@ -161,8 +160,8 @@ def with_run_variation(
 
     Args:
         own: the fit.
-        dropped: effects that the new fit goes without.
         runs: those of the fit with numbers to begin from; default: as in the fit.
+        begin: where the new fit begins, and what is free in it; default: as in the fit.
     """
     problem, noise = runs or own.problem, own.noise
     enough = problem.run_count >= POLICY.fewest_runs_for_spread
@@ -173,9 +172,8 @@ def with_run_variation(
             numbers = np.where(found.sd > 0.0, problem.variation, 0.0)
             problem = problem.with_variation(numbers, own.point, own.noise)
             noise = replace(own.noise, spread=found.sd)
-    if noise is own.noise and not dropped:
+    if noise is own.noise and begin is None:
         return own
-    effects = [name for name in own.effects if name not in dropped]
-    start = Point(own.point.z, of_effects(own.point.effects, effects))
-    steps = search_steps(problem)
-    return fit(problem, effects, start, noise, own.released, rounds=2, iterations=steps)
+    at = begin or where_ended(own)
+    start, steps = (at.effects, at.point, noise, at.released), search_steps(problem)
+    return fit(problem, *start, rounds=2, iterations=steps)

@@ -301,12 +301,13 @@ def objective_at(
     noise: Any,
     released: Sequence[Coefficient] = (),
 ) -> float:
-    """-2 log likelihood + prior at a point, without any fitting."""
+    """-2 log likelihood + prior at a point, without any fitting; infinite where it diverges."""
     free = Free(problem, effects, released)
     values = {**problem.neutral(effects), **point.effects}
     vector = free.bounds.clip(free.pack(Point(point.z, values)))
     problem = problem.settled(free.unpack(vector), noise)
-    return objective(problem, free, vector, noise)[0]
+    value, _ = objective(problem, free, vector, noise)
+    return value if np.isfinite(value) else np.inf
 
 
 def _finish(

@@ -184,7 +184,7 @@ def _diagnose_runs(
         baseline, causes_of(problem), np.random.default_rng(seed), effort, progress, judging,
         residual_model,
     )  # fmt: skip
-    gain = None
+    gain, baseline = None, found.attribution.baseline.fit
     if found.gap is not None and judging is not None:
         gain = measure_gain(judging, baseline, found.accepted, found.gap)
         if gain.is_useless:

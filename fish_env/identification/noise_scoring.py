@@ -16,11 +16,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.box_qp import minimise_in_box
+from fish_env.inference.parallel import side_by_side
 
 STEP = 1e-3
 """By which a parameter, the logarithm of a size, is moved for a difference."""
@@ -154,23 +156,23 @@ def _system(
     """Score and information about parameters, by differences."""
     factor = np.linalg.inv(here.whitening)
     eye = np.eye(factor.shape[1])
-    score = np.empty(len(at))
-    means = np.empty((len(at), here.innovations.size))
-    spreads = np.empty((len(at), here.whitening.size))
-    seen = np.empty((len(at), here.innovations.size))
-    for i in range(len(at)):
-        moved = at.copy()
-        moved[i] += STEP if at[i] + STEP <= upper[i] else -STEP
-        by = moved[i] - at[i]
-        there = replay(moved)
-        score[i] = (there.log_likelihood - here.log_likelihood) / by
+
+    def moved(i: int) -> tuple[float, FloatArray, FloatArray, FloatArray]:
+        """How likelihood, means and spreads of innovations change with one parameter."""
+        by = STEP if at[i] + STEP <= upper[i] else -STEP
+        there = replay(np.where(np.arange(len(at)) == i, at + by, at))
+        score = (there.log_likelihood - here.log_likelihood) / by
         # Both seen in the whitened coordinates of the present noise model.
         back = (eye - there.whitening @ factor) / by
         spread = back + back.transpose(0, 2, 1)
-        spreads[i] = spread.ravel()
-        seen[i] = np.einsum("tij,tj->ti", spread, here.innovations).ravel()
+        seen = np.einsum("tij,tj->ti", spread, here.innovations)
         shift = (there.innovations - here.innovations) / by
-        means[i] = (shift + np.einsum("tij,tj->ti", back, there.innovations)).ravel()
+        mean = shift + np.einsum("tij,tj->ti", back, there.innovations)
+        return score, mean.ravel(), spread.ravel(), seen.ravel()
+
+    found = side_by_side([partial(moved, i) for i in range(len(at))])
+    score = np.array([score for score, *_ in found])
+    means, spreads, seen = (np.array(rows) for rows in list(zip(*found, strict=True))[1:])
     # A parameter that nothing depends on stays where it is.
     shared = means @ means.T + 1e-6 * np.eye(len(at))
     return System(score, 0.5 * spreads @ spreads.T + shared, 0.5 * seen @ seen.T + shared)

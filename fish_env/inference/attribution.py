@@ -16,9 +16,10 @@ from fish_env.inference.elimination import (
     without_idle,
     without_insignificant,
 )
-from fish_env.inference.estimate.again import finished
+from fish_env.inference.estimate.again import finished, quietened
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.explanation import Explanation
+from fish_env.inference.first_screen import first_screen, with_differences
 from fish_env.inference.hypotheses import CauseId, Coefficient, listed
 from fish_env.inference.in_common import with_common_errors
 from fish_env.inference.many_causes import challenged, pursue
@@ -26,7 +27,6 @@ from fish_env.inference.parallel import both, side_by_side
 from fish_env.inference.policy import POLICY
 from fish_env.inference.preconditions import Precondition, preconditions
 from fish_env.inference.probes import Cause
-from fish_env.inference.problem import Problem
 from fish_env.inference.progress import Report, silent
 from fish_env.inference.projection import Signal
 from fish_env.inference.publication import published
@@ -71,7 +71,6 @@ class Attribution:
 
 
 def attribute(
-    problem: Problem,
     baseline: Fit,
     causes: Sequence[Cause],
     rng: np.random.Generator,
@@ -80,20 +79,28 @@ def attribute(
 ) -> Attribution:
     """Add causes while one is significant, keep all that explain the data alike.
 
+    Where none is, all are asked again beside what runs differ in, if that explains anything.
+
     Args:
-        problem: runs used for fitting.
-        baseline: refitted baseline.
+        baseline: refitted baseline, with the runs it was fitted to.
         causes: causes to consider.
         rng: for null distributions.
         effort: how much to spend.
         report: told what is being done.
     """
     usual = (causes, rng, effort, report)
-    return extended(_begun(problem, baseline, *usual), *usual)
+    begun = _begun(baseline, *usual)
+    found, nothing = extended(begun, *usual), begun.accepted
+    varied = nothing if found.accepted.causes else with_differences(nothing)
+    if varied is nothing:
+        return found
+    report("screening causes beside what the runs differ in")
+    shown = screen(varied.fit, causes, rng)
+    again = replace(begun, baseline=varied, first=shown, shown=shown, accepted=varied)
+    return extended(again, *usual)
 
 
 def _begun(
-    problem: Problem,
     baseline: Fit,
     causes: Sequence[Cause],
     rng: np.random.Generator,
@@ -101,17 +108,17 @@ def _begun(
     report: Report,
 ) -> Attribution:
     """What the baseline says, without a cause."""
-    nothing = Explanation((), baseline)
-    relax = effort.retries and disturbance_at_limit(baseline) and not problem.drive.known
     report("screening causes")
-    first = screen(baseline, causes, rng, keep_changes=True)
+    nothing, first = first_screen(Explanation((), baseline), causes, rng)
+    own = nothing.fit
     report("computing detectable sizes")
+    relax = effort.retries and disturbance_at_limit(own) and not own.problem.drive.known
     known, _ = both(  # where the disturbance is at its limit, relaxed noise is tried in any case
-        partial(preconditions, problem, first, causes, baseline if effort.retries else None),
+        partial(preconditions, own.problem, first, causes, own if effort.retries else None),
         lambda: nothing.with_relaxed_noise if relax else None,
     )
-    light = first.without_changes()
-    return Attribution(nothing, light, light, nothing, (), (), 0.0, preconditions=known)
+    first = first.without_changes()
+    return Attribution(nothing, first, first, nothing, (), (), 0.0, preconditions=known)
 
 
 def extended(
@@ -170,21 +177,20 @@ def settled(
     threshold = partial(threshold_of_coefficients, found.shown, relaxed_log_p=relaxed_log_p)
     if found.accepted.causes:
         report("removing unnecessary causes")
-    current = without_insignificant(found.accepted, threshold, report)
-    current, unnecessary = backward_elimination(current)
+    significant = without_insignificant(found.accepted, threshold, report)
+    current, unnecessary = backward_elimination(significant)
     failed = found.failed if current.causes == found.accepted.causes else frozenset()
     alike: tuple[Explanation, ...] = ()
     # What else is missing moves estimates by more than a few steps more would.
     if current.causes and thoroughly and not disturbance_at_limit(current.fit):
         current, alike = published(current, found.shown, report)
-        before = current
-        current = without_insignificant(current, threshold, report)
+        before, current = current, without_insignificant(current, threshold, report)
         if current is not before:
             current = Explanation(current.causes, finished(current.fit))
     rivals = (*found.rivals, *unnecessary, *alike)
     if thoroughly and rivals:
         rivals = tuple(side_by_side([partial(without_idle, e) for e in rivals]))
-    # A rival that contains the accepted causes is no rival once a cause is dropped.
+    # One that contains the accepted causes is no rival once a cause is dropped.
     rivals = tuple(e for e in rivals if e.causes and not set(current.causes) <= set(e.causes))
     return replace(found, accepted=current, rivals=rivals, failed=failed)
 
@@ -380,7 +386,8 @@ class Search:
 
         The others begin again from where the best one is, if it leaves something.
         """
-        best = tried[0]
+        best = Explanation(tried[0].causes, quietened(tried[0].fit))
+        tried = [best, *tried[1:]]
         after = screen(best.fit, self.causes, self.rng)
         problem = best.fit.problem
         if self.effort.retries and not current.causes and shortlisted(problem, after, 1):

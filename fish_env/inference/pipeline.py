@@ -70,8 +70,7 @@ def refit_baseline(problem: Problem) -> Fit:
 
     It is iterated to convergence unless its disturbance is at the limit: the misfit that causes
     this is what comes next. A drive known to be out of step hides what the runs differ in, and its
-    baseline is one to search from; where single runs differ in their drive, what else they differ
-    in counts beside any misfit.
+    baseline is one to search from.
 
     Raises:
         LinAlgError: the simulation diverges with the nominal coefficients.
@@ -79,9 +78,6 @@ def refit_baseline(problem: Problem) -> Fit:
     if problem.drive.in_step:
         problem = to_search(problem)
     own = fit(problem, rounds=2, iterations=FEWER_STEPS)
-    if problem.drive.in_step and disturbance_at_limit(own):
-        return own
-    own = Explanation((), own).varied(beside_misfit=problem.drive.uneven).fit
     return own if disturbance_at_limit(own) else finished(own)
 
 
@@ -106,7 +102,7 @@ def investigate(
         describe: models what no known cause explains; without it nothing is said of that.
     """
     problem = baseline.problem
-    attribution = attribute(problem, baseline, causes, rng, effort, report)
+    attribution = attribute(baseline, causes, rng, effort, report)
     shown = attribution.preconditions
     report("testing the residual")
     left = adequacy(attribution.accepted.fit, rng)
@@ -125,7 +121,7 @@ def investigate(
     gap = None
     if verdict.name in EXTENDING and held_out is not None:
         report("measuring the gain on final runs")
-        gap = gap_closed(held_out, baseline, attribution.accepted.fit, rng)
+        gap = gap_closed(held_out, attribution.baseline.fit, attribution.accepted.fit, rng)
     residual = None
     if effort.retries and not left.reached and describe:
         report("modelling the residual")

@@ -82,6 +82,6 @@ def test_what_puts_a_beat_out_of_step_is_tried_whatever_the_screen_makes_of_it(i
     problem.drive = Drive(known=in_step)
     said = []
     rng = np.random.default_rng(0)
-    attribute(problem, fit(problem), causes_of(problem), rng, report=said.append)
+    attribute(fit(problem), causes_of(problem), rng, report=said.append)
     relaxed = [step.split()[1] for step in said if step.endswith("under relaxed noise")]
     assert sorted(relaxed) == ([] if in_step else sorted((*STRONG, *DRIFTING)))

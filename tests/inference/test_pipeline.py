@@ -61,7 +61,7 @@ def test_a_weaker_cause_is_kept_if_it_leaves_nothing(wave, unknown, kept):
     problem = Pushed(apart(runs), [effect(name) for name in targets])
     causes = [cause for cause in causes_of(problem) if cause.id != UNKNOWN]
     rng, said = np.random.default_rng(0), []
-    before = attribute(problem, fit(problem), causes, rng)
+    before = attribute(fit(problem), causes, rng)
     assert before.accepted.causes == ()
     found, left = with_weaker_causes(before, LEFT, causes, rng, said.append)
     assert ("fitting wave" in said) == (wave > 0.0)
@@ -78,7 +78,7 @@ def test_what_explains_more_beside_a_cause_is_kept_though_something_is_missing(w
     causes = [cause for cause in causes_of(problem) if cause.id != UNKNOWN]
     first = [cause for cause in causes if cause.id == "hull_compression"]
     rng = np.random.default_rng(0)
-    before = attribute(problem, fit(problem), first, rng)
+    before = attribute(fit(problem), first, rng)
     assert before.accepted.causes == ("hull_compression",)
     found, left = with_weaker_causes(before, LEFT, causes, rng, lambda step: None)
     assert not left.reached
@@ -158,7 +158,7 @@ def test_a_slow_cause_is_found_where_a_disturbance_hid_it(tide, unknown, kept):
     problem = Hiding(apart(runs), [effect(name, reach=10.0) for name in targets])
     causes = [cause for cause in causes_of(problem) if cause.id != UNKNOWN]
     rng, said = np.random.default_rng(0), []
-    before = attribute(problem, fit(problem), causes, rng)
+    before = attribute(fit(problem), causes, rng)
     assert before.accepted.causes == ()
     found, left = with_slow_causes(before, LEFT, causes, rng, said.append)
     assert ("searching for slow causes" in said) == (tide > 0.0 or unknown > 0.0)

@@ -249,7 +249,7 @@ def test_where_one_cause_alone_was_of_no_use_two_have_to_show():
 def test_a_search_that_adds_nothing_fits_nothing_again():
     baseline, _ = screened()
     causes, rng = causes_of(problem()), np.random.default_rng(0)
-    found = attribute(problem(), baseline, causes, rng)
+    found = attribute(baseline, causes, rng)
     said = []
     assert set(found.accepted.causes) == NAMES
     assert extended(found, causes, rng, report=said.append) is found
@@ -313,7 +313,7 @@ def test_what_explains_more_in_one_run_only_does_not_lead_before_a_simpler_cause
     soft = DeclaredEffect("soft", (*effect("soft", 60.0).parameters, rings), ("lag",))
     problem, said = Stated(residuals, [lag, soft, bias]), []
     rng = np.random.default_rng(0)
-    found = attribute(problem, fit(problem), causes_of(problem), rng, report=said.append)
+    found = attribute(fit(problem), causes_of(problem), rng, report=said.append)
     answers = [{*e.causes} for e in (found.accepted, *found.rivals)]
     assert ({"lag", "bias"} in answers) != agreeing
     assert ("going on with lag, which explains as much" in said) != agreeing

@@ -48,6 +48,31 @@ def finished(own: Fit) -> Fit:
     return own
 
 
+def quietened(own: Fit) -> Fit:
+    """A fit whose disturbance is at its limit, or one from first noise if that is likelier.
+
+    A disturbance that stood in for a misfit moves coefficients, and beside these it stays the
+    likeliest when what was missing has been found. It is told by how little noise a fit needs that
+    begins with little.
+
+    Args:
+        own: the fit.
+    """
+    problem = own.problem
+    if not problem.disturbance_at_limit(own.noise):
+        return own
+    noise = problem.default_noise()
+    try:
+        if problem.variations:
+            numbers = np.where(spread_of(problem, noise) > 0.0, problem.variation, 0.0)
+            problem = problem.with_variation(numbers, own.point, noise)
+        start, steps = (own.effects, own.point, noise, own.released), search_steps(problem)
+        again = fit(problem, *start, rounds=2, iterations=steps)
+    except np.linalg.LinAlgError:
+        return own
+    return again if again.objective < own.objective else own
+
+
 def refined(own: Fit, rounds: int = 1) -> Fit:
     """The fit in the steps of published estimates, if it was made in longer ones."""
     if not own.problem.is_coarse:
@@ -109,6 +134,15 @@ def following(problem: Problem, begin: CoarseFit) -> Problem:
     return problem.in_usual_steps()
 
 
+def differences(own: Fit) -> Spread | None:
+    """What the runs of a fit differ in; None where they tell no spread, or have usual ones."""
+    problem = own.problem
+    enough = problem.run_count >= POLICY.fewest_runs_for_spread
+    if not problem.variations or not enough or problem.drive.uneven:
+        return None
+    return run_variation(own)
+
+
 def run_variation(own: Fit) -> Spread:
     """What the runs of a fit differ in, as far as it is strongly indicated.
 
@@ -163,15 +197,12 @@ def with_run_variation(
         runs: those of the fit with numbers to begin from; default: as in the fit.
         begin: where the new fit begins, and what is free in it; default: as in the fit.
     """
-    problem, noise = runs or own.problem, own.noise
-    enough = problem.run_count >= POLICY.fewest_runs_for_spread
-    if problem.variations and enough and not problem.drive.uneven:
-        found = run_variation(own)
-        if found.sd.any() or own.noise.spread.any():
-            # The fit moves them, run by run, as far as that helps.
-            numbers = np.where(found.sd > 0.0, problem.variation, 0.0)
-            problem = problem.with_variation(numbers, own.point, own.noise)
-            noise = replace(own.noise, spread=found.sd)
+    problem, noise, found = runs or own.problem, own.noise, differences(own)
+    if found is not None and (found.sd.any() or own.noise.spread.any()):
+        # The fit moves them, run by run, as far as that helps.
+        numbers = np.where(found.sd > 0.0, problem.variation, 0.0)
+        problem = problem.with_variation(numbers, own.point, own.noise)
+        noise = replace(own.noise, spread=found.sd)
     if noise is own.noise and begin is None:
         return own
     at = begin or where_ended(own)

@@ -1,6 +1,7 @@
 """Runs a suite of hidden effects and writes its rates and answers to a dated file.
 
-Each finished case is kept, so a stopped run goes on where it was:
+Each finished case is kept, so a stopped run goes on where it was. A part of a suite is written
+beside other results of the day, a whole one in their place:
 
     python scripts/benchmark_diagnosis.py --tiers rich,null --limit 20
     python scripts/benchmark_diagnosis.py --suite realistic
@@ -117,9 +118,9 @@ def write(rows: list[Any], options: argparse.Namespace) -> None:
     said = f"{len(rows)} cases, numbered from {seed0} in each tier, diagnosed at {commit()}."
     page = suite.page(today(), said, summary)
     content = {"seed0": seed0, **summary, "rows": [asdict(row) for row in rows]}
-    write_dated(
-        options.out, f"{suite.result}-quick" if options.quick else suite.result, content, page
-    )
+    kind = f"{suite.result}-quick" if options.quick else suite.result
+    part = bool(options.tiers or options.limit or options.finished)
+    write_dated(options.out, kind, content, page, beside=part)
     print(page)
 
 

@@ -20,7 +20,7 @@ from fish_env.inference.policy import POLICY
 from fish_env.inference.progress import Report
 from fish_env.inference.rivals import rivals_of
 from fish_env.inference.substitution import coarse_without, without
-from fish_env.inference.switched_off import distance, from_off, off_values
+from fish_env.inference.switched_off import distance, from_off, may_not_act, off_values
 from fish_env.inference.tails import chi2_log_tail
 
 
@@ -192,15 +192,6 @@ def foreseen_loss(current: Explanation, cause: CauseId) -> float:
     if not isinstance(cause, Coefficient) and not _is_linear(own, cause):
         return 0.0
     return from_off(own, off_values(own, cause)) - current.narrowed_by((cause,))
-
-
-def may_not_act(fit: Fit, cause: CauseId) -> bool:
-    """Whether the 95 % region of what switches a cause on holds the values at which it is off.
-
-    The region is corrected for coloured residuals.
-    """
-    off = off_values(fit, cause)
-    return bool(from_off(fit, off) < chdtri(len(off), POLICY.interval_error))
 
 
 def insignificant(fit: Fit, causes: Sequence[CauseId], threshold: float) -> tuple[CauseId, ...]:

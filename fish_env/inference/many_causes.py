@@ -10,6 +10,7 @@ import numpy as np
 from fish_env.inference.adequacy import disturbance_at_limit
 from fish_env.inference.explanation import Explanation, exchanged
 from fish_env.inference.hypotheses import CauseId, Coefficient, EffectName
+from fish_env.inference.limits import limit_at, limit_of
 from fish_env.inference.lookalikes import late, pairs_alike
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause
@@ -21,7 +22,7 @@ from fish_env.inference.rivals import ranked, rivals_of
 from fish_env.inference.screening import Screen, screen
 from fish_env.inference.shortlist import shortlisted
 from fish_env.inference.starts import probed
-from fish_env.inference.substitution import in_parts, limit_at, limit_of, substituted, without
+from fish_env.inference.substitution import in_parts, substituted, without
 from fish_env.inference.trials import tried_out
 
 

@@ -8,13 +8,15 @@ import numpy as np
 from scipy.special import stdtrit
 
 from fish_env.inference.adequacy import implausible_estimates
-from fish_env.inference.explanation import Explanation
+from fish_env.inference.explanation import Explanation, exchanged
 from fish_env.inference.hypotheses import CauseId, Coefficient
 from fish_env.inference.left_out import left_out_scores
+from fish_env.inference.limits import limit_of
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Problem
 from fish_env.inference.projection import Projector
 from fish_env.inference.screening import Screen
+from fish_env.inference.switched_off import may_not_act
 
 
 def rivals_of(best: Explanation, others: Iterable[Explanation]) -> tuple[Explanation, ...]:
@@ -25,7 +27,23 @@ def rivals_of(best: Explanation, others: Iterable[Explanation]) -> tuple[Explana
         if alike(best, e)
         and not same_causes(best.fit.problem, best.causes, e.causes)
         and not implausible_estimates(e.fit)
+        and not _is_at_limit(best, e)
     )
+
+
+def _is_at_limit(best: Explanation, other: Explanation) -> bool:
+    """Whether another explanation has the best one as its limit, and may not be beside it.
+
+    A servo of a torque without end has a largest rate and nothing else: if the data do not show an
+    end, the simpler effect says all that they do.
+    """
+    if len(best.causes) != len(other.causes):
+        return False
+    swaps = exchanged(best, other)
+    if len(swaps) != 1:
+        return False
+    (cause, stand_in), own = swaps[0], other.fit
+    return limit_of(own, stand_in) == cause and may_not_act(own, stand_in)
 
 
 def ranked(found: Iterable[Explanation]) -> list[Explanation]:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from functools import partial
 
 import numpy as np
 
-from fish_env.inference.effects import Parts
 from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.explanation import Explanation, reached
@@ -21,6 +20,7 @@ from fish_env.inference.hypotheses import (
     of_effects,
 )
 from fish_env.inference.in_place import begun_without, replaced, without_causes
+from fish_env.inference.limits import Values, parts_of
 from fish_env.inference.parallel import side_by_side
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
@@ -29,8 +29,6 @@ from fish_env.inference.projection import Signal
 from fish_env.inference.search import at_noise, is_off
 from fish_env.inference.starts import baselines, probed
 from fish_env.inference.switched_off import where_others_follow
-
-Values = Mapping[EffectParameterId, float]
 
 
 def substituted(
@@ -124,7 +122,7 @@ def in_parts(current: Explanation, cause: CauseId, report: Report) -> Explanatio
     own = current.fit
     if isinstance(cause, Coefficient) or cause not in own.effects:
         return None
-    parts = _parts(own.problem, cause, own.point.effects)
+    parts = parts_of(own.problem, cause, own.point.effects)
     if not parts:
         return None
     report(f"fitting {' and '.join(parts)} instead of {cause}")
@@ -148,36 +146,9 @@ def _stands_for(
     What it adds to those would have shown as the others. Beside its limit either could be done
     without. In the place of all of them, one effect is the simpler explanation.
     """
-    parts = {*_parts(problem, effect, values)}
+    parts = {*parts_of(problem, effect, values)}
     there = parts & {*causes}
     return bool(there) and (len(parts) == 1 or there != parts)
-
-
-def limit_of(own: Fit, cause: CauseId) -> EffectName | None:
-    """The effect that a cause has as its limit, see :func:`limit_at`; None without one."""
-    if isinstance(cause, Coefficient) or cause not in own.effects:
-        return None
-    return limit_at(own.problem, cause, own.point.effects)
-
-
-def limit_at(problem: Problem, effect: EffectName, values: Values) -> EffectName | None:
-    """The one effect that another does nearly the same as, if some parameter hardly acts.
-
-    Args:
-        problem: knows the effects.
-        effect: the effect.
-        values: of its parameters, and perhaps of others.
-    """
-    parts = _parts(problem, effect, values)
-    return EffectName(next(iter(parts))) if len(parts) == 1 else None
-
-
-def _parts(problem: Problem, effect: EffectName, values: Values) -> Parts:
-    """What together does nearly the same as an effect with these values, if all of it is known."""
-    known = problem.known
-    ids = (EffectParameterId(effect, p.name) for p in known[effect].parameters)
-    parts = known[effect].in_parts({id.name: values[id] for id in ids})
-    return parts if {*parts} <= {*known} else {}
 
 
 def without(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from scipy.special import chdtri
 
 from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.coarse_fit import CoarseFit
@@ -18,7 +19,17 @@ from fish_env.inference.hypotheses import (
     EffectParameterId,
     ParameterId,
 )
+from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point
+
+
+def may_not_act(fit: Fit, cause: CauseId) -> bool:
+    """Whether the 95 % region of what switches a cause on holds the values at which it is off.
+
+    The region is corrected for coloured residuals.
+    """
+    off = off_values(fit, cause)
+    return bool(from_off(fit, off) < chdtri(len(off), POLICY.interval_error))
 
 
 def from_off(fit: Fit, off: Mapping[ParameterId, float]) -> float:

@@ -1,0 +1,54 @@
+"""An effect that has another one as its limit is no rival where the data show no more than that."""
+
+import numpy as np
+import pytest
+
+from fish_env.inference.effects import DeclaredEffect, EffectParameter
+from fish_env.inference.estimate.fit import fit
+from fish_env.inference.explanation import Explanation
+from fish_env.inference.rivals import rivals_of
+from tests.inference.stated import SIZE, Stated, effect
+
+SIMPLE, FULLER, END = "simple", "fuller", "end"
+
+
+def known(contains):
+    """An effect, and one that does the same beside what its end does."""
+    end = EffectParameter(END, "-", 0.0, plausible=(-1.0, 1.0))
+    size = EffectParameter(SIZE, "-", 0.0, plausible=(-1.0, 1.0), shapes=True)
+    limit = {SIMPLE: {SIZE: 1.0}} if contains else {}
+    return effect(SIMPLE), DeclaredEffect(FULLER, (end, size), parts=lambda values: limit)
+
+
+def explained(end, contains, told=0.05):
+    """Explanations by either effect of what one of them has done, with noise.
+
+    Args:
+        end: of the fuller effect.
+        contains: whether it is known to have the other as its limit.
+        told: how much the data tell of its end; little costs no evidence.
+    """
+    rng = np.random.default_rng(2)
+    x, y, noise = rng.standard_normal((3, 4, 50))
+
+    def residuals(z, effects):
+        done = {(id.effect, id.name): value for id, value in effects.items()}
+        size = done[SIMPLE, SIZE] + done[FULLER, SIZE]
+        return 10.0 * ((size - 0.5) * x + told * (done[FULLER, END] - end) * y) + noise + z[0]
+
+    stated = Stated(residuals, known(contains))
+    return [
+        Explanation((name,), fit(stated, (name,), refit_noise=False)) for name in (SIMPLE, FULLER)
+    ]
+
+
+@pytest.mark.parametrize("contains", [True, False])
+def test_an_effect_at_its_limit_is_no_rival(contains):
+    simple, fuller = explained(end=0.0, contains=contains)
+    assert rivals_of(simple, [fuller]) == (() if contains else (fuller,))
+
+
+def test_an_effect_beyond_its_limit_leads():
+    simple, fuller = explained(end=0.5, contains=True, told=1.0)
+    assert fuller.score < simple.score
+    assert rivals_of(fuller, [simple]) == ()

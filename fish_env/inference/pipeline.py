@@ -21,11 +21,13 @@ from fish_env.inference.adequacy import (
 from fish_env.inference.attribution import Attribution, attribute, extended
 from fish_env.inference.budget import Budget, error_budget
 from fish_env.inference.effort import FULL, Effort
+from fish_env.inference.elimination import without_idle
 from fish_env.inference.estimate.again import finished, refined, to_publish, to_search
 from fish_env.inference.estimate.fit import FEWER_STEPS, Fit, fit
 from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.gain import gap_closed
 from fish_env.inference.lookalikes import decided, still_alike, undecided
+from fish_env.inference.parallel import side_by_side
 from fish_env.inference.partial import Describe, confirmed
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause, causes_of
@@ -178,6 +180,8 @@ def partly(
     rivals = (*rates, *lags)
     if disturbance_at_limit(found.fit):
         rivals = (*rivals, *undecided(found, attribution.shown, report))
+    plain = side_by_side([partial(without_idle, other) for other in rivals])
+    rivals = tuple(other for other in plain if other.causes != found.causes)
     shared = {*found.causes}.intersection(*(other.causes for other in rivals))
     if not shared:
         return attribution, verdict

@@ -1,7 +1,7 @@
 """Runs a suite of hidden effects and writes its rates and answers to a dated file.
 
-Each finished case is kept, so a stopped run goes on where it was. A part of a suite is written
-beside other results of the day, a whole one in their place:
+Each finished case is kept, so a stopped run goes on where it was. Its result takes the place of one
+of the same day; what `--finished` sums up is written beside it:
 
     python scripts/benchmark_diagnosis.py --tiers rich,null --limit 20
     python scripts/benchmark_diagnosis.py --suite realistic
@@ -119,8 +119,7 @@ def write(rows: list[Any], options: argparse.Namespace) -> None:
     page = suite.page(today(), said, summary)
     content = {"seed0": seed0, **summary, "rows": [asdict(row) for row in rows]}
     kind = f"{suite.result}-quick" if options.quick else suite.result
-    part = bool(options.tiers or options.limit or options.finished)
-    write_dated(options.out, kind, content, page, beside=part)
+    write_dated(options.out, kind, content, page, beside=options.finished)
     print(page)
 
 

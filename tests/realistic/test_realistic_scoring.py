@@ -316,6 +316,8 @@ def test_the_benchmark_goes_on_where_it_stopped(tmp_path, capsys):
     assert met["nothing named in pure noise"] is True
     assert met["foreign plant told as such"] is False
     assert "Realistic suite" in capsys.readouterr().out
+    script.main([*options, "--finished"])
+    assert len([*tmp_path.glob("realistic-*.json")]) == 2
     with pytest.raises(SystemExit):
         script.main(["--suite", "realistic", "--tiers", "rich"])
     assert "no tier rich" in capsys.readouterr().err

@@ -72,7 +72,8 @@ def where_others_follow(own: Fit, begin: CoarseFit) -> Point:
     kept = {id: own.ids.index(id) for id in free.ids}
     off = {
         id: value
-        for name in {*own.effects} - {*begin.effects}
+        for name in own.effects
+        if name not in begin.effects
         for id, value in off_values(own, EffectName(name)).items()
     }
     gone = [own.ids.index(id) for id in off]

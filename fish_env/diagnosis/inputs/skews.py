@@ -175,7 +175,7 @@ def _by_shift(
     """Score of every offset of the commands (low is good), and the offsets, s."""
     most = round(CHECKS.largest_clock_offset_s / SPACING_S)
     total = np.zeros(2 * most + 1)
-    for name in {name for answers in measured for name in answers}:
+    for name in dict.fromkeys(name for answers in measured for name in answers):
         error, size, count = (np.zeros(2 * most + 1) for _ in range(3))
         for m, g in zip(measured, swum, strict=True):
             if name in m and name in g and len(m[name]) > 2:

@@ -58,7 +58,8 @@ class Weighed:
             * (1.0 if name == BEAT else CHECKS.comparison_weight)
             * windows[name]
             * float(np.log((mine[name] + least) / (theirs[name] + least)))
-            for name in mine.keys() & theirs.keys()
+            for name in mine
+            if name in theirs
         )
 
     def of_runs(self, runs: Collection[str]) -> Weighed:

@@ -12,7 +12,7 @@ import numpy as np
 from fish_env.arrays import FloatArray, IntArray
 from fish_env.inference.adequacy import disturbance_at_limit
 from fish_env.inference.effects import EffectParameter
-from fish_env.inference.estimate.again import search_steps, with_run_variation
+from fish_env.inference.estimate.again import taken_on, with_run_variation
 from fish_env.inference.estimate.coarse_fit import CoarseFit
 from fish_env.inference.estimate.fit import FEWER_STEPS, Fit, fit
 from fish_env.inference.estimate.information import information, prior_precision
@@ -181,6 +181,14 @@ def exchanged(before: Explanation, after: Explanation) -> list[tuple[CauseId, Ca
     return [(a, b) for a, b in zip(before.causes, after.causes, strict=False) if a != b]
 
 
+def swap_between(before: Explanation, after: Explanation) -> tuple[CauseId, CauseId] | None:
+    """The cause and what has its place, if two explanations differ in one of their causes."""
+    if len(before.causes) != len(after.causes):
+        return None
+    swaps = exchanged(before, after)
+    return swaps[0] if len(swaps) == 1 else None
+
+
 def reached(make: Callable[[], T]) -> T | None:
     """A fit; None where the simulation diverges before it can begin."""
     try:
@@ -207,17 +215,5 @@ def in_steps_of(problem: Problem, current: Explanation) -> Explanation:
 
 
 def fitted_again(problem: Problem, at: CoarseFit | Fit, noise: Any, rounds: int = 2) -> Fit | None:
-    """A fit taken on, its noise estimated anew; None where the simulation diverges.
-
-    Args:
-        problem: the runs, perhaps not those of the fit.
-        at: where to begin, and what is free.
-        noise: noise model to begin from.
-        rounds: most alternations between parameters and disturbance.
-    """
-    return reached(
-        lambda: fit(
-            problem, at.effects, at.point, noise, at.released,
-            rounds=rounds, iterations=search_steps(problem),
-        )
-    )  # fmt: skip
+    """As :func:`taken_on`; None where the simulation diverges."""
+    return reached(partial(taken_on, problem, at, noise, rounds))

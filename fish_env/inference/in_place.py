@@ -100,15 +100,9 @@ def begun_without(
     if runs is not own.problem:
         return runs, begin
     points = [begin.point, where_others_follow(own, begin)]
-    values = [_left_at(own, begin, point) for point in points]
+    start = [(begin.effects, point, own.noise, begin.released) for point in points]
+    values = [objective_at(runs, *one) for one in start]
     return runs, replace(begin, point=points[int(np.argmin(values))])
-
-
-def _left_at(own: Fit, begin: CoarseFit, point: Point) -> float:
-    try:
-        return objective_at(own.problem, begin.effects, point, own.noise, begin.released)
-    except np.linalg.LinAlgError:
-        return np.inf
 
 
 def in_step(runs: Problem, own: Fit, cause: CauseId, at: CoarseFit) -> Problem:

@@ -19,7 +19,7 @@ from fish_env.inference.elimination import surely_acts
 from fish_env.inference.estimate.again import finished
 from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter, where_ended
 from fish_env.inference.estimate.fit import Fit
-from fish_env.inference.explanation import Explanation, exchanged, reached
+from fish_env.inference.explanation import Explanation, reached, swap_between
 from fish_env.inference.hypotheses import (
     CauseId,
     EffectName,
@@ -306,7 +306,7 @@ def still_alike(
     """
     still, pairs = list[Explanation](), late(found)
     for rival in rivals:
-        swap = _swap(before, rival)
+        swap = swap_between(before, rival)
         if swap not in pairs:
             continue
         if found is before:
@@ -314,14 +314,6 @@ def still_alike(
         elif (other := _beside_fewer(found, *swap, rival, report)) and alike(found, other):
             still.append(other)
     return tuple(still)
-
-
-def _swap(before: Explanation, rival: Explanation) -> tuple[CauseId, CauseId] | None:
-    """The cause and what has its place, if two explanations differ in one of their causes."""
-    if len(before.causes) != len(rival.causes):
-        return None
-    swaps = exchanged(before, rival)
-    return swaps[0] if len(swaps) == 1 else None
 
 
 def _beside_fewer(

@@ -215,8 +215,7 @@ def _fitted(problem: Problem, current: Explanation, coarse: CoarseFit) -> Iterat
     as_known = Point(own.point.z, {**coarse.point.effects, **own.point.effects})
 
     def left(point: Point) -> float:
-        value = reached(partial(objective_at, problem, coarse.effects, point, own.noise))
-        return np.inf if value is None else value
+        return objective_at(problem, coarse.effects, point, own.noise)
 
     best, second, _ = sorted((coarse.point, as_known, faint), key=left)
     for begin in (best, second) if best is faint else (best,):

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import stdtrit
 
 from fish_env.inference.adequacy import implausible_estimates
-from fish_env.inference.explanation import Explanation, exchanged
+from fish_env.inference.explanation import Explanation, swap_between
 from fish_env.inference.hypotheses import CauseId, Coefficient
 from fish_env.inference.left_out import left_out_scores
 from fish_env.inference.limits import limit_of
@@ -37,12 +37,10 @@ def _is_at_limit(best: Explanation, other: Explanation) -> bool:
     A servo of a torque without end has a largest rate and nothing else: if the data do not show an
     end, the simpler effect says all that they do.
     """
-    if len(best.causes) != len(other.causes):
+    swap = swap_between(best, other)
+    if swap is None:
         return False
-    swaps = exchanged(best, other)
-    if len(swaps) != 1:
-        return False
-    (cause, stand_in), own = swaps[0], other.fit
+    (cause, stand_in), own = swap, other.fit
     return limit_of(own, stand_in) == cause and may_not_act(own, stand_in)
 
 

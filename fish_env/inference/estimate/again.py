@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from fish_env.inference.estimate.coarse_fit import CoarseFit, where_ended
+from fish_env.inference.estimate.coarse_fit import CoarseFit
 from fish_env.inference.estimate.fit import FEWER_STEPS, USUAL_STEPS, Fit, fit
 from fish_env.inference.estimate.free import DIFFERENCE, Free, linearise, spread_of
 from fish_env.inference.estimate.gauss_newton import predicted_decrease
@@ -66,8 +67,7 @@ def quietened(own: Fit) -> Fit:
         if problem.variations:
             numbers = np.where(spread_of(problem, noise) > 0.0, problem.variation, 0.0)
             problem = problem.with_variation(numbers, own.point, noise)
-        start, steps = (own.effects, own.point, noise, own.released), search_steps(problem)
-        again = fit(problem, *start, rounds=2, iterations=steps)
+        again = taken_on(problem, own, noise)
     except np.linalg.LinAlgError:
         return own
     return again if again.objective < own.objective else own
@@ -98,6 +98,22 @@ def search_steps(problem: Problem) -> int:
     long, and what is still missing moves estimates by more than further steps would.
     """
     return FEWER_STEPS if problem.drive.uneven else USUAL_STEPS
+
+
+def taken_on(problem: Problem, at: CoarseFit | Fit, noise: Any, rounds: int = 2) -> Fit:
+    """A fit taken on in the steps of a search, its noise estimated anew.
+
+    Args:
+        problem: the runs, perhaps not those of the fit.
+        at: where to begin, and what is free.
+        noise: noise model to begin from.
+        rounds: most alternations between parameters and disturbance.
+
+    Raises:
+        LinAlgError: the simulation diverges there.
+    """
+    start, steps = (at.effects, at.point, noise, at.released), search_steps(problem)
+    return fit(problem, *start, rounds=rounds, iterations=steps)
 
 
 def to_search(problem: Problem, begin: CoarseFit | None = None) -> Problem:
@@ -205,6 +221,4 @@ def with_run_variation(
         noise = replace(own.noise, spread=found.sd)
     if noise is own.noise and begin is None:
         return own
-    at = begin or where_ended(own)
-    start, steps = (at.effects, at.point, noise, at.released), search_steps(problem)
-    return fit(problem, *start, rounds=2, iterations=steps)
+    return taken_on(problem, begin or own, noise)

@@ -305,8 +305,11 @@ def objective_at(
     free = Free(problem, effects, released)
     values = {**problem.neutral(effects), **point.effects}
     vector = free.bounds.clip(free.pack(Point(point.z, values)))
-    problem = problem.settled(free.unpack(vector), noise)
-    value, _ = objective(problem, free, vector, noise)
+    try:
+        settled = problem.settled(free.unpack(vector), noise)
+        value, _ = objective(settled, free, vector, noise)
+    except np.linalg.LinAlgError:
+        return np.inf
     return value if np.isfinite(value) else np.inf
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from fish_env.inference.effects import Parts
+from fish_env.inference.effects import EffectParameter, Parts
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.hypotheses import CauseId, Coefficient, EffectName, EffectParameterId
 from fish_env.inference.problem import Problem
@@ -29,6 +29,32 @@ def limit_at(problem: Problem, effect: EffectName, values: Values) -> EffectName
     """
     parts = parts_of(problem, effect, values)
     return EffectName(next(iter(parts))) if len(parts) == 1 else None
+
+
+def does_no_more(problem: Problem, effect: EffectName, values: Values, than: CauseId) -> bool:
+    """Whether an effect with these values is another cause, and something too faint to be itself.
+
+    It is if the other cause is one of its parts, and all that switches it on is nearer to neutral
+    than what is plausible. A tail too stiff to bend, whose servo lags, is a servo that lags.
+
+    Args:
+        problem: knows the effects.
+        effect: the effect.
+        values: of its parameters, and perhaps of others.
+        than: the other cause.
+    """
+    if than not in parts_of(problem, effect, values):
+        return False
+    switching = problem.known[effect].switching
+    return all(_is_faint(p, values[EffectParameterId(effect, p.name)]) for p in switching)
+
+
+def _is_faint(parameter: EffectParameter, value: float) -> bool:
+    """Whether a value lies between neutral and what is plausible."""
+    low, high = parameter.plausible
+    if low <= parameter.neutral <= high:
+        return False
+    return value > high if parameter.neutral > high else value < low
 
 
 def parts_of(problem: Problem, effect: EffectName, values: Values) -> Parts:

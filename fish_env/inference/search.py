@@ -16,6 +16,7 @@ from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.explanation import Explanation, fitted_again, reached
 from fish_env.inference.hypotheses import CauseId, Coefficient, EffectParameterId, name_of
+from fish_env.inference.limits import does_no_more
 from fish_env.inference.parallel import side_by_side
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
@@ -122,6 +123,7 @@ def restart_from_winner(
     coarse = _all(partial(again, s) for s in others)
     finalists = _finalists(coarse, fitter.base, 0.0, FULL.finalists)
     finalists = [f for f in finalists if f[1].objective < enough]
+    finalists = _with_more(best.problem, tried[0].causes[-1], fitter.base, finalists)
     more = _rest(current, finalists, best, report)
     return _best_first([*tried, *more], tried[0])[0]
 
@@ -200,8 +202,29 @@ def _led(
         leader = in_full(base.problem, coarse, base.noise)
         if leader is not None:
             first = Explanation((*current.causes, name), leader)
+            left = _with_more(base.problem, name, coarse.objective, left)
             return [first, *_rest(current, left, leader, report)]
     return []
+
+
+def _with_more(
+    problem: Problem, leading: CauseId, reached: float, finalists: list[NamedCoarseFit]
+) -> list[NamedCoarseFit]:
+    """The finalists without causes that have more numbers than the leading one for nothing.
+
+    Args:
+        problem: knows the effects.
+        leading: the leading cause.
+        reached: objective of its coarse fit.
+        finalists: other coarse fits.
+    """
+    return [
+        (name, coarse)
+        for name, coarse in finalists
+        if isinstance(name, Coefficient)
+        or coarse.objective < reached
+        or not does_no_more(problem, name, coarse.point.effects, leading)
+    ]
 
 
 def _gaining(

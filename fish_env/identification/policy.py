@@ -45,6 +45,8 @@ class IdentificationPolicy(Numbers):
             servo still follows what it was told before.
         smeared_gyro_s: time after a jump of a command in which no sample of a gyro judges anything
             (s), as the gyro may have a low-pass inside.
+        enough_samples_per_s: samples a second that a fit uses, of more.
+        samples_per_beat: samples that it uses in a beat, where that needs more.
         outliers_at_jumps_level: p-value of as many outliers near jumps of commands below which they
             are motion.
         copied_noise: root mean square by which the noise of two runs differs, over that of one,
@@ -115,6 +117,10 @@ class IdentificationPolicy(Numbers):
         5.0,
         "0.14 s to a twentieth after a low-pass of 5 Hz, and 0.02 s by which clocks differ",
     )
+    enough_samples_per_s: float = number(
+        25.0, 1.0, 1e4, f"that of the data sets that levels were calibrated on; {EFFORT}"
+    )
+    samples_per_beat: float = number(8.0, 2.0, 100.0, EFFORT)
     outliers_at_jumps_level: float = number(0.01, 1e-6, 0.5, BY_HAND)
     copied_noise: float = number(
         0.5,

@@ -16,6 +16,7 @@ from fish_env.identification.command_jumps import SAME_INSTANT_S, jump_times, ju
 from fish_env.identification.first_state import first_state
 from fish_env.identification.late_rows import in_earlier_rows, rows_to_spare
 from fish_env.identification.policy import IDENTIFICATION
+from fish_env.identification.spare_rows import needed_rows
 from fish_env.identification.state_blocks import PHASE_COLUMN
 from fish_env.identification.variation import (
     BEAT,
@@ -289,7 +290,7 @@ def prepare_run(
     dt: float = 0.01,
     noise_scale: FloatArray | None = None,
 ) -> RunData:
-    """Read a run for the filter.
+    """Read a run for the filter, without the rows that it can spare.
 
     Args:
         run: measured run.
@@ -306,11 +307,13 @@ def prepare_run(
     clock, measured = _merged(
         run.time_s - run.time_s[0], np.column_stack([run.channels[name] for name in channels])
     )
+    scale = np.ones(1) if noise_scale is None else noise_scale
+    state0, covariance0 = first_state(run, channels, measured, clock, noise_sd * scale)
+    kept = needed_rows(clock, measured, float(run.commands.values[:, FREQUENCY].max()))
+    clock, measured = clock[kept], measured[kept]
     switches = run.commands.times_s - run.time_s[0]
     fresh = just_after(switches[jumped(run.commands.values)], clock)
     substeps = _steps(clock, np.where(fresh, dt / FINER, dt))
-    scale = np.ones(1) if noise_scale is None else noise_scale
-    state0, covariance0 = first_state(run, channels, measured, clock, noise_sd * scale)
     if run.start == "rest":
         measured[clock < IDENTIFICATION.untold_start_s] = np.nan
     # Where the tail is at the first sample is known only once it has moved.

@@ -16,7 +16,7 @@ from fish_env.inference.elimination import (
     without_idle,
     without_insignificant,
 )
-from fish_env.inference.estimate.again import finished, quietened
+from fish_env.inference.estimate.again import arrived, finished, quietened
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.first_screen import first_screen, with_differences
@@ -386,7 +386,7 @@ class Search:
 
         The others begin again from where the best one is, if it leaves something.
         """
-        best = Explanation(tried[0].causes, quietened(tried[0].fit))
+        best = Explanation(tried[0].causes, arrived(quietened(tried[0].fit)))
         tried = [best, *tried[1:]]
         after = screen(best.fit, self.causes, self.rng)
         problem = best.fit.problem

@@ -32,13 +32,7 @@ def finished(own: Fit) -> Fit:
     likelihoods are rough, and a fit ends where steps follow that.
     """
     for _ in range(1 if spread_of(own.problem, own.noise).any() else MORE):
-        free = Free(own.problem, own.effects, own.released)
-        vector = free.pack(own.point)
-        lin = own.linearised
-        hessian = information(lin.slopes, free.prior)
-        pull = gradient(lin.slopes, lin.residuals, free.prior, vector)
-        step = free.bounds.beside(vector).step(hessian, pull, vector)
-        if predicted_decrease(hessian, pull, step) < POLICY.converged:
+        if _left_to_gain(own) < POLICY.converged:
             break
         again = fit(own.problem, own.effects, own.point, own.noise, own.released, rounds=2)
         gained = own.objective - again.objective
@@ -47,6 +41,27 @@ def finished(own: Fit) -> Fit:
         if gained < POLICY.converged:
             break
     return own
+
+
+def arrived(own: Fit) -> Fit:
+    """A fit that is near its minimum under its own noise, taken on if it is not.
+
+    What a step more would still explain shows as another cause otherwise.
+    """
+    if _left_to_gain(own) < POLICY.evidence_doubt:
+        return own
+    start = own.point, own.noise, own.released
+    return fit(own.problem, own.effects, *start, refit_noise=False, iterations=FEWER_STEPS)
+
+
+def _left_to_gain(own: Fit) -> float:
+    """By how much -2 log likelihood would fall with the next step."""
+    free = Free(own.problem, own.effects, own.released)
+    vector, lin = free.pack(own.point), own.linearised
+    hessian = information(lin.slopes, free.prior)
+    pull = gradient(lin.slopes, lin.residuals, free.prior, vector)
+    step = free.bounds.beside(vector).step(hessian, pull, vector)
+    return predicted_decrease(hessian, pull, step)
 
 
 def quietened(own: Fit) -> Fit:

@@ -269,7 +269,8 @@ def _best_first(
     first = None if ranked[0] is leader else _noise_too(problem, own)
     if first is None:
         return ranked, own.noise
-    tasks = [partial(at_noise, problem, e.fit, first.noise, 2) for e in ranked[1:]]
+    beyond = first.objective + POLICY.out_of_reach
+    tasks = [partial(at_noise, problem, e.fit, first.noise, 2, beyond) for e in ranked[1:]]
     pairs = zip(ranked[1:], side_by_side(tasks), strict=True)
     others = [Explanation(e.causes, fitted) for e, fitted in pairs if fitted]
     return [Explanation(ranked[0].causes, first), *others], first.noise

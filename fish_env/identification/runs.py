@@ -16,8 +16,8 @@ from fish_env.identification.command_jumps import SAME_INSTANT_S, jump_times, ju
 from fish_env.identification.first_state import first_state
 from fish_env.identification.late_rows import in_earlier_rows, rows_to_spare
 from fish_env.identification.policy import IDENTIFICATION
-from fish_env.identification.spare_rows import needed_rows
 from fish_env.identification.state_blocks import PHASE_COLUMN
+from fish_env.identification.thinning import kept_rows
 from fish_env.identification.variation import (
     BEAT,
     COUNT,
@@ -290,7 +290,7 @@ def prepare_run(
     dt: float = 0.01,
     noise_scale: FloatArray | None = None,
 ) -> RunData:
-    """Read a run for the filter, without the rows that it can spare.
+    """Read a run for the filter, thinned where it comes faster than a beat needs.
 
     Args:
         run: measured run.
@@ -309,7 +309,7 @@ def prepare_run(
     )
     scale = np.ones(1) if noise_scale is None else noise_scale
     state0, covariance0 = first_state(run, channels, measured, clock, noise_sd * scale)
-    kept = needed_rows(clock, measured, float(run.commands.values[:, FREQUENCY].max()))
+    kept = kept_rows(clock, measured, float(run.commands.values[:, FREQUENCY].max()))
     clock, measured = clock[kept], measured[kept]
     switches = run.commands.times_s - run.time_s[0]
     fresh = just_after(switches[jumped(run.commands.values)], clock)

@@ -22,7 +22,13 @@ from fish_env.inference.attribution import Attribution, attribute, extended
 from fish_env.inference.budget import Budget, error_budget
 from fish_env.inference.effort import FULL, Effort
 from fish_env.inference.elimination import without_idle
-from fish_env.inference.estimate.again import finished, refined, to_publish, to_search
+from fish_env.inference.estimate.again import (
+    finished,
+    refined,
+    to_publish,
+    to_search,
+    under_noise,
+)
 from fish_env.inference.estimate.fit import FEWER_STEPS, Fit, fit
 from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.gain import gap_closed
@@ -261,7 +267,7 @@ def cross_validated(
         half = own.problem.some(mine)
         try:
             noise = half.noise_of(own)
-            fitted = fit(half, own.effects, own.point, noise, own.released, refit_noise=False)
+            fitted = under_noise(half, own, noise)
         except np.linalg.LinAlgError:
             return left
         model = describe(fitted, left.threshold, own.problem.some(other))
@@ -328,9 +334,7 @@ def with_slow_causes(
     if noise is None:
         return attribution, left
     report("searching for slow causes")
-    passing = reached(
-        lambda: fit(own.problem, own.effects, own.point, noise, own.released, refit_noise=False)
-    )
+    passing = reached(partial(under_noise, own.problem, own, noise))
     if passing is None:
         return attribution, left
     begun = replace(

@@ -11,7 +11,7 @@ import numpy as np
 
 from fish_env.inference.adequacy import disturbance_at_limit
 from fish_env.inference.effort import FULL, Effort
-from fish_env.inference.estimate.again import search_steps, to_search
+from fish_env.inference.estimate.again import search_steps, to_search, under_noise
 from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
 from fish_env.inference.estimate.fit import Fit, fit
 from fish_env.inference.explanation import Explanation, fitted_again, reached
@@ -123,7 +123,7 @@ def restart_from_winner(
     coarse = _all(partial(again, s) for s in others)
     finalists = _finalists(coarse, fitter.base, 0.0, FULL.finalists)
     finalists = [f for f in finalists if f[1].objective < enough]
-    finalists = _with_more(best.problem, tried[0].causes[-1], fitter.base, finalists)
+    finalists = _that_do_more(best.problem, tried[0].causes[-1], fitter.base, finalists)
     more = _rest(current, finalists, best, report)
     return _best_first([*tried, *more], tried[0])[0]
 
@@ -202,27 +202,27 @@ def _led(
         leader = in_full(base.problem, coarse, base.noise)
         if leader is not None:
             first = Explanation((*current.causes, name), leader)
-            left = _with_more(base.problem, name, coarse.objective, left)
+            left = _that_do_more(base.problem, name, coarse.objective, left)
             return [first, *_rest(current, left, leader, report)]
     return []
 
 
-def _with_more(
-    problem: Problem, leading: CauseId, reached: float, finalists: list[NamedCoarseFit]
+def _that_do_more(
+    problem: Problem, leading: CauseId, objective: float, finalists: list[NamedCoarseFit]
 ) -> list[NamedCoarseFit]:
-    """The finalists without causes that have more numbers than the leading one for nothing.
+    """The finalists without those that do no more than the leading cause, see :func:`does_no_more`.
 
     Args:
         problem: knows the effects.
         leading: the leading cause.
-        reached: objective of its coarse fit.
+        objective: that its coarse fit reaches.
         finalists: other coarse fits.
     """
     return [
         (name, coarse)
         for name, coarse in finalists
         if isinstance(name, Coefficient)
-        or coarse.objective < reached
+        or coarse.objective < objective
         or not does_no_more(problem, name, coarse.point.effects, leading)
     ]
 
@@ -298,21 +298,8 @@ def at_noise(
     iterations: int,
     give_up_above: float = np.inf,
 ) -> Fit | None:
-    """A few steps on from a fit under one noise model; None where the simulation diverges.
-
-    Args:
-        problem: the runs.
-        at: where to begin, and what is free.
-        noise: noise model, which is kept.
-        iterations: most steps.
-        give_up_above: stop where the objective will not get below this.
-    """
-    return reached(
-        lambda: fit(
-            problem, at.effects, at.point, noise, at.released, refit_noise=False,
-            iterations=iterations, give_up_above=give_up_above,
-        )
-    )  # fmt: skip
+    """As :func:`under_noise`; None where the simulation diverges."""
+    return reached(partial(under_noise, problem, at, noise, iterations, give_up_above))
 
 
 def _noise_too(problem: Problem, own: Fit) -> Fit | None:

@@ -50,8 +50,7 @@ def arrived(own: Fit) -> Fit:
     """
     if _left_to_gain(own) < POLICY.evidence_doubt:
         return own
-    start = own.point, own.noise, own.released
-    return fit(own.problem, own.effects, *start, refit_noise=False, iterations=FEWER_STEPS)
+    return under_noise(own.problem, own, own.noise, FEWER_STEPS)
 
 
 def _left_to_gain(own: Fit) -> float:
@@ -129,6 +128,31 @@ def taken_on(problem: Problem, at: CoarseFit | Fit, noise: Any, rounds: int = 2)
     """
     start, steps = (at.effects, at.point, noise, at.released), search_steps(problem)
     return fit(problem, *start, rounds=rounds, iterations=steps)
+
+
+def under_noise(
+    problem: Problem,
+    at: CoarseFit | Fit,
+    noise: Any,
+    iterations: int = USUAL_STEPS,
+    give_up_above: float = np.inf,
+) -> Fit:
+    """A few steps on from a fit under one noise model.
+
+    Args:
+        problem: the runs, perhaps not those of the fit.
+        at: where to begin, and what is free.
+        noise: noise model, which is kept.
+        iterations: most steps.
+        give_up_above: stop where the objective will not get below this.
+
+    Raises:
+        LinAlgError: the simulation diverges there.
+    """
+    return fit(
+        problem, at.effects, at.point, noise, at.released, refit_noise=False,
+        iterations=iterations, give_up_above=give_up_above,
+    )  # fmt: skip
 
 
 def to_search(problem: Problem, begin: CoarseFit | None = None) -> Problem:

@@ -1,4 +1,4 @@
-"""Rows that a fit can spare: samples that come faster than a tail's beat needs.
+"""Thinning of fast logs: which rows a fit keeps of samples that come faster than a beat needs.
 
 Each sample costs a step of the filter and memory for its slopes. Of a motion that is known between
 samples, more of them only average noise. A late device is followed back through one interval, which
@@ -18,7 +18,7 @@ KEPT = 0.8
 """Share of its samples that each channel has to keep, of those expected."""
 
 
-def needed_rows(clock: FloatArray, measured: FloatArray, quickest_beat_hz: float) -> IntArray:
+def kept_rows(clock: FloatArray, measured: FloatArray, quickest_beat_hz: float) -> IntArray:
     """Numbers of the rows to keep, the first among them; all where a channel would lose too much.
 
     Channels that are sampled in other rows, as by devices with clocks of their own, keep theirs.

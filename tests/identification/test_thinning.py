@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fish_env.identification.spare_rows import needed_rows
+from fish_env.identification.thinning import kept_rows
 
 NAN = np.nan
 
@@ -21,7 +21,7 @@ def rows(rate, seconds=10.0, channels=3):
 )  # fmt: skip
 def test_evenly_spaced_rows_stay_evenly_spaced(rate, beat, every):
     clock, measured = rows(rate)
-    kept = needed_rows(clock, measured, beat)
+    kept = kept_rows(clock, measured, beat)
     np.testing.assert_array_equal(kept, np.arange(0, len(clock), every))
 
 
@@ -31,7 +31,7 @@ def test_jitter_of_the_times_and_gaps_do_not_shift_the_rows_kept():
     clock[1:-1] += rng.uniform(-2e-3, 2e-3, len(clock) - 2)
     measured[200:240] = NAN
     measured[rng.choice(len(clock), 20), 0] = NAN
-    kept = needed_rows(clock, measured, 2.0)
+    kept = kept_rows(clock, measured, 2.0)
     assert np.all(kept % 4 == 0)
     assert np.isin(np.arange(0, 200, 4), kept).all()
 
@@ -39,10 +39,10 @@ def test_jitter_of_the_times_and_gaps_do_not_shift_the_rows_kept():
 def test_a_slow_device_beside_a_fast_one_keeps_its_samples():
     clock, measured = rows(100)
     measured[np.arange(len(clock)) % 4 != 0, 0] = NAN
-    assert np.all(needed_rows(clock, measured, 2.0) % 4 == 0)
+    assert np.all(kept_rows(clock, measured, 2.0) % 4 == 0)
     measured[:, 0] = NAN
     measured[2::4, 0] = 0.0  # between the rows that would be kept
-    assert len(needed_rows(clock, measured, 2.0)) == len(clock)
+    assert len(kept_rows(clock, measured, 2.0)) == len(clock)
 
 
 def test_rows_that_only_tell_a_command_do_not_count():
@@ -51,5 +51,5 @@ def test_rows_that_only_tell_a_command_do_not_count():
     extra = np.isin(told, (3.333, 7.777))
     wider = np.full((len(told), 3), NAN)
     wider[~extra] = measured
-    kept = needed_rows(told, wider, 2.0)
+    kept = kept_rows(told, wider, 2.0)
     np.testing.assert_allclose(told[kept], clock[::2])

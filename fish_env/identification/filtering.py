@@ -96,6 +96,7 @@ class Measurement:
         bias: (C, N).
         ages: (devices, N) how much older than its row a sample of each device is (s).
         geometry: fields of :mod:`fish_env.sensing.geometry`, each (N,); none for none.
+        cutoff: (N,) of the low-pass inside the inertial unit (Hz); None for none.
     """
 
     pace: FloatArray
@@ -105,6 +106,7 @@ class Measurement:
     bias: FloatArray
     geometry: Mapping[str, FloatArray] = field(default_factory=dict)
     ages: FloatArray | None = None
+    cutoff: FloatArray | None = None
 
     @cached_property
     def device_ages(self) -> FloatArray:
@@ -127,6 +129,7 @@ class Measurement:
             np.ascontiguousarray(self.bias[:, lanes]),
             {name: values[lanes] for name, values in self.geometry.items()},
             None if self.ages is None else np.ascontiguousarray(self.ages[:, lanes]),
+            None if self.cutoff is None else self.cutoff[lanes],
         )
 
     def of_run(self, run: RunData, own: FloatArray, channels: Sequence[str]) -> Measurement:

@@ -184,7 +184,7 @@ def measurement_of(
     """
     pace, delay, by_commands = np.ones(count), np.zeros(count), np.ones(count)
     geometry: dict[str, FloatArray] = {}
-    ages = np.zeros((len(Device), count))
+    ages, cutoff = np.zeros((len(Device), count)), np.full(count, np.inf)
     gain, bias = np.ones((len(channels), count)), np.zeros((len(channels), count))
     for effect in effects:
         base = model.effects.get(effect.name, effect.neutral)
@@ -202,6 +202,8 @@ def measurement_of(
         if effect.geometry is not None:
             geometry |= effect.geometry(own)
         ages += device_ages_s(effect, own, count)
+        if effect.low_pass is not None:
+            cutoff = np.minimum(cutoff, effect.low_pass(own))
         if effect.measure is not None:
             zeros = {name: np.zeros(count) for name in channels}
             ones = {name: np.ones(count) for name in channels}
@@ -218,4 +220,5 @@ def measurement_of(
         np.ascontiguousarray(bias),
         geometry,
         ages if ages.any() else None,
+        cutoff if np.isfinite(cutoff).any() else None,
     )

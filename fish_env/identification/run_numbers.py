@@ -17,8 +17,10 @@ from fish_env.identification.filtering import Filtered, Measurement
 from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.runs import RunData
 from fish_env.identification.sensor_errors import known_slopes
+from fish_env.identification.shared_filter import smoothing
 from fish_env.identification.variation import IN_SAMPLES, VARIATIONS
 from fish_env.inference.problem import Point
+from fish_env.sensing.low_pass import HIGHEST_HZ
 
 MOST_TURNS, AGREED = 6, 0.05
 """In which errors and motion are worked out, and what they may differ by, in units of the noise."""
@@ -49,17 +51,34 @@ class Numbered(Protocol):
 N = TypeVar("N", bound=Numbered)
 
 
-def in_late_rows(problem: N, point: Point) -> N:
-    """The problem with its samples in rows that suit how late devices are in all runs.
+def as_devices_record(problem: N, point: Point, noise: NoiseModel) -> N:
+    """The problem with samples as devices record them that are late and smooth in all runs alike.
 
     Args:
         problem: the runs.
         point: values of the shared parameters.
+        noise: noise model.
+
+    Raises:
+        LinAlgError: the simulation diverges where a filter asks for its motion.
     """
-    late = problem.lane(point)[1].device_ages[:, 0]
-    if all(np.array_equal(run.late, late) for run in problem.runs):
+    moved = _in_late_rows(problem, point)
+    if not any(run.is_smoothed for run in (*moved.runs, *problem.runs)):
+        return moved
+    runs = renumbered(problem, _numbers(problem.runs), point, noise)
+    same = all(a is b for a, b in zip(runs, problem.runs, strict=True))
+    return problem if same else problem.with_runs(runs)
+
+
+def _in_late_rows(problem: N, point: Point) -> N:
+    """The problem with its samples in rows that suit how late devices are in all runs."""
+    sensors = problem.lane(point)[1]
+    late = sensors.device_ages[:, 0]
+    cutoff = np.inf if sensors.cutoff is None else float(sensors.cutoff[0])
+    cutoff = cutoff if cutoff < HIGHEST_HZ else np.inf
+    if all(np.array_equal(run.late, late) and run.cutoff_hz == cutoff for run in problem.runs):
         return problem
-    return problem.with_runs([run.with_late(late) for run in problem.runs])
+    return problem.with_runs([run.with_devices(late, cutoff) for run in problem.runs])
 
 
 def renumbered(
@@ -86,7 +105,8 @@ def renumbered(
     """
     if not np.isfinite(values).all():
         raise np.linalg.LinAlgError("numbers of runs have diverged")
-    problem = in_late_rows(problem, point)
+    filters = [run.cutoff_hz for run in problem.runs]
+    problem = _in_late_rows(problem, point)
     runs = list(problem.runs)
     own, errors = np.split(values, [len(VARIATIONS)], axis=1)
     if near:
@@ -99,23 +119,45 @@ def renumbered(
             for run, before, f in triples
         ]
         return runs if kept and _agree(runs, found, problem.sensor_sd) else found
-    changed = []
-    for i, run in enumerate(runs):
-        if not np.array_equal(_numbers([run])[0], values[i]):
-            changed.append(i)
+    follow: list[int] = []
+    for i, run in enumerate(problem.runs):
+        same = filters[i] == run.cutoff_hz and np.array_equal(_numbers([run])[0], values[i])
+        if not same:
             runs[i] = run.with_numbers(own[i], errors[i])
-    if not errors[changed][:, IN_SAMPLES].any():
-        return runs
-    moved, seen = [runs[i] for i in changed], [problem.runs[i] for i in changed]
-    for _ in range(MOST_TURNS):
-        filtered = problem.with_runs(seen).filtered(point, noise, (), True)
-        turn = zip(moved, seen, filtered, strict=True)
-        before, seen = seen, [_undone(run, s, f, problem.channels) for run, s, f in turn]
-        if _agree(before, seen, problem.sensor_sd):
-            break
-    for i, run in zip(changed, seen, strict=True):
+        if run.is_smoothed or (not same and errors[i, IN_SAMPLES].any()):
+            follow.append(i)
+    put_right = _put_right(problem, [runs[i] for i in follow], follow, point, noise)
+    for i, run in zip(follow, put_right, strict=True):
         runs[i] = run
     return runs
+
+
+def _put_right(
+    problem: Numbered, moved: Sequence[RunData], at: Sequence[int], point: Point, noise: NoiseModel
+) -> list[RunData]:
+    """Runs with what errors and filters do to their samples, by the motion these then show.
+
+    Args:
+        problem: all runs, as they were.
+        moved: some of them with other numbers; one that is as it was stays so if it agrees.
+        at: places of these among all runs.
+        point: values of the shared parameters.
+        noise: noise model.
+
+    Raises:
+        LinAlgError: the simulation diverges.
+    """
+    seen = first = [problem.runs[i] for i in at]
+    for turn in range(MOST_TURNS if at else 0):
+        filtered = problem.with_runs(seen).filtered(point, noise, (), True)
+        each = zip(moved, seen, filtered, strict=True)
+        before, seen = seen, [_undone(run, s, f, problem.channels) for run, s, f in each]
+        if _agree(before, seen, problem.sensor_sd):
+            if turn == 0:
+                pairs = zip(moved, first, seen, strict=True)
+                seen = [own if own is run else other for own, run, other in pairs]
+            break
+    return seen
 
 
 def _undone(run: RunData, seen: RunData, filtered: Filtered, channels: Sequence[str]) -> RunData:
@@ -128,7 +170,8 @@ def _undone(run: RunData, seen: RunData, filtered: Filtered, channels: Sequence[
         channels: names of its channels.
     """
     slopes = known_slopes(seen, filtered, channels)
-    return replace(run, distortion=_in_samples(slopes, run.sensor_errors))
+    shared = smoothing(run, filtered, channels)
+    return replace(run, distortion=_in_samples(slopes, run.sensor_errors) + shared)
 
 
 def _moved(run: RunData, seen: RunData, filtered: Filtered, channels: Sequence[str]) -> RunData:

@@ -27,6 +27,7 @@ from fish_env.identification.variation import (
     device_ages,
 )
 from fish_env.sensing.devices import Device, devices_of
+from fish_env.sensing.low_pass import late_s
 
 PHASE = PHASE_COLUMN
 BEFORE_S = 1e3
@@ -73,6 +74,7 @@ class RunData:
             what is known of the devices' delays; None where rows stay.
         devices: (C,) device of each channel, where rows may be moved.
         late: (devices,) how late each device is in all runs (s), beside what is a run's own.
+        cutoff_hz: of the low-pass inside the inertial unit, in all runs; infinite for none.
         moved: (devices,) rows by which the samples of each device were moved to earlier ones.
         noise_scale: (C,) noise of its sensors over the usual one, or one number for all.
         usual_substeps: (T,) of published estimates, where ``substeps`` are fewer; else None.
@@ -100,6 +102,7 @@ class RunData:
     recorded: FloatArray | None = None
     devices: IntArray | None = None
     late: FloatArray = field(default_factory=lambda: np.zeros(len(Device)))
+    cutoff_hz: float = np.inf
     moved: IntArray = field(default_factory=lambda: np.zeros(len(Device), np.int64))
     noise_scale: FloatArray = field(default_factory=lambda: np.ones(1))
     usual_substeps: IntArray | None = None
@@ -131,9 +134,27 @@ class RunData:
         own = replace(self, variation=variation, sensor_errors=sensor_errors, distortion=None)
         return own._in_last_rows()
 
-    def with_late(self, late: FloatArray) -> RunData:
-        """The same run where devices are late by other times (devices,) in all runs (s)."""
-        return replace(self, late=late)._in_last_rows()
+    @property
+    def is_smoothed(self) -> bool:
+        """Whether all runs share a low-pass that takes something off the motion."""
+        return bool(np.isfinite(self.cutoff_hz))
+
+    def with_devices(self, late: FloatArray, cutoff_hz: float) -> RunData:
+        """The same run where other times and another filter make devices late in all runs.
+
+        What the filter does to samples beside that follows from the motion, and is as before.
+
+        Args:
+            late: (devices,) how late each is (s), by its filter too.
+            cutoff_hz: of the low-pass inside the inertial unit; infinite for none.
+        """
+        return replace(self, late=late, cutoff_hz=cutoff_hz)._in_last_rows()
+
+    def with_cutoff(self, cutoff_hz: float) -> RunData:
+        """The same samples in the same rows as if another low-pass had made them as late."""
+        late = self.late.copy()
+        late[Device.INERTIAL] += late_s(cutoff_hz) - late_s(self.cutoff_hz)
+        return replace(self, late=late, cutoff_hz=cutoff_hz)
 
     def _in_last_rows(self) -> RunData:
         """The same run with its samples in the last rows before their devices took them."""

@@ -32,10 +32,11 @@ from fish_env.identification.open_loop import in_units_of_noise, windows
 from fish_env.identification.parameters import ALIKE, baseline_of, changes_of, neutral_values
 from fish_env.identification.phases import settle_phases
 from fish_env.identification.run_noise import noise_scales
-from fish_env.identification.run_numbers import in_late_rows, renumbered
+from fish_env.identification.run_numbers import as_devices_record, renumbered
 from fish_env.identification.runs import prepare_run
 from fish_env.identification.sensor_errors import slopes_of_runs
 from fish_env.identification.sensors import largest_jitter_of, largest_noise
+from fish_env.identification.shared_filter import by_other_filters
 from fish_env.identification.steps import Stepped
 from fish_env.identification.tail_drive import LATE, LATE_SENSORS, TailDrive
 from fish_env.identification.variation import COMMON, EVERY, USUAL, VARIATIONS
@@ -200,9 +201,14 @@ class SeriesProblem(Stepped):
         """Whether a disturbance is as strong as any that a noise model may have."""
         return bool(widest_disturbance(self.fish).left_by(noise))
 
+    @property
+    def samples_follow(self) -> bool:
+        """Whether all runs share a low-pass inside the inertial unit."""
+        return any(run.is_smoothed for run in self.runs)
+
     def settled(self, point: Point, noise: NoiseModel, nearby: bool = False) -> SeriesProblem:
         """The same problem with the likeliest phases of tails that have none, and of a wave."""
-        own = settle_phases(in_late_rows(self, point), point, noise, nearby)
+        own = settle_phases(as_devices_record(self, point, noise), point, noise, nearby)
         return settle_wave_phases(own, point, noise)
 
     @cached_property
@@ -298,7 +304,20 @@ class SeriesProblem(Stepped):
             pushes: a prescribed wrench for each point.
         """
         lanes = self.lanes(z, effects)
-        return self.filter_for(effects).innovations(*lanes, noise, filtered, pushes)
+        rows = self.filter_for(effects).innovations(*lanes, noise, filtered, pushes)
+        cutoffs = lanes[1].cutoff
+        if cutoffs is not None and self._filters_differ(cutoffs, filtered):
+            seen = self.runs, filtered, self.channels
+            rows -= by_other_filters(*seen, noise.correlation_s, cutoffs)
+        return rows
+
+    def _filters_differ(self, cutoffs_hz: FloatArray, filtered: Sequence[Filtered]) -> bool:
+        """Whether some points (N,) have another low-pass than the samples were put right for.
+
+        Where nothing corrects the simulation, samples stay as they are. All runs share the filter.
+        """
+        follow = self.samples_follow and all(one.slopes is not None for one in filtered)
+        return follow and bool((cutoffs_hz != self.runs[0].cutoff_hz).any())
 
     def changes(
         self,
@@ -322,14 +341,19 @@ class SeriesProblem(Stepped):
     ) -> list[Filtered]:
         """Extended Kalman filter of every run at one point (see the protocol).
 
-        It begins where its run does, and not ``near`` another one. Where runs differ it keeps in
-        any case what :meth:`RunFilter.replay` needs.
+        It begins where its run does, and not ``near`` another one. Where runs differ, and where
+        samples follow the motion, it keeps in any case what :meth:`RunFilter.replay` needs.
         """
-        keep = keep_slopes or bool(noise.spread.any())
+        keep = keep_slopes or self.samples_follow or bool(noise.spread.any())
         return self.filter_for(point.effects).run(*self.lane(point), noise, keep)
 
     def lasting(self, filtered: Sequence[Filtered]) -> list[Filtered]:
-        """The filtered runs without the slopes of their filters, a third of what a fit holds."""
+        """The filtered runs without the slopes of their filters, a third of what a fit holds.
+
+        Where samples follow the motion these are needed wherever parameters are compared.
+        """
+        if self.samples_follow:
+            return list(filtered)
         return [replace(run, slopes=None) for run in filtered]
 
     def lane(self, point: Point) -> tuple[FloatArray, Measurement]:

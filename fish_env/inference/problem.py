@@ -311,8 +311,15 @@ class Problem(Protocol):
         """Whether a disturbance is as strong as any that a noise model may have."""
         return False
 
+    @property
+    def samples_follow(self) -> bool:
+        """Whether samples are put right by the motion estimated, so that settling goes on."""
+        return False
+
     def settled(self, point: Point, noise: Any, nearby: bool = False) -> Problem:
         """The same problem with what is unknown of each run's start where it suits a point.
+
+        Where samples follow the motion, they are those that suit the point.
 
         Args:
             point: values of the parameters.

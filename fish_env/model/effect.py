@@ -112,6 +112,8 @@ class Effect(Switched):
         command_time: (recorded time array, parameters) -> true time array, of commands.
         late: parameters -> name of a device, ``camera``, ``inertial`` or ``depth`` -> by how much
             later it shows what was than the true time says (s; measurement).
+        low_pass: parameters -> frequency (Hz) of half power of the Butterworth filter of second
+            order inside the inertial unit (measurement).
         geometry: parameters -> how sensors sit and look, by the names of
             :data:`fish_env.sensing.geometry.FIELDS` (measurement).
         measure: (channel arrays by name, parameters) -> channel arrays, an affine function of each
@@ -147,6 +149,7 @@ class Effect(Switched):
     sample_time: Callable[..., Any] | None = None
     command_time: Callable[..., Any] | None = None
     late: Callable[..., Any] | None = None
+    low_pass: Callable[..., Any] | None = None
     geometry: Callable[..., Any] | None = None
     measure: Callable[..., Any] | None = None
     time_scale: Callable[[Mapping[str, float]], float] | None = None
@@ -208,8 +211,8 @@ class Effect(Switched):
     @property
     def acts_on_record(self) -> bool:
         """Whether it changes what is recorded of a motion."""
-        shown = (self.sample_time, self.command_time, self.late, self.geometry, self.measure)
-        return any(shown)
+        times = (self.sample_time, self.command_time, self.late, self.low_pass)
+        return any((*times, self.geometry, self.measure))
 
     @property
     def acts_on_motion(self) -> bool:

@@ -12,6 +12,7 @@ from fish_env.effects.extended import ExtendedModel
 from fish_env.model.effect import Effect
 from fish_env.sensing.devices import Device, devices_of
 from fish_env.sensing.geometry import through_geometry
+from fish_env.sensing.low_pass import late_s
 
 
 def true_times(model: ExtendedModel, recorded_s: npt.ArrayLike) -> FloatArray:
@@ -46,6 +47,8 @@ def device_ages_s(
     ages = np.zeros((len(Device), count) if count else len(Device))
     for device, seconds in effect.late(values).items() if effect.late is not None else ():
         ages[Device[device.upper()]] += seconds
+    if effect.low_pass is not None:
+        ages[Device.INERTIAL] += late_s(effect.low_pass(values))
     return ages
 
 

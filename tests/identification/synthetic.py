@@ -1,9 +1,10 @@
 """Measured runs made up with the filter's own assumptions: white sensors and a random wrench."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.signal import butter, sosfilt
 
 from fish_env.data import CommandSteps, Dataset, Run
 from fish_env.effects.extended import ExtendedModel
@@ -114,3 +115,18 @@ def motion(setup, times, steps, rng):
         wrench = keep * wrench + np.sqrt(1.0 - keep**2) * fresh
         out.append(state.copy())
     return np.array(out)
+
+
+def through_low_pass(dataset, cutoff_hz):
+    """The data as an inertial unit with scipy's Butterworth filter of second order shows them."""
+    sections = butter(2, cutoff_hz, fs=1000.0, output="sos")
+    runs = []
+    for run in dataset.runs:
+        even = np.arange(0.0, run.time_s[-1] + 0.001, 0.001)
+        seen = dict(run.channels)
+        for name in ("roll", "pitch", "yaw", "p", "q", "r"):
+            values = CubicSpline(run.time_s, seen[name])(even)
+            smooth = sosfilt(sections, values - values[0]) + values[0]
+            seen[name] = CubicSpline(even, smooth)(run.time_s)
+        runs.append(replace(run, channels=seen))
+    return replace(dataset, runs=tuple(runs))

@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import butter, sosfilt
 
 from fish_env.identification.sensor_errors import (
-    LATE_S,
+    USUAL_CUTOFF_HZ,
     innovation_slopes,
     known_slopes,
     sensor_slopes,
@@ -21,7 +20,8 @@ from fish_env.inference.estimate.fit import fit
 from fish_env.inference.estimate.settle import predicted_variation
 from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
-from tests.identification.synthetic import PATHS, Setup, simulate
+from fish_env.sensing.low_pass import late_s
+from tests.identification.synthetic import PATHS, Setup, simulate, through_low_pass
 
 NAMES = [error.name for error in SENSOR_ERRORS]
 
@@ -203,17 +203,7 @@ def test_a_camera_above_tells_nothing_of_how_a_fish_floats(channels, floats):
 def test_a_filter_in_the_inertial_unit_is_a_delay_and_a_little_smoothing():
     """The delay is exact whatever its size, and what else the filter takes away is small."""
     data = simulate(Setup(runs=5, duration=16.0))
-    low_pass = butter(2, 5.0, fs=250.0, output="sos")
-    runs = []
-    for run in data.runs:
-        even = np.arange(0.0, run.time_s[-1], 0.004)
-        seen = dict(run.channels)
-        for name in ("roll", "pitch", "yaw", "p", "q", "r"):
-            values = np.interp(even, run.time_s, seen[name])
-            smooth = sosfilt(low_pass, values - values[0]) + values[0]
-            seen[name] = np.interp(run.time_s, even, smooth)
-        runs.append(replace(run, channels=seen))
-    problem = SeriesProblem(replace(data, runs=tuple(runs)))
+    problem = SeriesProblem(through_low_pass(data, USUAL_CUTOFF_HZ))
     problem = problem.with_runs([run.movable(problem.channels) for run in problem.runs])
     at, plain = Point(np.zeros(len(problem.baseline)), {}), problem.default_noise()
     names = [v.name for v in problem.variations]
@@ -229,7 +219,7 @@ def test_a_filter_in_the_inertial_unit_is_a_delay_and_a_little_smoothing():
     for _ in range(6):
         problem, _ = predicted_variation(problem, at, noise)
     found = problem.variation
-    assert found[:, late].mean() == pytest.approx(LATE_S, abs=0.002)
+    assert found[:, late].mean() == pytest.approx(late_s(USUAL_CUTOFF_HZ), abs=0.002)
     assert found[:, smooth].mean() == pytest.approx(1.0, abs=0.25)
     clean = SeriesProblem(data)
     clean = clean.with_runs([run.movable(problem.channels) for run in clean.runs])

@@ -23,6 +23,7 @@ from fish_env.inference.estimate.free import (
 from fish_env.inference.estimate.gauss_newton import Linearise, Quadratic, descend
 from fish_env.inference.estimate.information import gradient, information, leverage, prior_precision
 from fish_env.inference.estimate.joint import descend_jointly
+from fish_env.inference.estimate.own_steps import ENOUGH
 from fish_env.inference.estimate.rounds import Reached, last, noise_of
 from fish_env.inference.estimate.run_variation import Marginal
 from fish_env.inference.estimate.slopes import Slopes
@@ -34,6 +35,8 @@ from fish_env.inference.progress import Report, silent
 
 SAME = 0.01
 """Root mean square of the difference between whitened residuals below which they are the same."""
+MOST_FOLLOWED = 6
+"""Descents, and rounds, in turn with samples that follow the motion."""
 USUAL_STEPS, FEWER_STEPS = 5, 3
 """Most steps in a round; the fewer are enough to compare causes by, and to go on from a fit."""
 
@@ -198,7 +201,9 @@ def _in_turns(
     """
     filtered: Sequence[Evaluation] = ()
     reached: Reached | None = None
-    for round_ in range(rounds):
+    for round_ in range(max(rounds, MOST_FOLLOWED)):
+        if round_ >= rounds and not problem.samples_follow:
+            break
         report(f"fitting parameters, round {round_ + 1}")
         slopes = Slopes(free, noise)
         try:
@@ -232,11 +237,18 @@ def _descended(
 ) -> tuple[Problem, FloatArray, float, Sequence[Evaluation], Marginal | None]:
     """Gauss-Newton steps by the shared parameters, and by the runs' own numbers where they differ.
 
+    Samples that follow the motion and the estimates settle in turns.
+
     As :func:`~fish_env.inference.estimate.joint.descend_jointly` returns it.
     """
     if spread_of(problem, slopes.noise).any():
         return descend_jointly(problem, slopes, vector, *limits)
     vector, value, filtered = gauss_newton(problem, slopes, vector, *limits, near=near)
+    for _ in range(MOST_FOLLOWED if problem.samples_follow else 0):
+        before, problem = value, problem.settled(slopes.free.unpack(vector), slopes.noise, True)
+        vector, value, filtered = gauss_newton(problem, slopes, vector, *limits)
+        if abs(before - value) < ENOUGH:
+            break
     return problem, vector, value, filtered, None
 
 

@@ -128,7 +128,7 @@ def _agreed(at: Joint, free: Free, noise: Any) -> Joint:
     The value may rise by that. Where that of a run rises by more than the noise of its residuals,
     the motion and what follows from it drive each other away, and both stay as they are.
     """
-    if not at.problem.variation.any():
+    if not (at.problem.variation.any() or at.problem.samples_follow):
         return at
     problem, point = at.problem, free.unpack(at.vector)
     try:

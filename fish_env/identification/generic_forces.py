@@ -171,8 +171,9 @@ def regressors(run: RunData, filtered: Filtered) -> dict[str, FloatArray]:
     """Functions of the filtered motion that a missing force may depend on, each (T,).
 
     In SI units, but time in units of 30 s; angles in rad, frequencies in Hz. ``beat`` is amplitude
-    times frequency as commanded; depth, north, east, frequency and amplitude count from their mean
-    over the run; what goes with the tail's phase is multiplied by the square of the beat.
+    times frequency as commanded; north, east, frequency and amplitude count from their mean over
+    the run. Depth counts from the surface, as what depends on it is the same at one depth in all
+    runs. What goes with the tail's phase is multiplied by the square of the beat.
     """
     c = channels_from_states(filtered.states.T[:18])
     row = np.searchsorted(run.command_times, run.clock, side="right") - 1
@@ -188,7 +189,7 @@ def regressors(run: RunData, filtered: Filtered) -> dict[str, FloatArray]:
     plain |= {"p r": p * r, "u^3": u**3, "v^3": v**3}
     plain |= {"sin pitch": np.sin(c["pitch"]), "sin roll": np.sin(c["roll"])}
     plain |= {"cos yaw": np.cos(c["yaw"]), "sin yaw": np.sin(c["yaw"])}
-    depth = c["z"] - np.mean(c["z"])
+    depth = c["z"]
     plain |= {"depth": depth, "depth^2": depth**2, "depth^3": depth**3}
     plain |= {"north": c["x"] - c["x"].mean(), "east": c["y"] - c["y"].mean()}
     plain |= {"beat speed^2": beat**2, "offset beat^2": offset * beat**2, "u beat": u * beat}

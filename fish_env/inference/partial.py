@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fish_env.arrays import FloatArray
+from fish_env.arrays import FloatArray, IntArray
 from fish_env.inference.adequacy import (
     Implausible,
     contradicts_priors,
@@ -22,6 +22,7 @@ from fish_env.inference.adequacy import (
 )
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.free import Free
+from fish_env.inference.estimate.information import eliminated
 from fish_env.inference.estimate.products import inner
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import (
@@ -158,8 +159,8 @@ class Removed:
 
     loss: float
     shift: FloatArray
-    own: FloatArray
-    rest: FloatArray
+    own: IntArray
+    rest: IntArray
     along: FloatArray
     freed: FloatArray
 
@@ -244,13 +245,9 @@ class StandIns:
         off = {id: value for name in names for id, value in off_values(self.fit, name).items()}
         own = np.array([self.fit.ids.index(id) for id in off])
         gap = np.array(list(off.values())) - self.fit.estimates[own]
-        hessian = self.projector.hessian
-        rest = np.setdiff1d(np.arange(len(hessian)), own)
-        across = hessian[np.ix_(rest, own)]
-        along = np.linalg.solve(hessian[np.ix_(rest, rest)], across)
-        left = hessian[np.ix_(own, own)] - across.T @ along
+        rest, along, left = eliminated(self.projector.hessian, own)
         moves = np.array([isinstance(id, Coefficient) for id in off])
-        shift, freed = np.where(moves, 0.0, gap), np.linalg.inv(left)
+        shift, freed = np.where(moves, 0.0, gap), np.asarray(np.linalg.inv(left))
         z = self.fit.point.z[own[moves]]
         if moves.any():
             held = left[np.ix_(moves, moves)] + np.eye(len(z))

@@ -21,6 +21,7 @@ from fish_env.inference.elimination import allowed_loss, insignificant
 from fish_env.inference.estimate.again import to_search
 from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
 from fish_env.inference.estimate.fit import FEWER_STEPS, Fit, fit, objective_at
+from fish_env.inference.estimate.information import eliminated
 from fish_env.inference.explanation import Explanation, in_steps_of, reached
 from fish_env.inference.hypotheses import CauseId, Coefficient, EffectName, listed
 from fish_env.inference.policy import POLICY
@@ -319,13 +320,10 @@ def substitutes(found: Explanation, shown: Screen) -> list[Substitute]:
         off = off_values(fit, cause)
         own = np.array([fit.ids.index(id) for id in off])
         shift = np.array(list(off.values())) - fit.estimates[own]
-        rest = np.setdiff1d(np.arange(len(fit.ids)), own)
         hessian = projector.hessian
+        rest, along, left = eliminated(hessian, own)
+        loss = float(shift @ left @ shift)
         inside = hessian[np.ix_(rest, rest)]
-        across = hessian[np.ix_(rest, own)]
-        along = np.linalg.solve(inside, across)
-        # Half the increase of the objective is shift' (H_oo - H_or H_rr^-1 H_ro) shift.
-        loss = float(shift @ (hessian[np.ix_(own, own)] - across.T @ along) @ shift)
         for s in others:
             assert s.followed is not None
             pull = hessian @ s.followed  # X'J, where no bound is in the way

@@ -78,3 +78,20 @@ def block_index(
 def sums_over(index: IntArray, scores: FloatArray) -> FloatArray:
     """Scores (D, m) summed over the blocks of an index (D,), shape (blocks, m)."""
     return np.column_stack([np.bincount(index, weights=column) for column in scores.T])
+
+
+def eliminated(hessian: FloatArray, own: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Some parameters with all others following them, as a Schur complement.
+
+    Args:
+        hessian: (n, n) of all parameters.
+        own: (k,) numbers of some of them.
+
+    Returns:
+        Numbers of the rest; by how much these go back, (rest, k), for each unit of the k; and the
+        information (k, k) that is left about the k.
+    """
+    rest = np.setdiff1d(np.arange(len(hessian)), own)
+    across = hessian[np.ix_(rest, own)]
+    along = np.linalg.solve(hessian[np.ix_(rest, rest)], across)
+    return rest, np.asarray(along), np.asarray(hessian[np.ix_(own, own)] - across.T @ along)

@@ -122,6 +122,15 @@ def test_a_missing_wrench_is_found_with_what_it_depends_on(function, channel, di
     assert best.size == pytest.approx(0.6 * unit, rel=0.4)
 
 
+def test_what_depends_on_depth_is_the_same_at_one_depth_in_all_runs():
+    run, filtered = swimming(np.random.default_rng(1))
+    below = replace(filtered, states=filtered.states + 0.5 * (np.arange(20) == 2))
+    forces = generic_forces([run, run], [filtered, below], ("z",))
+    column = forces.names.index("depth")
+    upper, lower = (basis[:, column] * forces.scale[column] for basis in forces.bases)
+    np.testing.assert_allclose(lower - upper, 0.5)
+
+
 def turning(size):
     """A size that changes its sign after half of a run."""
     return lambda clock: size * np.where(clock < 8.0, 1.0, -1.0)

@@ -26,8 +26,7 @@ from fish_env.identification.variation import (
     SENSOR_ERRORS,
     device_ages,
 )
-from fish_env.sensing.devices import Device, devices_of
-from fish_env.sensing.low_pass import late_s
+from fish_env.sensing.devices import Device, devices_of, late_s
 
 PHASE = PHASE_COLUMN
 BEFORE_S = 1e3

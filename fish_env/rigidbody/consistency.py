@@ -31,6 +31,7 @@ NEEDS: dict[str, tuple[tuple[str, ...], ...]] = {
     "depth_bias": (),
     "camera_tilt": (),
     "gyro_scale": (),
+    "imu_lowpass": (),
     "marker_offset": (),
     "refraction": (),
     "soft_iron": (),
@@ -42,7 +43,14 @@ NEVER = {
     "sensor_delay": "all channels share the delay, so only the commands can show it",
     "depth_bias": "no other channel contradicts a shifted depth",
 }
-LATER = ("camera_tilt", "gyro_scale", "marker_offset", "refraction", "soft_iron")
+LATER = (
+    "camera_tilt",
+    "gyro_scale",
+    "imu_lowpass",
+    "marker_offset",
+    "refraction",
+    "soft_iron",
+)
 """Effects that this test has no setting for; fits of the motion look for them."""
 LOOKS_ALIKE = {
     "clock_scale": "`clock_skew`, or a gyro with a wrong gain (`gyro_scale`)",

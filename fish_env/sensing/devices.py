@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from enum import IntEnum
+from math import pi, sqrt
+from typing import Any
 
 
 class Device(IntEnum):
@@ -38,3 +40,13 @@ def devices_of(names: Sequence[str]) -> tuple[Device, ...]:
     inertial = has_inertial_unit(names)
     found = (USUAL_DEVICE[name] for name in names)
     return tuple(Device.CAMERA if d == Device.INERTIAL and not inertial else d for d in found)
+
+
+def late_s(cutoff_hz: Any) -> Any:
+    """By how much a low-pass inside an inertial unit makes slow signals late (s).
+
+    Args:
+        cutoff_hz: frequency of half power of a Butterworth filter of second order, a number or an
+            array; infinite for none.
+    """
+    return sqrt(2.0) / (2.0 * pi * cutoff_hz)

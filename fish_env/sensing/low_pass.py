@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
@@ -16,16 +15,12 @@ from scipy.linalg import expm
 from scipy.signal import butter, sosfilt
 
 from fish_env.arrays import FloatArray
+from fish_env.sensing.devices import late_s
 
 FINE_S = 0.004
 """Steps in which the filter is computed (s)."""
 HIGHEST_HZ = 0.25 / FINE_S
 """Cutoff up to which such steps compute it. A higher one takes nothing off a tail's beat."""
-
-
-def late_s(cutoff_hz: Any) -> Any:
-    """By how much the filter makes slow signals late (s); zero for an infinite cutoff."""
-    return math.sqrt(2.0) / (2.0 * math.pi * cutoff_hz)
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,9 +10,8 @@ import numpy.typing as npt
 from fish_env.arrays import FloatArray
 from fish_env.effects.extended import ExtendedModel
 from fish_env.model.effect import Effect
-from fish_env.sensing.devices import Device, devices_of
+from fish_env.sensing.devices import Device, devices_of, late_s
 from fish_env.sensing.geometry import through_geometry
-from fish_env.sensing.low_pass import late_s
 
 
 def true_times(model: ExtendedModel, recorded_s: npt.ArrayLike) -> FloatArray:

@@ -20,7 +20,7 @@ from fish_env.inference.estimate.fit import fit
 from fish_env.inference.estimate.settle import predicted_variation
 from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
-from fish_env.sensing.low_pass import late_s
+from fish_env.sensing.devices import late_s
 from tests.identification.synthetic import PATHS, Setup, simulate, through_low_pass
 
 NAMES = [error.name for error in SENSOR_ERRORS]

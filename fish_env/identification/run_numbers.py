@@ -20,7 +20,7 @@ from fish_env.identification.sensor_errors import known_slopes
 from fish_env.identification.shared_filter import smoothing
 from fish_env.identification.variation import IN_SAMPLES, VARIATIONS
 from fish_env.inference.problem import Point
-from fish_env.sensing.low_pass import HIGHEST_HZ
+from fish_env.sensing.devices import seen_cutoff
 
 MOST_TURNS, AGREED = 6, 0.05
 """In which errors and motion are worked out, and what they may differ by, in units of the noise."""
@@ -74,8 +74,7 @@ def _in_late_rows(problem: N, point: Point) -> N:
     """The problem with its samples in rows that suit how late devices are in all runs."""
     sensors = problem.lane(point)[1]
     late = sensors.device_ages[:, 0]
-    cutoff = np.inf if sensors.cutoff is None else float(sensors.cutoff[0])
-    cutoff = cutoff if cutoff < HIGHEST_HZ else np.inf
+    cutoff = seen_cutoff(np.inf if sensors.cutoff is None else float(sensors.cutoff[0]))
     if all(np.array_equal(run.late, late) and run.cutoff_hz == cutoff for run in problem.runs):
         return problem
     return problem.with_runs([run.with_devices(late, cutoff) for run in problem.runs])

@@ -26,7 +26,7 @@ from fish_env.identification.variation import (
     SENSOR_ERRORS,
     device_ages,
 )
-from fish_env.sensing.devices import Device, devices_of, late_s
+from fish_env.sensing.devices import Device, devices_of, late_s, seen_cutoff
 
 PHASE = PHASE_COLUMN
 BEFORE_S = 1e3
@@ -153,7 +153,7 @@ class RunData:
         """The same samples in the same rows as if another low-pass had made them as late."""
         late = self.late.copy()
         late[Device.INERTIAL] += late_s(cutoff_hz) - late_s(self.cutoff_hz)
-        return replace(self, late=late, cutoff_hz=cutoff_hz)
+        return replace(self, late=late, cutoff_hz=seen_cutoff(cutoff_hz))
 
     def _in_last_rows(self) -> RunData:
         """The same run with its samples in the last rows before their devices took them."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from enum import IntEnum
-from math import pi, sqrt
+from math import inf, pi, sqrt
 from typing import Any
 
 
@@ -50,3 +50,12 @@ def late_s(cutoff_hz: Any) -> Any:
             array; infinite for none.
     """
     return sqrt(2.0) / (2.0 * pi * cutoff_hz)
+
+
+HIGHEST_HZ = 60.0
+"""Cutoff of a low-pass from which it takes nothing off a tail's beat."""
+
+
+def seen_cutoff(cutoff_hz: float) -> float:
+    """The cutoff of a low-pass (Hz); infinite where it does nothing but make samples late."""
+    return cutoff_hz if cutoff_hz < HIGHEST_HZ else inf

@@ -19,8 +19,6 @@ from fish_env.sensing.devices import late_s
 
 FINE_S = 0.004
 """Steps in which the filter is computed (s)."""
-HIGHEST_HZ = 0.25 / FINE_S
-"""Cutoff up to which such steps compute it. A higher one takes nothing off a tail's beat."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -64,13 +64,10 @@ class Motion:
         """
         euler, rates, euler_slope, rate_slope = self.foreseen
         if channel in ANGLES:
-            parts, column = (
-                (self.euler, self.slopes[1], euler, euler_slope),
-                ANGLES.index(channel),
-            )
+            names, parts = ANGLES, (self.euler, self.slopes[1], euler, euler_slope)
         else:
-            parts, column = (self.rates, self.slopes[2], rates, rate_slope), RATES.index(channel)
-        seen = Foreseen(self.clock, *(part[:, column] for part in parts))
+            names, parts = RATES, (self.rates, self.slopes[2], rates, rate_slope)
+        seen = Foreseen(self.clock, *(part[:, names.index(channel)] for part in parts))
         return reshaped(seen, age, cutoff_hz)
 
 

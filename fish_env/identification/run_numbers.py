@@ -15,6 +15,7 @@ import numpy as np
 from fish_env.arrays import FloatArray
 from fish_env.identification.filtering import Filtered, Measurement
 from fish_env.identification.noise_model import NoiseModel
+from fish_env.identification.predicted_motion import predicted_motion
 from fish_env.identification.runs import RunData
 from fish_env.identification.sensor_errors import known_slopes
 from fish_env.identification.shared_filter import smoothing
@@ -168,9 +169,13 @@ def _undone(run: RunData, seen: RunData, filtered: Filtered, channels: Sequence[
         filtered: that motion, with its slopes.
         channels: names of its channels.
     """
-    slopes = known_slopes(seen, filtered, channels)
-    shared = smoothing(run, filtered, channels)
-    return replace(run, distortion=_in_samples(slopes, run.sensor_errors) + shared)
+    if not run.is_smoothed:
+        slopes = known_slopes(seen, filtered, channels)
+        return replace(run, distortion=_in_samples(slopes, run.sensor_errors))
+    found = smoothing(run, predicted_motion(run.clock, filtered), channels)
+    if run.sensor_errors[IN_SAMPLES].any():
+        found += _in_samples(known_slopes(seen, filtered, channels), run.sensor_errors)
+    return replace(run, distortion=found)
 
 
 def _moved(run: RunData, seen: RunData, filtered: Filtered, channels: Sequence[str]) -> RunData:

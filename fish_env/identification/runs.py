@@ -279,8 +279,15 @@ class RunData:
         return float(spans @ values[:, FREQUENCY])
 
     def until(self, end_s: float) -> RunData:
-        """The beginning of the run, at least two samples of it."""
-        return self.cut(0, max(2, int(np.searchsorted(self.clock, end_s, side="right"))))
+        """The beginning of the run, at least two samples of it; movable rows stay movable."""
+        count = max(2, int(np.searchsorted(self.clock, end_s, side="right")))
+        if count >= len(self.clock):
+            return self
+        part = self.cut(0, count)
+        if self.recorded is None:
+            return part
+        part = replace(part, recorded=self.recorded[:count])
+        return replace(part, measured=part._in_rows(part.moved))
 
     def cut(self, first: int, last: int) -> RunData:
         """The same run with some of its samples, ``first`` to before ``last``."""

@@ -102,6 +102,20 @@ def test_rows_are_moved_by_whole_samples_and_as_many_always_count(problem):
     assert len(counts) == 1
 
 
+@pytest.mark.parametrize("end_s", [1.0, np.inf])
+def test_rows_of_the_beginning_of_a_run_may_be_moved_too(problem, end_s):
+    movable = problem.with_runs([problem.runs[0].movable(problem.channels)])
+    begun = movable.until(end_s)
+    assert np.isnan(begun.runs[0].measured[-2:]).all()
+    values = numbers_of(problem, inertial_delay=0.05)
+    noise = problem.default_noise()
+    early = begun.with_variation(values, problem.start, noise).runs[0]
+    whole = movable.with_variation(values, problem.start, noise).runs[0]
+    assert early.moved[Device.INERTIAL] == 1
+    kept = len(early.clock) - 2
+    np.testing.assert_array_equal(early.measured[:kept], whole.measured[:kept])
+
+
 def test_the_likelihood_hardly_leaps_where_a_row_is_moved(problem):
     movable = problem.with_runs([problem.runs[0].movable(problem.channels)])
     noise, at = problem.default_noise(), Point(np.zeros(len(PATHS)), {})

@@ -44,3 +44,17 @@ def just_after(switches: FloatArray, clock: FloatArray) -> BoolArray:
     begin = np.concatenate([clock[:1], clock[:-1]])
     since = begin - switches[np.maximum(last, 0)]
     return (last >= 0) & (since < SWITCH_S - SAME_INSTANT_S)
+
+
+def soon_after(
+    commands: tuple[FloatArray, FloatArray], clock: FloatArray, for_s: float
+) -> BoolArray:
+    """Which samples (T,) come within some time (s) of a jump, at it or after it.
+
+    Args:
+        commands: (m,) times from which each row of commands holds (s), and (m, 5) commands, SI.
+        clock: (T,) sample times (s).
+        for_s: how long.
+    """
+    since = clock[:, None] - jump_times(*commands)
+    return np.asarray(((since >= 0.0) & (since < for_s)).any(axis=1))

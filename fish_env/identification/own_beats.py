@@ -297,7 +297,7 @@ def with_own_beats(problem: SeriesProblem, beats: OwnBeats) -> SeriesProblem:
     drive = beats.drive or problem.drive
     if not beats.own:
         return problem.with_drive(drive)
-    runs = [_beating(run, beats).movable(problem.channels) for run in problem.runs]
+    runs = [_beating(run, beats).without_smeared_gyros(problem.channels) for run in problem.runs]
     return problem.with_runs(runs).with_drive(replace(drive, uneven=True))
 
 

@@ -9,15 +9,10 @@ from functools import cached_property
 import numpy as np
 
 from fish_env.arrays import BoolArray, FloatArray, IntArray
-from fish_env.data.schema import Run
-from fish_env.errors import DatasetError
-from fish_env.identification.channels import BY_NAME, Kind
-from fish_env.identification.command_jumps import SAME_INSTANT_S, jump_times, jumped, just_after
-from fish_env.identification.first_state import first_state
+from fish_env.identification.command_jumps import soon_after
 from fish_env.identification.late_rows import in_earlier_rows, rows_to_spare
 from fish_env.identification.policy import IDENTIFICATION
 from fish_env.identification.state_blocks import PHASE_COLUMN
-from fish_env.identification.thinning import kept_rows
 from fish_env.identification.variation import (
     BEAT,
     COUNT,
@@ -69,8 +64,8 @@ class RunData:
         variation: (K,) what this run differs in from the others, see ``variation.VARIATIONS``.
         sensor_errors: (K,) errors of its sensors, see ``variation.SENSOR_ERRORS``.
         distortion: (T, C) what they do to its samples; None for nothing.
-        recorded: (T, C) samples in the rows that their stamps ask for, where rows may be moved with
-            what is known of the devices' delays; None where rows stay.
+        recorded: (T, C) samples in the rows that their stamps ask for, where they are evenly spaced
+            and rows may be moved by devices' delays; None where rows stay.
         devices: (C,) device of each channel, where rows may be moved.
         late: (devices,) how late each device is in all runs (s), beside what is a run's own.
         cutoff_hz: of the low-pass inside the inertial unit, in all runs; infinite for none.
@@ -170,20 +165,37 @@ class RunData:
 
         A device that is late shows what was. Moved by whole rows its samples are as they were, and
         only part of a row is left to the equations of motion. The last rows count for nothing, so
-        that the same samples count however far they are moved. What a filter inside a gyro makes of
-        a jump nobody knows, so that its samples after one judge nothing either.
+        that the same samples count however far they are moved.
 
         Args:
             channels: names of the channels.
         """
         if self.most_rows < 1:
             return self
-        recorded = self.measured.copy()
-        gyro = np.array([name in ("p", "q", "r") for name in channels])
-        since = self.clock[:, None] - jump_times(*self.commands)
-        smeared = ((since >= 0.0) & (since < IDENTIFICATION.smeared_gyro_s)).any(axis=1)
+        run = replace(self, devices=np.array(devices_of(channels)), recorded=self.measured)
+        return replace(run, measured=run._in_rows(run.moved))
+
+    def as_recorded(self) -> RunData:
+        """The same run with all samples in the rows that their stamps ask for, where they stay."""
+        if self.recorded is None:
+            return self
+        none = np.zeros_like(self.moved)
+        return replace(self, measured=self.recorded, recorded=None, devices=None, moved=none)
+
+    def without_smeared_gyros(self, channels: Sequence[str]) -> RunData:
+        """The same run without the samples of its gyro just after jumps, where rows may be moved.
+
+        Where runs have delays of their own, nobody knows what a filter inside a gyro makes of one.
+
+        Args:
+            channels: names of the channels.
+        """
+        if self.recorded is None:
+            return self
+        recorded, gyro = self.recorded.copy(), np.isin(channels, ["p", "q", "r"])
+        smeared = soon_after(self.commands, self.clock, IDENTIFICATION.smeared_gyro_s)
         recorded[np.ix_(smeared, gyro)] = np.nan
-        run = replace(self, devices=np.array(devices_of(channels)), recorded=recorded)
+        run = replace(self, recorded=recorded)
         return replace(run, measured=run._in_rows(run.moved))
 
     def _in_rows(self, rows: IntArray) -> FloatArray:
@@ -234,7 +246,7 @@ class RunData:
         """
         long = min(long, fastest)
         longest = np.where(self.fresh, long / FINER, long)
-        fewer = np.minimum(self.substeps, _steps(self.clock, longest))
+        fewer = np.minimum(self.substeps, steps_between(self.clock, longest))
         if np.array_equal(fewer, self.substeps):
             return self
         usual = self.substeps if self.usual_substeps is None else self.usual_substeps
@@ -310,82 +322,12 @@ class RunData:
         return float(self.clock[-1])
 
 
-def prepare_run(
-    run: Run,
-    channels: Sequence[str],
-    noise_sd: FloatArray,
-    dt: float = 0.01,
-    noise_scale: FloatArray | None = None,
-) -> RunData:
-    """Read a run for the filter, thinned where it comes faster than a beat needs.
+def steps_between(clock: FloatArray, longest: float | FloatArray) -> IntArray:
+    """RK4 steps (T,) from one row to the next, no longer than asked.
 
     Args:
-        run: measured run.
-        channels: channels to use.
-        noise_sd: (C,) white noise of each channel, for the spread of the initial state.
-        dt: longest RK4 step (s), but for a moment after each jump of the commands.
-        noise_scale: (C,) by how much more noise this run has; default: as much.
-
-    Raises:
-        DatasetError: the run has none of the channels.
+        clock: (T,) times of the rows (s).
+        longest: step before each row (s), or one for all.
     """
-    if not channels:
-        raise DatasetError(f"run {run.id}: none of {', '.join(BY_NAME)} is measured")
-    clock, measured = _merged(
-        run.time_s - run.time_s[0], np.column_stack([run.channels[name] for name in channels])
-    )
-    scale = np.ones(1) if noise_scale is None else noise_scale
-    state0, covariance0 = first_state(run, channels, measured, clock, noise_sd * scale)
-    kept = kept_rows(clock, measured, float(run.commands.values[:, FREQUENCY].max()))
-    clock, measured = clock[kept], measured[kept]
-    switches = run.commands.times_s - run.time_s[0]
-    fresh = just_after(switches[jumped(run.commands.values)], clock)
-    substeps = _steps(clock, np.where(fresh, dt / FINER, dt))
-    if run.start == "rest":
-        measured[clock < IDENTIFICATION.untold_start_s] = np.nan
-    # Where the tail is at the first sample is known only once it has moved.
-    measured[0, [BY_NAME[name].kind == Kind.DRIVE for name in channels]] = np.nan
-    return RunData(
-        run.id,
-        run.condition,
-        clock,
-        substeps,
-        fresh,
-        *_commands(run, switches),
-        np.ascontiguousarray(measured),
-        state0,
-        covariance0,
-        run.tail_phase is not None,
-        run.start != "rest",
-        noise_scale=scale,
-    )
-
-
-def _commands(run: Run, switches: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Switch times (m,) and commands (m, 5), from before the run on where it starts from rest.
-
-    Late samples show a time before the run. The fish was then held as first commanded, but for
-    its beat, which had not begun.
-    """
-    values = run.commands.values
-    if run.start == "rest":
-        held = values[:1].copy()
-        held[0, FREQUENCY] = 0.0
-        switches, values = np.r_[switches[0] - BEFORE_S, switches], np.vstack([held, values])
-    return np.ascontiguousarray(switches), np.ascontiguousarray(values)
-
-
-def _steps(clock: FloatArray, longest: float | FloatArray) -> IntArray:
     spans = np.diff(clock, prepend=0.0)
     return np.maximum(1, np.ceil(spans / longest - 1e-9)).astype(np.int64)
-
-
-def _merged(clock: FloatArray, measured: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Rows at one instant, but for rounding, made one: a command and a sample may each have one."""
-    apart = np.diff(clock, prepend=-np.inf) > SAME_INSTANT_S
-    first = np.flatnonzero(apart)
-    merged = measured[first]
-    for row in np.flatnonzero(~apart):
-        at = int(np.searchsorted(first, row, side="right")) - 1
-        merged[at] = np.where(np.isfinite(merged[at]), merged[at], measured[row])
-    return clock[first], merged

@@ -33,7 +33,7 @@ from fish_env.identification.parameters import ALIKE, baseline_of, changes_of, n
 from fish_env.identification.phases import settle_phases
 from fish_env.identification.run_noise import noise_scales
 from fish_env.identification.run_numbers import as_devices_record, renumbered
-from fish_env.identification.runs import prepare_run
+from fish_env.identification.run_reading import prepare_run
 from fish_env.identification.sensor_errors import slopes_of_runs
 from fish_env.identification.sensors import largest_jitter_of, largest_noise
 from fish_env.identification.shared_filter import by_other_filters

@@ -83,14 +83,13 @@ def test_only_the_channels_of_a_device_are_late(problem):
 
 
 def test_rows_are_moved_by_whole_samples_and_as_many_always_count(problem):
-    movable = problem.with_runs([problem.runs[0].movable(problem.channels)])
-    run = movable.runs[0]
+    (run,) = problem.runs
     assert run.most_rows == 2
     inertial = [i for i, d in enumerate(devices_of(problem.channels)) if d == Device.INERTIAL]
     counts = {int(np.isfinite(run.measured).sum())}
     for delay, rows in ((0.03, 0), (0.05, 1), (0.09, 2), (0.2, 2)):
         values = numbers_of(problem, inertial_delay=delay)
-        moved = movable.with_variation(values, problem.start, problem.default_noise()).runs[0]
+        moved = problem.with_variation(values, problem.start, problem.default_noise()).runs[0]
         assert moved.moved[Device.INERTIAL] == rows
         np.testing.assert_array_equal(
             moved.measured[4:-2, inertial],
@@ -104,25 +103,23 @@ def test_rows_are_moved_by_whole_samples_and_as_many_always_count(problem):
 
 @pytest.mark.parametrize("end_s", [1.0, np.inf])
 def test_rows_of_the_beginning_of_a_run_may_be_moved_too(problem, end_s):
-    movable = problem.with_runs([problem.runs[0].movable(problem.channels)])
-    begun = movable.until(end_s)
+    begun = problem.until(end_s)
     assert np.isnan(begun.runs[0].measured[-2:]).all()
     values = numbers_of(problem, inertial_delay=0.05)
     noise = problem.default_noise()
     early = begun.with_variation(values, problem.start, noise).runs[0]
-    whole = movable.with_variation(values, problem.start, noise).runs[0]
+    whole = problem.with_variation(values, problem.start, noise).runs[0]
     assert early.moved[Device.INERTIAL] == 1
     kept = len(early.clock) - 2
     np.testing.assert_array_equal(early.measured[:kept], whole.measured[:kept])
 
 
 def test_the_likelihood_hardly_leaps_where_a_row_is_moved(problem):
-    movable = problem.with_runs([problem.runs[0].movable(problem.channels)])
     noise, at = problem.default_noise(), Point(np.zeros(len(PATHS)), {})
 
     def value(delay):
         values = numbers_of(problem, inertial_delay=delay)
-        moved = movable.with_variation(values, at, noise)
+        moved = problem.with_variation(values, at, noise)
         return -2.0 * moved.filtered(at, noise)[0].log_likelihood
 
     below, above = value(STEP_S - 1e-4), value(STEP_S + 1e-4)
@@ -139,36 +136,35 @@ def test_numbers_by_which_a_run_diverges_get_no_slope():
 def test_a_gyro_says_nothing_just_after_a_jump(problem):
     """What a filter inside it makes of a jump nobody knows."""
     (run,) = problem.runs
-    movable = run.movable(problem.channels)
+    silent = run.without_smeared_gyros(problem.channels)
     since = run.clock[:, None] - jump_times(*run.commands)
     after = ((since >= 0.0) & (since < IDENTIFICATION.smeared_gyro_s)).any(axis=1)
     gyro = np.isin(problem.channels, ["p", "q", "r"])
-    kept = np.isfinite(movable.recorded)
+    kept = np.isfinite(silent.recorded)
     assert 0 < after.sum() < 0.5 * len(after)
     assert not kept[np.ix_(after, gyro)].any()
-    assert np.array_equal(kept[~after], np.isfinite(run.measured[~after]))
-    assert np.array_equal(kept[:, ~gyro], np.isfinite(run.measured[:, ~gyro]))
+    assert np.array_equal(kept[~after], np.isfinite(run.recorded[~after]))
+    assert np.array_equal(kept[:, ~gyro], np.isfinite(run.recorded[:, ~gyro]))
 
 
 def test_what_makes_devices_late_in_all_runs_is_as_numbers_of_each_run(problem):
     """Two ways to the same prediction: the effect's parameters, and the runs' own numbers."""
-    movable = problem.with_runs([problem.runs[0].movable(problem.channels)])
     noise, none = problem.default_noise(), numbers_of(problem)
     values = numbers_of(problem, camera_delay=0.056, depth_delay=0.013)
-    own = movable.with_variation(values, problem.start, noise)
+    own = problem.with_variation(values, problem.start, noise)
     shared = Point(
         np.zeros(len(PATHS)),
         {EffectParameterId("sensor_delay", name): value
          for name, value in {"delay": 0.0, "camera_later": 0.056, "depth_later": 0.013}.items()},
     )  # fmt: skip
-    common = movable.with_variation(none, shared, noise)
+    common = problem.with_variation(none, shared, noise)
     np.testing.assert_array_equal(common.runs[0].moved, own.runs[0].moved)
     np.testing.assert_allclose(common.runs[0].own_ages, own.runs[0].own_ages, atol=1e-15)
     by_effect = common.filtered(shared, noise)[0].log_likelihood
     by_numbers = own.filtered(problem.start, noise)[0].log_likelihood
     assert by_effect == pytest.approx(by_numbers, rel=1e-12)
     back = common.settled(problem.start, noise)
-    np.testing.assert_array_equal(back.runs[0].moved, movable.runs[0].moved)
+    np.testing.assert_array_equal(back.runs[0].moved, problem.runs[0].moved)
 
 
 def test_a_fit_finds_how_late_camera_and_depth_sensor_are():
@@ -192,7 +188,6 @@ def test_a_fit_finds_how_late_camera_and_depth_sensor_are():
         runs.append(replace(run, tail_phase=None))
     dataset = replace(fine, runs=tuple(runs))
     series = SeriesProblem(dataset, paths=PATHS, effects=("sensor_delay",))
-    series = series.with_runs([run.movable(series.channels) for run in series.runs])
     found = fit(series)
     for name, truth, width in (("delay", 0.02, 0.003), ("camera_later", 0.065, 0.04)):
         low, high = found.interval(EffectParameterId("sensor_delay", name))

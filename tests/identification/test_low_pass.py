@@ -11,14 +11,13 @@ from fish_env.identification.series import SeriesProblem
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
-from tests.identification.synthetic import PATHS, Setup, simulate, through_low_pass
+from tests.identification.synthetic import PATHS, Setup, simulate, through_low_pass, with_calm_gyros
 
 CUTOFF = EffectParameterId("imu_lowpass", "cutoff")
 
 
 def problem_of(data):
-    problem = SeriesProblem(data, paths=PATHS)
-    return problem.with_runs([run.movable(problem.channels) for run in problem.runs])
+    return with_calm_gyros(SeriesProblem(data, paths=PATHS))
 
 
 @pytest.fixture(scope="module")

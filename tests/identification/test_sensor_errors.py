@@ -21,7 +21,13 @@ from fish_env.inference.estimate.settle import predicted_variation
 from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.problem import Point
 from fish_env.sensing.devices import late_s
-from tests.identification.synthetic import PATHS, Setup, simulate, through_low_pass
+from tests.identification.synthetic import (
+    PATHS,
+    Setup,
+    simulate,
+    through_low_pass,
+    with_calm_gyros,
+)
 
 NAMES = [error.name for error in SENSOR_ERRORS]
 
@@ -203,8 +209,7 @@ def test_a_camera_above_tells_nothing_of_how_a_fish_floats(channels, floats):
 def test_a_filter_in_the_inertial_unit_is_a_delay_and_a_little_smoothing():
     """The delay is exact whatever its size, and what else the filter takes away is small."""
     data = simulate(Setup(runs=5, duration=16.0))
-    problem = SeriesProblem(through_low_pass(data, USUAL_CUTOFF_HZ))
-    problem = problem.with_runs([run.movable(problem.channels) for run in problem.runs])
+    problem = with_calm_gyros(SeriesProblem(through_low_pass(data, USUAL_CUTOFF_HZ)))
     at, plain = Point(np.zeros(len(problem.baseline)), {}), problem.default_noise()
     names = [v.name for v in problem.variations]
     late, smooth = names.index("inertial_delay"), names.index("inertial_smoothing")
@@ -221,9 +226,7 @@ def test_a_filter_in_the_inertial_unit_is_a_delay_and_a_little_smoothing():
     found = problem.variation
     assert found[:, late].mean() == pytest.approx(late_s(USUAL_CUTOFF_HZ), abs=0.002)
     assert found[:, smooth].mean() == pytest.approx(1.0, abs=0.25)
-    clean = SeriesProblem(data)
-    clean = clean.with_runs([run.movable(problem.channels) for run in clean.runs])
-    best = misfit(clean)
+    best = misfit(with_calm_gyros(SeriesProblem(data)))
     assert misfit(problem) - best < 0.02 * (spoilt - best)
 
 

@@ -81,9 +81,9 @@ class WholeRunProblem(Problem):
         if paths is None and from_above(dataset.channels):
             paths = PLANAR_PATHS
         self.effects = tuple(dict.fromkeys((FREQUENCY_SCALE, *effects)))
-        self.series = SeriesProblem(
-            dataset, fish, run_ids, paths, self.effects, tuple(user_effects), dt
-        )
+        series = SeriesProblem(dataset, fish, run_ids, paths, self.effects, tuple(user_effects), dt)
+        # What swims alone needs no rows moved, and its last samples count too.
+        self.series = series.with_runs([run.as_recorded() for run in series.runs])
         self.known, self.baseline = self.series.known, self.series.baseline
         ratios = {run: ratio for run, (ratio, _) in by_run(beats_of(dataset)).items()}
         own = self.neutral([FREQUENCY_SCALE])[SCALE]

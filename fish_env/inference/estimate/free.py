@@ -364,7 +364,8 @@ def objective_of(problem: Problem, free: Free, vector: FloatArray, residuals: Fl
 
 
 def _objective(free: Free, vector: FloatArray, residuals: FloatArray, possible: bool) -> float:
-    value = float(residuals @ residuals + free.prior @ (vector * vector))
+    with np.errstate(over="ignore"):  # where the simulation diverges
+        value = float(residuals @ residuals + free.prior @ (vector * vector))
     return value if possible and np.isfinite(value) else np.inf
 
 

@@ -8,7 +8,7 @@ from fish_env.inference.effects import DeclaredEffect, EffectParameter
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.problem import Point
-from fish_env.inference.rivals import ranked
+from fish_env.inference.rivals import agreed, ranked
 from tests.inference.stated import SIZE, Stated, effect, size_of
 
 SHAPE = (4, 60)
@@ -69,3 +69,24 @@ def test_a_better_explanation_leads_whatever_its_estimates():
     wild, sober = same_by(1.0, 2e4)
     assert wild.score < sober.score - 6.0
     assert ranked([sober, wild]) == [wild, sober]
+
+
+@pytest.mark.parametrize(
+    ("left", "expected"),
+    [
+        ((4.0, 4.0, 4.0, 4.0), True),
+        ((4.0, 4.0, 4.0, 60.0), True),
+        ((1.0, 1.0, 1.0, 60.0), False),
+        ((-4.0, 4.0, 0.0, 60.0), False),
+    ],
+)
+def test_runs_agree_where_each_tells_or_all_tell_alike(left, expected):
+    """However much more one of them tells than the others."""
+
+    def residuals(z, effects):
+        best, other = (effects[size_of(name)] for name in ("best", "other"))
+        return np.column_stack([np.full(4, 1e3 * (1.0 - best - other)), other * np.array(left)])
+
+    stated = Stated(residuals, [effect("best", 1.0), effect("other", 1.0)])
+    best, other = (Explanation((name,), fit(stated, [name])) for name in ("best", "other"))
+    assert agreed(best, other) == expected

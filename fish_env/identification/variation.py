@@ -157,9 +157,16 @@ COMMON = (
     _alike("current", ("current_north", "current_east"), ("north", "east")),
     _alike("battery_sag", ("beat_sag",), ("rate",)),
     _alike("frequency_scale", ("beat",), ("scale",), 1.0),
+    CommonEffect(
+        "clock_scale",
+        ("beat", *GYRO_GAINS),
+        lambda shared: {"scale": 1.0 + shared[0]},
+        rates=(1.0, -1.0, -1.0, -1.0),
+    ),
 )
 """What is wrong in all runs alike. Runs keep delays of their inertial unit, but for what all
-devices share: a filter inside it delays no other."""
+devices share: a filter inside it delays no other. In the seconds of a slow clock the tail beats
+more often, and gyros show too little."""
 USUAL = np.array([variation.usual for variation in EVERY])
 _MASS, _BUOYANCY = RECORD_FIELDS.index("mass_total"), RECORD_FIELDS.index("mass_buoyancy")
 _STATIC = {f"trim_{axis}": RECORD_FIELDS.index(f"static_{axis}") for axis in "xyz"}

@@ -69,26 +69,43 @@ class Numbers:
 
     def __init__(self, own: Fit) -> None:
         self.own, self.problem = own, own.problem
-        usual = np.array([variation.usual for variation in self.problem.variations])
-        self.spread: FloatArray = spread_of(self.problem, own.noise) / usual
+        self._sizes = np.array([variation.usual for variation in self.problem.variations])
+        self.spread: FloatArray = spread_of(self.problem, own.noise) / self._sizes
         self._likelihoods = own_likelihoods(own)
-        self._usual = self._likelihoods(())
+        self._usual = self._likelihoods(np.zeros((len(self.spread), 0)))
         self._apart = self._usual(self.spread)
 
     def in_common(self) -> list[CommonEffect]:
-        """Effects that are likelier than numbers of runs, and than nothing, the clearest first."""
+        """Effects that are likelier than numbers of runs, and than nothing, the clearest first.
+
+        No two of them are for the same number: the likelier one is.
+        """
         effects = self.problem.common_effects
         found: list[tuple[float, int]] = []
         for i, one in enumerate(effects):
             at, begin = begun(self.problem, one)
-            if one.effect in self.own.effects or not self.spread[at].any() or begin is None:
+            told = int(np.count_nonzero(self.spread[at]))
+            if one.effect in self.own.effects or told <= bool(one.rates) or begin is None:
                 continue
-            fewer = _without(self.spread, [k for k in at if self.problem.variations[k].shared])
-            alike = self._likelihoods(at)(fewer) - len(at) * float(np.log(WIDE))
+            fewer = _without(self.spread, _gone(self.problem, one, at))
+            common = self._along(one, at)
+            alike = self._likelihoods(common)(fewer) - common.shape[1] * float(np.log(WIDE))
             otherwise = min(self._apart, self._usual(fewer))
             if alike < otherwise - POLICY.evidence_doubt:
                 found.append((alike, i))
-        return [effects[i] for _, i in sorted(found)]
+        chosen: list[CommonEffect] = []
+        for _, i in sorted(found):
+            if not any({*effects[i].numbers} & {*one.numbers} for one in chosen):
+                chosen.append(effects[i])
+        return chosen
+
+    def _along(self, one: CommonEffect, at: Sequence[int]) -> FloatArray:
+        """(K, m) what runs have in common by an effect, in usual spreads of the numbers ``at``."""
+        each = np.eye(len(self.spread))[:, at]
+        if not one.rates:
+            return each
+        rates = np.array(one.rates) / self._sizes[at]
+        return np.asarray(each @ (rates / np.abs(rates).max())[:, None])
 
     def unneeded(self) -> list[int]:
         """Numbers that the data are likelier without, of those that runs may share.
@@ -111,6 +128,17 @@ def _without(sd: FloatArray, which: Sequence[int]) -> FloatArray:
     fewer = sd.copy()
     fewer[list(which)] = 0.0
     return fewer
+
+
+def _gone(problem: Problem, one: CommonEffect, at: Sequence[int]) -> list[int]:
+    """Numbers that an effect leaves nothing of in any run."""
+    return [] if one.rates else [k for k in at if problem.variations[k].shared]
+
+
+def _in_all(one: CommonEffect, numbers: FloatArray) -> FloatArray:
+    """(m,) what runs share by an effect of the numbers (R, m) that it moves; the first tells."""
+    means = numbers.mean(axis=0)
+    return means[0] / one.rates[0] * np.array(one.rates) if one.rates else np.asarray(means)
 
 
 def begun(
@@ -143,8 +171,8 @@ def _refitted(own: Fit, shared: Sequence[CommonEffect], idle: Sequence[int]) -> 
     gone, values = list(idle), dict(own.point.effects)
     for one in shared:
         at, begin = begun(problem, one)
-        gone += [k for k in at if problem.variations[k].shared]
-        numbers[:, at] -= numbers[:, at].mean(axis=0)
+        gone += _gone(problem, one, at)
+        numbers[:, at] -= _in_all(one, numbers[:, at])
         values |= begin or {}
     numbers[:, gone] = 0.0
     spread[gone] = 0.0

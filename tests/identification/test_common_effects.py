@@ -11,6 +11,8 @@ from tests.identification.synthetic import PATHS, Setup, simulate
 
 SIZES = np.array([0.5, 0.3, 0.4])
 """Of the numbers that an effect does, in usual spreads."""
+SLOW = 0.002
+"""By how much, where one parameter moves all of them."""
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +26,8 @@ def test_an_effect_shows_what_numbers_of_all_runs_show(problem, common):
     names = [variation.name for variation in problem.variations]
     at = [names.index(name) for name in common.numbers]
     numbers = np.zeros_like(problem.variation)
-    numbers[:, at] = [s * problem.variations[k].usual for s, k in zip(SIZES, at, strict=False)]
+    sizes = [s * problem.variations[k].usual for s, k in zip(SIZES, at, strict=False)]
+    numbers[:, at] = SLOW * np.array(common.rates) if common.rates else sizes
     numbered = problem.with_variation(numbers, nominal, noise)
     same, values = begun(numbered, common)
     assert same == at

@@ -93,7 +93,7 @@ def test_numbers_that_undo_an_effect_are_seen_to_be_unneeded(declared):
     problem.own[:] = -0.5
     begin = Point(np.zeros(1), {DRIFT: problem.MEAN + 0.5})
     own = fit(problem, ["drift"], begin, Spreading(), refit_noise=False, iterations=0)
-    spread = own_likelihoods(own)(())
+    spread = own_likelihoods(own)(np.zeros((1, 0)))
     assert (spread(np.zeros(1)) < spread(np.ones(1))) is declared
 
 

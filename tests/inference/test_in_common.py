@@ -14,7 +14,9 @@ from tests.inference.stated import SIZE, Numbered, White, effect, size_of
 
 RUNS, SAMPLES, THRESHOLD = 6, 120, -8.0
 ASKEW, DRIFT, TRIM = range(3)
-MOUNTING, BALLAST = "mounting", "ballast"
+MOUNTING, BALLAST, CLOCK = "mounting", "ballast", "clock"
+TOGETHER = (1.0, -0.5)
+"""By how much the clock changes the first and the last number."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +25,9 @@ class Spreading(White):
 
 
 class Sensed(Numbered):
-    """Runs with three numbers, two of sensors and a trim. Effects do one of those, and the trim.
+    """Runs with three numbers, two of sensors and a trim.
+
+    Effects do one of those, the trim, and both at once.
 
     Args:
         askew: (RUNS,) what the first number should be.
@@ -45,13 +49,17 @@ class Sensed(Numbered):
         self.common_effects = (
             CommonEffect(MOUNTING, ("askew",), lambda shared: {SIZE: shared[0]}),
             CommonEffect(BALLAST, ("trim",), lambda shared: {SIZE: shared[0]}),
+            CommonEffect(
+                CLOCK, ("askew", "trim"), lambda shared: {SIZE: shared[0]}, rates=TOGETHER
+            ),
         )
         self.drive = Drive(uneven=True)
-        super().__init__((effect(MOUNTING), effect(BALLAST)))
+        super().__init__((effect(MOUNTING), effect(BALLAST), effect(CLOCK)))
 
     def left(self, z, effects):
-        shared = [effects[size_of(MOUNTING)], 0.0, effects[size_of(BALLAST)]]
-        numbers = self.own + np.array(shared)
+        alone = np.array([effects[size_of(MOUNTING)], 0.0, effects[size_of(BALLAST)]])
+        clock = effects[size_of(CLOCK)] * np.array([TOGETHER[0], 0.0, TOGETHER[1]])
+        numbers = self.own + alone + clock
         return self.data - np.einsum("rsk,rk->rs", self.x, numbers) - z[0] * self.y
 
     def variation_slopes(self, point, noise, filtered, steps):
@@ -80,6 +88,21 @@ def test_what_runs_share_of_a_trim_becomes_an_effect_and_the_rest_stays_theirs()
     assert found.fit.noise.spread[TRIM] == 1.0
     moved = found.fit.problem.variation[:, TRIM] + found.fit.point.effects[size_of(BALLAST)]
     assert moved == pytest.approx(own, abs=0.3)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_one_effect_that_moves_two_numbers_takes_the_place_of_two_effects(seed):
+    own = 3.0 + 0.5 * np.random.default_rng(seed).standard_normal(RUNS)
+    found = with_common_errors(explained(Sensed(own, -0.5 * own, seed)), THRESHOLD, [].append)
+    assert found.causes == (CLOCK,)
+    assert found.fit.point.effects[size_of(CLOCK)] == pytest.approx(3.0, abs=1.0)
+    # What the numbers have beside it is theirs.
+    assert found.fit.noise.spread == pytest.approx([1.0, 0.0, 1.0])
+    for number, rate in ((ASKEW, 1.0), (TRIM, -0.5)):
+        moved = (
+            found.fit.problem.variation[:, number] + rate * found.fit.point.effects[size_of(CLOCK)]
+        )
+        assert moved == pytest.approx(rate * own, abs=0.3)
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -41,7 +41,7 @@ def likelihood(seed, spreads=(0.0, 0.0), mean=0.0, may_share=True):
     residuals, shared, own, run_of, values = record(seed, spreads, mean)
     information = shared.T @ shared + np.eye(3)
     at = np.zeros((RUNS, 2))
-    common = np.full(2, not may_share)
+    common = np.eye(2)[:, [] if may_share else [0, 1]]
     found = Likelihood(residuals, shared, own, at, run_of, information, np.zeros(3), common)
     return found, values
 

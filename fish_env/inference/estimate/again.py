@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.coarse_fit import CoarseFit
 from fish_env.inference.estimate.fit import FEWER_STEPS, USUAL_STEPS, Fit, fit
 from fish_env.inference.estimate.free import DIFFERENCE, Free, linearise, spread_of
@@ -205,18 +206,18 @@ def run_variation(own: Fit) -> Spread:
         own: the fit; its weighting is held.
     """
     variations = own.problem.variations
-    differing = [i for i, variation in enumerate(variations) if not variation.shared]
-    return fit_spread(own_likelihoods(own)(differing), variations)
+    differing = np.array([not variation.shared for variation in variations])
+    return fit_spread(own_likelihoods(own)(np.eye(len(variations))[:, differing]), variations)
 
 
-def own_likelihoods(own: Fit) -> Callable[[Collection[int]], Likelihood]:
+def own_likelihoods(own: Fit) -> Callable[[FloatArray], Likelihood]:
     """How likely spreads are, in usual ones, in the linear model about a fit.
 
     Args:
         own: the fit; its weighting is held.
 
     Returns:
-        The likelihood from those numbers whose part that all runs have is a parameter of its own.
+        The likelihood from what all runs have in common, (K, m) as :class:`Likelihood` takes it.
     """
     problem, usual = own.problem, np.array([v.usual for v in own.problem.variations])
     free = Free(problem, own.effects, own.released)
@@ -231,10 +232,8 @@ def own_likelihoods(own: Fit) -> Callable[[Collection[int]], Likelihood]:
     prior = information(lin.slopes, free.prior), free.prior * vector
     at = problem.variation / usual
 
-    def likelihood(alike: Collection[int]) -> Likelihood:
-        common = [i in alike for i in range(len(usual))]
-        given = (lin.residuals, lin.slopes, slopes, at, lin.run_of, *prior)
-        return Likelihood(*given, np.array(common))
+    def likelihood(common: FloatArray) -> Likelihood:
+        return Likelihood(lin.residuals, lin.slopes, slopes, at, lin.run_of, *prior, common)
 
     return likelihood
 

@@ -66,12 +66,15 @@ class CommonEffect:
         values: its parameters from what runs share of each number (SI), and of those beside; None
             where no effect does that. Others stay at neutral.
         beside: names of further variations, which stay: part of them may be the effect's too.
+        rates: by how much each number changes with the one parameter that moves all of them (SI);
+            none where each has a parameter of its own. What is left of the numbers stays.
     """
 
     effect: str
     numbers: tuple[str, ...]
     values: Callable[[Sequence[float]], Mapping[str, float] | None]
     beside: tuple[str, ...] = ()
+    rates: tuple[float, ...] = ()
 
 
 def shown_spread(values: FloatArray, variance: FloatArray) -> FloatArray:

@@ -53,8 +53,8 @@ class Likelihood:
         run_of: (D,) run of each residual.
         information: (n, n) of the shared parameters with their prior.
         pull: (n,) gradient of the shared parameters' prior at the estimates.
-        common: (K,) whether what all runs have in common is a parameter of its own, which no
-            spread has to explain.
+        common: (K, m) what all runs have in common, each column a parameter of its own, which no
+            spread has to explain; in usual spreads of the numbers that it moves.
     """
 
     def __init__(
@@ -66,20 +66,20 @@ class Likelihood:
         run_of: IntArray,
         information: FloatArray,
         pull: FloatArray,
-        common: BoolArray,
+        common: FloatArray,
     ) -> None:
         shifted = residuals - np.einsum("dk,dk->d", own, at[run_of])
         edges = np.searchsorted(run_of, np.arange(len(at) + 1))
         slices = [slice(a, b) for a, b in pairwise(edges.tolist())]
         self.grams = np.array([own[s].T @ own[s] for s in slices])
         cross = np.array([own[s].T @ slopes[s] for s in slices])
-        self.cross = np.concatenate([cross, self.grams[:, :, common]], axis=2)
+        self.cross = np.concatenate([cross, self.grams @ common], axis=2)
         self.scores = np.array([own[s].T @ shifted[s] for s in slices])
-        mixed = cross.sum(axis=0)[common]
-        both = self.grams.sum(axis=0)[np.ix_(common, common)] + WIDE * np.eye(common.sum())
+        mixed = common.T @ cross.sum(axis=0)
+        both = common.T @ self.grams.sum(axis=0) @ common + WIDE * np.eye(common.shape[1])
         self.information = np.block([[information, mixed.T], [mixed, both]])
         pulls = inner(slopes, shifted[:, None])[:, 0] + pull
-        self.gradient = np.r_[pulls, self.scores.sum(axis=0)[common]]
+        self.gradient = np.r_[pulls, common.T @ self.scores.sum(axis=0)]
 
     def __call__(self, sd: FloatArray) -> float:
         """-2 log likelihood of spreads (K,), but for a constant."""

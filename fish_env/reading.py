@@ -225,13 +225,24 @@ def parse_json(text: str) -> Any:
         text: The JSON.
 
     Raises:
-        Unreadable: It is no JSON, nests too deep or holds a number of thousands of digits.
+        Unreadable: It is no JSON, nests too deep, repeats a key or holds a number of thousands of
+            digits.
     """
     try:
-        return json.loads(text)
+        return json.loads(text, object_pairs_hook=_without_repeats)
     except (ValueError, RecursionError) as error:
         reason = short(printable(str(error)), 120)
         raise Unreadable(f"this is no JSON ({reason})", "correct it") from None
+
+
+def _without_repeats(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """The object of these keys and values; the JSON parser alone would keep the last of a key."""
+    made = dict[str, Any]()
+    for key, value in pairs:
+        if key in made:
+            raise ValueError(f"the key '{short(key)}' occurs twice")
+        made[key] = value
+    return made
 
 
 def read_json(path: Path, most: int = MOST_TEXT_BYTES) -> Any:

@@ -80,7 +80,8 @@ def schedule(rows: Iterable[Mapping[str, float]]) -> CommandSteps:
     for row in rows:
         unknown = set(row) - {"t", *INPUTS}
         if unknown or "t" not in row:
-            problem = f"unknown command {sorted(unknown)}" if unknown else "a row without 't'"
+            named = shown(sorted(map(str, unknown)))
+            problem = f"unknown command {named}" if unknown else "a row without 't'"
             raise ScheduleError(f"schedule: {problem}; rows have t and any of {', '.join(INPUTS)}")
         current |= {name: float(row[name]) for name in INPUTS if name in row}
         times.append(float(row["t"]))

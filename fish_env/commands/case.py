@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from fish_env.data.schema import CommandSteps
-from fish_env.errors import ScheduleError
+from fish_env.errors import ParameterError, ScheduleError
 from fish_env.files import STANDARD
 from fish_env.params import FishParams, list_fish, load_fish
 from fish_env.reading import (
@@ -24,6 +24,7 @@ from fish_env.reading import (
     parse_json,
     read_json,
     read_standard_input,
+    short,
 )
 from fish_env.simulator import InitialState, schedule
 
@@ -103,9 +104,9 @@ def _check_keys(
     known = [*required, *optional]
     for key in data:
         if key not in known:
-            near = difflib.get_close_matches(key, known, 1)
+            near = difflib.get_close_matches(short(key), known, 1)
             hint = f"did you mean '{near[0]}'?" if near else f"known keys: {', '.join(known)}"
-            raise ScheduleError(f"{where}: unknown key '{key}'; {hint}")
+            raise ScheduleError(f"{where}: unknown key '{short(key)}'; {hint}")
     for key in required:
         if key not in data:
             raise ScheduleError(f"{where}: the key '{key}' is missing; add it")
@@ -120,7 +121,10 @@ def _fish(name: Any, file: Path, trust_effects: bool) -> FishParams:
         raise ScheduleError(f"{file}: fish: {error}") from None
     # A name without an ending that is no file is a misspelt preset: load_fish suggests the nearest.
     is_path = name not in list_fish() and (beside.is_file() or beside.suffix in (".yaml", ".yml"))
-    return load_fish(beside if is_path else name, trust_effects)
+    try:
+        return load_fish(beside if is_path else name, trust_effects)
+    except ParameterError as error:
+        raise ParameterError(f"{file}: fish: {error}") from error
 
 
 def _commands(rows: Any, file: Path) -> CommandSteps:
@@ -149,7 +153,7 @@ def _initial(data: Any, where: str) -> InitialState:
 
 def _effects(data: Any, where: str) -> dict[str, dict[str, float]]:
     named = _mapping({} if data is None else data, where)
-    return {name: _numbers(values, f"{where}.{name}") for name, values in named.items()}
+    return {name: _numbers(values, f"{where}.{short(name)}") for name, values in named.items()}
 
 
 def _vector(data: Any, where: str) -> tuple[float, float, float]:
@@ -161,7 +165,7 @@ def _vector(data: Any, where: str) -> tuple[float, float, float]:
 
 def _numbers(data: Any, where: str) -> dict[str, float]:
     given = _mapping(data, where)
-    return {key: _number(value, f"{where}.{key}") for key, value in given.items()}
+    return {key: _number(value, f"{where}.{short(key)}") for key, value in given.items()}
 
 
 def _number(value: Any, where: str) -> float:

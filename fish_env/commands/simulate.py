@@ -10,9 +10,9 @@ import numpy as np
 from rich.console import Console
 
 from fish_env.arrays import FloatArray
-from fish_env.commands.case import read_case
+from fish_env.commands.case import Case, read_case
 from fish_env.commands.numbers import write_json
-from fish_env.errors import ScheduleError
+from fish_env.errors import EffectError, ScheduleError, SimulationDiverged
 from fish_env.files import STANDARD, cannot_write, check_outputs
 from fish_env.motion_files import (
     description_file,
@@ -58,11 +58,7 @@ def simulate_case(
     case = read_case(case_file, trust_effects)
     described = None if out is None or out.suffix != ".csv" else description_file(out)
     check_outputs([out, described, replay, json_file], [case_file, *fish_files(case.fish)])
-    simulator = Simulator(case.fish, dt, case.effects)
-    try:
-        trajectory = simulator.run(case.commands, case.duration_s, case.initial, rate_hz)
-    except ScheduleError as error:
-        raise ScheduleError(f"{case_file}: {error}") from error
+    trajectory = _simulated(case, case_file, dt, rate_hz)
     table = pose_table(trajectory)
     if out is not None or json_file is None or str(json_file) != STANDARD:
         write_table(table, out)
@@ -73,6 +69,18 @@ def simulate_case(
 
         # Standard output may be the table.
         replay_case(Console(stderr=True), case, dt, case_file.stem, replay)
+
+
+def _simulated(case: Case, case_file: Path, dt: float, rate_hz: float) -> Trajectory:
+    """The motion of a case; errors about the case name its file."""
+    try:
+        simulator = Simulator(case.fish, dt, case.effects)
+    except EffectError as error:
+        raise EffectError(f"{case_file}: {error}") from error
+    try:
+        return simulator.run(case.commands, case.duration_s, case.initial, rate_hz)
+    except (ScheduleError, SimulationDiverged) as error:
+        raise ScheduleError(f"{case_file}: {error}") from error
 
 
 def pose_table(trajectory: Trajectory) -> dict[str, FloatArray]:

@@ -93,7 +93,7 @@ class Section:
         value = self.text(key)
         if value not in choices:
             known = ", ".join(choices)
-            raise self.at(key).refuse(f"'{value}' is not known here", f"Use one of: {known}")
+            raise self.at(key).refuse(f"'{short(value)}' is not known here", f"Use one of: {known}")
         return value
 
     def number(self, key: str) -> float:

@@ -6,7 +6,10 @@ from difflib import get_close_matches
 from pathlib import Path
 
 from fish_env.errors import DatasetError
-from fish_env.reading import Unreadable, printable
+from fish_env.reading import Unreadable, printable, short
+
+LONGEST_SHOWN = 120
+"""Characters of a column's name or of a key in a message."""
 
 
 @dataclass(frozen=True)
@@ -48,8 +51,8 @@ class Place:
         parts = [str(self.file)]
         parts += [f"run {self.run}"] if self.run is not None else []
         parts += [f"row {self.row}"] if self.row is not None else []
-        parts += [f"column {self.column}"] if self.column is not None else []
-        parts += [f"key {self.key}"] if self.key is not None else []
+        parts += [f"column {short(self.column, LONGEST_SHOWN)}"] if self.column is not None else []
+        parts += [f"key {short(self.key, LONGEST_SHOWN)}"] if self.key is not None else []
         return ", ".join(parts)
 
 

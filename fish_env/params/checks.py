@@ -29,7 +29,7 @@ from fish_env.params.balance import central_inertia
 from fish_env.params.fields import Leaf, leaves, tables
 from fish_env.params.fish_data import FishData
 from fish_env.params.provenance import STATUSES, Origin, Posterior
-from fish_env.reading import printable_lines, shown
+from fish_env.reading import printable_lines, short, shown
 
 
 def check_fish(fish: FishData) -> None:
@@ -164,12 +164,12 @@ def check_central_inertia(fish: FishData) -> None:
 def check_effects(fish: FishData) -> None:
     """Checks that effects are names with named finite numbers."""
     for name, parameters in fish.effects.items():
-        key = f"effects.{name}"
+        key = f"effects.{short(str(name))}"
         if not isinstance(name, str) or not isinstance(parameters, Mapping):
             remedy = "write each effect as a name with its parameters below"
             raise fault(fish, key, f"is {shown(parameters)}", remedy)
         for parameter, value in parameters.items():
-            check_number(fish, f"{key}.{parameter}", value)
+            check_number(fish, f"{key}.{short(str(parameter))}", value)
 
 
 def check_provenance(fish: FishData) -> None:
@@ -180,17 +180,17 @@ def check_provenance(fish: FishData) -> None:
         check_origin(fish, path, origin)
         if path not in known:
             remedy = f"name a parameter or a group{closest(path, known)}"
-            raise fault(fish, f"provenance.{path}", "belongs to nothing", remedy)
+            raise fault(fish, f"provenance.{short(path)}", "belongs to nothing", remedy)
 
 
 def check_origin(fish: FishData, path: str, origin: Origin) -> None:
     """Checks status and source of one origin."""
     if origin.status not in STATUSES:
         remedy = f"use one of {', '.join(STATUSES)}"
-        raise fault(fish, f"provenance.{path}.status", f"is {shown(origin.status)}", remedy)
+        raise fault(fish, f"provenance.{short(path)}.status", f"is {shown(origin.status)}", remedy)
     if not isinstance(origin.source, str) or not printable_lines(origin.source.strip() or "\0"):
         remedy = "say in words where the value comes from"
-        raise fault(fish, f"provenance.{path}.source", f"is {shown(origin.source)}", remedy)
+        raise fault(fish, f"provenance.{short(path)}.source", f"is {shown(origin.source)}", remedy)
 
 
 def check_posterior(fish: FishData, posterior: Posterior) -> None:
@@ -219,7 +219,7 @@ def check_names(fish: FishData, names: tuple[str, ...]) -> None:
             raise fault(fish, f"posterior.names: {shown(name)}", "is no text", "write a path")
         if name not in known:
             remedy = f"name a parameter or an effect parameter of this file{closest(name, known)}"
-            raise fault(fish, f"posterior.names: {name}", "is unknown", remedy)
+            raise fault(fish, f"posterior.names: {short(name)}", "is unknown", remedy)
     if len(set(names)) < len(names):
         raise fault(fish, "posterior.names", "has a name twice", "name each parameter once")
 

@@ -18,7 +18,7 @@ from fish_env.params.files import read_yaml, write_yaml
 from fish_env.params.provenance import Origin, Posterior, Provenance
 from fish_env.params.schema import FishParams
 from fish_env.params.tables import write_table
-from fish_env.reading import Unreadable, located, short, shown
+from fish_env.reading import Unreadable, located, shown
 
 SUFFIXES = (".yaml", ".yml")
 MOST_BASES = 20
@@ -129,7 +129,7 @@ def find_fish(name_or_path: str | Path, folder: Path) -> Path:
         raise ParameterError(f"{path}: no such file; check the path")
     presets = list_fish()
     raise ParameterError(
-        f"no fish '{short(name)}'{closest(name, presets) or ';'} "
+        f"no fish {shown(name)}{closest(name, presets) or ';'} "
         f"give the path of a YAML file or one of {', '.join(presets)}"
     )
 

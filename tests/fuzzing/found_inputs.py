@@ -12,6 +12,8 @@ MERGES = "a0: &a0 {x: 1, y: 2}\n" + "".join(
     f"a{i}: &a{i} {{<<: [*a{i - 1}, *a{i - 1}, *a{i - 1}], z{i}: 1}}\n" for i in range(1, 25)
 )
 
+LONG = "k" * 100_000
+
 TEXTS: dict[str, str] = {
     "alias bomb of lists": ALIASES,
     "alias bomb of mappings": MAPPINGS,
@@ -51,6 +53,24 @@ TEXTS: dict[str, str] = {
     "JSON of NaN": "NaN",
     "a wide CSV": ",".join(f"c{i}" for i in range(20_000)) + "\n" + ",".join("0" * 20_000),
     "an open quotation mark": 't,x\n0,"1\n',
+    "a key of 100,000 letters": f"? {LONG}\n: 1",
+    "a format of 100,000 letters": f"format: {LONG}",
+    "an origin of 100,000 letters": (
+        f"name: x\nbase: zheng-2021-a\nprovenance:\n  ? {LONG}\n  : {{status: a, source: b}}"
+    ),
+    "JSON with a key of 100,000 letters": (
+        f'{{"fish": "zheng-2021-a", "duration_s": 1, "schedule": [], "{LONG}": 1}}'
+    ),
+    "JSON with a command of 100,000 letters": (
+        f'{{"fish": "zheng-2021-a", "duration_s": 1, "schedule": [{{"t": 0, "{LONG}": 1}}]}}'
+    ),
+    "JSON with an effect of 100,000 letters": (
+        f'{{"fish": "zheng-2021-a", "duration_s": 1, "schedule": [{{"t": 0}}], '
+        f'"effects": {{"{LONG}": {{"a": "x"}}}}}}'
+    ),
+    "JSON with a key twice": (
+        '{"fish": "zheng-2021-a", "duration_s": 1, "duration_s": 2, "schedule": [{"t": 0}]}'
+    ),
     "two megabytes": "a: 1\n# " + "x" * 2_000_000,
 }
 
@@ -63,6 +83,9 @@ FISH: dict[str, str] = {
     "covariance of a number": "posterior: {names: [mass.total], mean: [1], covariance: [5]}",
     "covariance of words": (
         "posterior: {names: [mass.total], mean: [1], covariance: [[a]], validity: {}}"
+    ),
+    "a name of 100,000 letters": (
+        f"posterior: {{names: [{LONG}], mean: [1], covariance: [[1]], validity: {{}}}}"
     ),
     "names are mappings": (
         "posterior: {names: [{a: b}], mean: [1], covariance: [[1]], validity: {}}"

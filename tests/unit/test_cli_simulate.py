@@ -11,7 +11,7 @@ import pytest
 
 from fish_env.commands.case import read_case
 from fish_env.commands.simulate import COLUMNS, simulate_case
-from fish_env.errors import ParameterError, ScheduleError
+from fish_env.errors import ParameterError, RoboticFishError, ScheduleError
 from fish_env.params import load_fish, save_fish
 
 TOLERANCE = 1e-7
@@ -168,3 +168,24 @@ def test_a_missing_fish_file_is_looked_for_beside_the_case(tmp_path: Path) -> No
 def test_an_unknown_output_ending_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ScheduleError, match=r"\.csv or \.parquet"):
         simulate_case(written(tmp_path), 0.01, 10.0, tmp_path / "out.txt")
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"fish": "no-such"},
+        {"effects": {"servo_lag": {"time_constant": -1.0}}},
+        {"initial": {"velocity_body": [1e300, 0.0, 0.0]}},
+    ],
+    ids=["unknown fish", "an effect beyond its bounds", "a state that diverges"],
+)
+def test_a_case_that_cannot_be_simulated_is_named(changes: dict[str, Any], tmp_path: Path) -> None:
+    case = written(tmp_path, **changes)
+    with pytest.raises(RoboticFishError) as caught:
+        simulated(case, tmp_path / "out.csv")
+    assert str(caught.value).startswith(f"{case}: ")
+
+
+def test_a_wrong_step_is_not_put_on_the_case(tmp_path: Path) -> None:
+    with pytest.raises(ScheduleError, match=r"^dt = 1e-12"):
+        simulated(written(tmp_path), tmp_path / "out.csv", dt=1e-12)

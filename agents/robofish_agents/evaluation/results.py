@@ -13,7 +13,7 @@ import numpy as np
 from fish_env.envs.registration import ENV_ID
 from fish_env.errors import ConfigError
 from fish_env.files import write_text
-from fish_env.reading import Unreadable, read_json
+from fish_env.reading import Unreadable, read_json, short
 from fish_env.version import versioned
 from robofish_agents.evaluation.goal_metrics import measure_task
 from robofish_agents.evaluation.intervals import Interval, bootstrap, rate
@@ -130,7 +130,8 @@ def read_results(path: Path) -> list[Result]:
     except Unreadable as error:
         raise ConfigError(f"{path}: no results of `robofish evaluate`: {error}") from error
     except (ValueError, KeyError, TypeError, AttributeError) as error:
-        raise ConfigError(f"{path}: no results of `robofish evaluate`: {error!r}") from error
+        reason = short(repr(error), 120)
+        raise ConfigError(f"{path}: no results of `robofish evaluate`: {reason}") from error
 
 
 def _from_json(row: dict[str, Any]) -> Result:

@@ -163,9 +163,8 @@ def _find(name_or_path: str | Path) -> Path:
     except Unreadable as error:
         raise ConfigError(f"{error}") from None
     if not path.is_file():
-        raise ConfigError(
-            f"suite '{name_or_path}': neither one of {', '.join(suite_names())} nor a file"
-        )
+        known = ", ".join(suite_names())
+        raise ConfigError(f"suite {shown(str(name_or_path))}: neither one of {known} nor a file")
     return path
 
 

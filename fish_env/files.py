@@ -217,16 +217,16 @@ def check_first_line(output: Path, first: str) -> None:
 
 
 def check_mark(output: Path, mark: str) -> None:
-    """Refuses to replace a file that does not hold, near its beginning, what this program writes.
+    """Refuses to replace a file that does not hold, near an end, what this program writes.
 
     Args:
         output: The file, which need not be there.
-        mark: Words within its first two kilobytes.
+        mark: Words within its first or last two kilobytes.
 
     Raises:
         OutputError: It is another file.
     """
-    if output.exists() and mark.encode() not in _begin(output, _MARKED):
+    if output.exists() and mark.encode() not in _begin(output, _MARKED) + _end(output, _MARKED):
         raise _of_someone_else(output)
 
 
@@ -234,6 +234,15 @@ def _begin(file: Path, count: int) -> bytes:
     """The first bytes of a file; none of what is no file or cannot be read."""
     if file.is_file():
         with suppress(OSError), file.open("rb") as stream:
+            return stream.read(count)
+    return b""
+
+
+def _end(file: Path, count: int) -> bytes:
+    """The last bytes of a file, as :func:`_begin` gives the first."""
+    if file.is_file():
+        with suppress(OSError), file.open("rb") as stream:
+            stream.seek(max(0, file.stat().st_size - count))
             return stream.read(count)
     return b""
 

@@ -16,8 +16,8 @@ import numpy as np
 
 from fish_env.arrays import FloatArray
 from fish_env.errors import missing_extra
-from fish_env.files import replacing, write_text
-from fish_env.version import WRITER
+from fish_env.files import check_mark, check_no_links, replacing, write_text
+from fish_env.version import PROGRAM, WRITER
 
 
 def write_csv(columns: Mapping[str, FloatArray], stream: TextIO) -> None:
@@ -39,8 +39,9 @@ def write_csv_file(columns: Mapping[str, FloatArray], path: str | Path) -> None:
         path: The CSV file.
 
     Raises:
-        OutputError: A file cannot be written.
+        OutputError: A file cannot be written, or the description would replace another file.
     """
+    check_description(path)
     with replacing(path) as part, part.open("w", encoding="utf-8") as stream:
         write_csv(columns, stream)
     if Path(path).is_file():  # and no pipe or device
@@ -78,6 +79,19 @@ def description_file(path: str | Path) -> Path:
         path: The CSV file.
     """
     return Path(f"{path}-metadata.json")
+
+
+def check_description(path: str | Path) -> None:
+    """Refuses a CSV file whose description would replace what this program did not write.
+
+    Args:
+        path: The CSV file.
+
+    Raises:
+        OutputError: Names the file in the description's place.
+    """
+    check_no_links([description_file(path)])
+    check_mark(description_file(path), PROGRAM)
 
 
 def _description(columns: Iterable[str], file: str) -> dict[str, Any]:

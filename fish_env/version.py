@@ -7,7 +7,9 @@ from collections.abc import Mapping
 from typing import Any
 
 VERSION = "0.2.0"
-WRITER = f"robotic-fish {VERSION}"
+PROGRAM = "robotic-fish"
+"""What stands in each file that is written, of whichever version."""
+WRITER = f"{PROGRAM} {VERSION}"
 WRITTEN_BY = "Written by"
 """How the comment above a YAML text begins."""
 

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any
 from fish_env.comparison import RunsComparison, SteadyComparison
 from fish_env.comparison.words import in_words
 from fish_env.diagnosis.headline import headline
-from fish_env.diagnosis.writing import EXTENDED
-from fish_env.files import write_bytes
+from fish_env.diagnosis.writing import EXTENDED, check_marks
+from fish_env.files import check_no_links, write_bytes
 from fish_env.identification.dataset_fit import DatasetFit
 from fish_env.params import FishParams, load_fish
 from fish_env.version import versioned
@@ -267,6 +267,7 @@ class DiagnoseResult(Result):
         """
         figures = sorted((self.folder / "figures").glob("*.svg"))
         if folder is not None:
+            check_marks(Path(folder) / figure.name for figure in figures)
             for figure in figures:
                 write_bytes(Path(folder) / figure.name, figure.read_bytes())
         return Pictures(figures)
@@ -281,10 +282,14 @@ class DiagnoseResult(Result):
             The report.
 
         Raises:
-            OutputError: A file cannot be written.
+            OutputError: A file cannot be written, or is none of a diagnosis.
         """
-        for file in sorted(path for path in self.folder.rglob("*") if path.is_file()):
-            write_bytes(Path(folder) / file.relative_to(self.folder), file.read_bytes())
+        files = sorted(path for path in self.folder.rglob("*") if path.is_file())
+        copies = {file: Path(folder) / file.relative_to(self.folder) for file in files}
+        check_no_links(copies.values())
+        check_marks(copies.values())
+        for file, copy in copies.items():
+            write_bytes(copy, file.read_bytes())
         return Path(folder) / REPORT
 
 

@@ -9,7 +9,9 @@ import numpy as np
 from rich.console import Console
 
 from fish_env.errors import ConfigError
+from fish_env.files import check_mark, check_no_links
 from fish_env.params import FishParams, load_fish
+from fish_env.version import PROGRAM
 
 Formats = tuple[str, ...]
 FORMATS = ("png", "svg", "pdf")
@@ -80,6 +82,8 @@ def plot_fish(
     Raises:
         ConfigError: An unknown kind or format.
         ParameterError: The fish cannot be used.
+        OutputError: A picture cannot be written, is a link, or would replace a file that this
+            program did not write.
     """
     if kind not in (*KINDS, "all"):
         raise ConfigError(f"no picture '{kind}': choose {', '.join(KINDS)} or all")
@@ -87,8 +91,13 @@ def plot_fish(
     if unknown:
         raise ConfigError(f"no format '{unknown[0]}': choose from {', '.join(FORMATS)}")
     loaded = load_fish(fish, trust_effects)
+    names = list(KINDS) if kind == "all" else [kind]
+    paths = [out / f"{name}.{ending}" for name in names for ending in formats]
+    check_no_links(paths)
+    for path in paths:
+        check_mark(path, PROGRAM)
     written = []
-    for name in KINDS if kind == "all" else (kind,):
+    for name in names:
         with console.status(f"swimming and drawing: {name}"):
             written.append(KINDS[name](loaded, out, tuple(formats)))
         for ending in formats:

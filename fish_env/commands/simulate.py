@@ -15,6 +15,7 @@ from fish_env.commands.numbers import write_json
 from fish_env.errors import EffectError, ScheduleError, SimulationDiverged
 from fish_env.files import STANDARD, cannot_write, check_outputs
 from fish_env.motion_files import (
+    check_description,
     description_file,
     write_csv,
     write_csv_file,
@@ -58,6 +59,8 @@ def simulate_case(
     case = read_case(case_file, trust_effects)
     described = None if out is None or out.suffix != ".csv" else description_file(out)
     check_outputs([out, described, replay, json_file], [case_file, *fish_files(case.fish)])
+    if out is not None and described is not None:
+        check_description(out)
     trajectory = _simulated(case, case_file, dt, rate_hz)
     table = pose_table(trajectory)
     if out is not None or json_file is None or str(json_file) != STANDARD:

@@ -46,7 +46,7 @@ def write_dataset(dataset: Dataset | SteadyDataset, folder: str | Path, frame: s
     target = Path(folder)
     if frame not in ("ned", "enu"):
         raise DatasetError(f"frame '{frame}' is not known; use 'ned' or 'enu'.")
-    if (target / FILE_NAME).exists():
+    if os.path.lexists(target / FILE_NAME):
         raise DatasetError(f"{target} already holds a dataset; give another folder.")
     if isinstance(dataset, SteadyDataset):
         steady = dataset if frame == "ned" else switch_steady_frame(dataset)
@@ -95,7 +95,7 @@ def check_free(folder: Path, names: Iterable[str]) -> None:
         DatasetError: One of them is there already.
     """
     for name in names:
-        if (folder / name).exists():
+        if os.path.lexists(folder / name):  # a link, too, whatever it points to
             raise DatasetError(
                 f"{folder / name} already exists and would be overwritten; give another folder."
             )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +14,10 @@ from fish_env.diagnosis.written import replace_part
 from fish_env.files import check_mark, check_no_links, write_text
 from fish_env.params.io import fish_outputs, save_fish
 from fish_env.params.schema import FishParams
-from fish_env.version import WRITER
+from fish_env.version import PROGRAM
 
 ANSWER, REPORT, EXTENDED = "diagnosis.json", "report.html", "extended.yaml"
 FIGURES = "figures"
-PROGRAM = WRITER.split()[0]
 MARKS = {
     ANSWER: f'"format": "{FORMAT.split("/")[0]}/',
     REPORT: PROGRAM,
@@ -55,12 +54,24 @@ def check_own(fish: FishParams, folder: Path) -> None:
         OutputError: names a link, or a file of the user with the name of one of a diagnosis.
     """
     check_no_links(outputs(fish, folder))
-    for name, mark in MARKS.items():
-        check_mark(folder / name, mark)
-    for picture in sorted((folder / FIGURES).glob("*")):
-        if FIGURE.fullmatch(picture.name):
-            check_no_links([picture])
-            check_mark(picture, PROGRAM)
+    check_marks(folder / name for name in MARKS)
+    check_marks(sorted((folder / FIGURES).glob("*")))
+
+
+def check_marks(files: Iterable[Path]) -> None:
+    """Refuses files with names of a diagnosis that no diagnosis wrote, or that are links.
+
+    Args:
+        files: files that need not be there; others in their folders are passed over.
+
+    Raises:
+        OutputError: names a file.
+    """
+    for file in files:
+        mark = PROGRAM if FIGURE.fullmatch(file.name) else MARKS.get(file.name)
+        if mark is not None:
+            check_no_links([file])
+            check_mark(file, mark)
 
 
 def write_answer(answer: Mapping[str, Any], extended: FishParams | None, folder: Path) -> None:

@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from fish_env.files import replacing
+from fish_env.files import check_no_links, replacing
 from fish_env.version import WRITER
 
 if TYPE_CHECKING:
@@ -114,9 +114,14 @@ def keep_literal(figure: Figure) -> None:
 
 
 def save(figure: Figure, folder: Path, name: str, formats: tuple[str, ...] | None = None) -> Path:
-    """Writes a figure as `<folder>/<name>.<format>` for each format; returns the first path."""
+    """Writes a figure as `<folder>/<name>.<format>` for each format; returns the first path.
+
+    Raises:
+        OutputError: A file cannot be written, or is a link.
+    """
     keep_literal(figure)
     paths = [folder / f"{name}.{ending}" for ending in formats or FORMATS]
+    check_no_links(paths)
     for path in paths:
         with replacing(path) as part:
             figure.savefig(part, dpi=DOTS_PER_INCH)

@@ -8,14 +8,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
+from fish_env.analysis.results import DiagnoseResult
 from fish_env.campaign import Options, find_cases, run_campaign
 from fish_env.campaign.cases import prepare
 from fish_env.campaign.run import MARK, TABLE
 from fish_env.cluster import ClusterSettings
+from fish_env.commands.plot import plot_fish
+from fish_env.data import load_dataset, write_dataset
 from fish_env.diagnosis import diagnose
 from fish_env.diagnosis.written import LIST, replace_part
-from fish_env.errors import ConfigError, OutputError, RoboticFishError
+from fish_env.errors import ConfigError, DatasetError, OutputError, RoboticFishError
+from fish_env.simulator import Simulator
 from robofish_agents.sweep.plan import plan
 from robofish_agents.sweep.run import PLAN, run_sweep
 from robofish_agents.sweep.run import TABLE as SWEEP_TABLE
@@ -214,3 +219,68 @@ def test_a_checkpoint_that_unpacks_to_more_than_it_is_is_refused(tmp_path):
         archive.writestr("array_1.npy", packed.getvalue())
     with pytest.raises(ValueError, match="unpacked"):
         read_plain(file)
+
+
+def simulate_into(folder: Path) -> None:
+    Simulator("zheng-2021-a").run([{"t": 0.0}], 0.2).to_csv(folder / "swim.csv")
+
+
+def plot_into(folder: Path) -> None:
+    plot_fish(Console(quiet=True), "trim", "zheng-2021-a", folder, ["png", "svg", "pdf"])
+
+
+WRITERS = {
+    "swim.csv-metadata.json": simulate_into,
+    "trim.png": plot_into,
+    "trim.svg": plot_into,
+    "trim.pdf": plot_into,
+}
+"""Name that a program chose -> what writes it into a folder."""
+
+
+@pytest.mark.parametrize("name", WRITERS)
+def test_a_file_that_the_user_did_not_name_is_kept(name, mine, tmp_path):
+    """Another file of that name is refused, a link too; what this program wrote is replaced."""
+    folder = tmp_path / "out"
+    folder.mkdir()
+    (folder / name).write_text("of the user")
+    with pytest.raises(OutputError, match=rf"{name}: this program did not write it"):
+        WRITERS[name](folder)
+    assert [file.name for file in folder.iterdir()] == [name]
+    (folder / name).unlink()
+    (folder / name).symlink_to(mine)
+    with pytest.raises(OutputError, match=rf"{name}: is a link"):
+        WRITERS[name](folder)
+    assert mine.read_text() == "of the user"
+    (folder / name).unlink()
+    WRITERS[name](folder)
+    WRITERS[name](folder)
+    assert (folder / name).stat().st_size > 100
+
+
+def test_a_copy_of_a_diagnosis_replaces_no_file_of_the_user(mine, tmp_path):
+    kept, copy = tmp_path / "kept", tmp_path / "copy"
+    for folder in (kept, copy):
+        (folder / "figures").mkdir(parents=True)
+    (kept / "report.html").write_text("a report")
+    (kept / "figures" / "gain.svg").write_text("a picture")
+    found = DiagnoseResult({}, kept)
+    (copy / "report.html").write_text("of the user")
+    with pytest.raises(OutputError, match=r"report\.html: this program did not write it"):
+        found.save(copy)
+    (copy / "report.html").unlink()
+    (copy / "gain.svg").symlink_to(mine)
+    with pytest.raises(OutputError, match=r"gain\.svg: is a link"):
+        found.plot(copy)
+    assert mine.read_text() == "of the user"
+
+
+def test_a_dataset_is_written_through_no_link(tmp_path):
+    dataset, out = load_dataset(good_folder(tmp_path / "data")), tmp_path / "out"
+    out.mkdir()
+    for name in ("dataset.yaml", "r01.csv"):
+        (out / name).symlink_to(tmp_path / "nowhere")
+        with pytest.raises(DatasetError, match="already"):
+            write_dataset(dataset, out)
+        (out / name).unlink()
+    assert not (tmp_path / "nowhere").exists()

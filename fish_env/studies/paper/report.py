@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fish_env.comparison.errors import plain
-from fish_env.files import write_text
+from fish_env.files import check_mark, check_no_links, write_text
 from fish_env.studies.paper import ranges
 from fish_env.studies.paper.motions import Study
 from fish_env.studies.paper.statements import (
@@ -19,6 +19,7 @@ from fish_env.studies.paper.statements import (
 )
 from fish_env.version import versioned
 
+TITLE = "# The paper's statements and this model"
 COLUMNS = ("motion", "statement", "criterion", "this model", "verdict")
 
 
@@ -28,7 +29,7 @@ def statements_markdown(study: Study) -> str:
     held = sum(s.held for s in statements)
     return "\n".join(
         [
-            "# The paper's statements and this model",
+            TITLE,
             "",
             "Written by `robofish paper`. "
             f"The model without effects reproduces {held} of {len(statements)} statements. "
@@ -111,7 +112,10 @@ def _statement(statement: Statement) -> dict[str, Any]:
 
 def write_report(study: Study, folder: Path) -> list[Path]:
     """Writes `statements.md` and `paper.json`; returns their paths."""
-    words, numbers = folder / "statements.md", folder / "paper.json"
+    words, numbers = reports = [folder / "statements.md", folder / "paper.json"]
+    check_no_links(reports)
+    check_mark(words, TITLE)
+    check_mark(numbers, '"version": ')
     write_text(words, statements_markdown(study))
     write_text(numbers, json.dumps(versioned(study_json(study)), indent=1, allow_nan=False) + "\n")
     return [words, numbers]

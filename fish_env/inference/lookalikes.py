@@ -132,6 +132,26 @@ def asked_of_rates(
     return _asked(current.fit.problem, current, swaps, POLICY.rate_steps, leeway, report)
 
 
+def rates_asked_again(
+    current: Explanation, before: Explanation, others: Sequence[Explanation], report: Report
+) -> tuple[Explanation, tuple[Explanation, ...]]:
+    """The explanation with the clock or drive that fits best, and those with one as good.
+
+    What was compared beside a wrong cause may compare otherwise beside the right one.
+
+    Args:
+        current: causes with their fit.
+        before: those that were compared with others.
+        others: these, each with another clock or drive in the place of one of its causes.
+        report: told what is being done.
+    """
+    pairs, steps = rates(current), POLICY.rate_steps
+    swaps = [(swap, other) for other in others if (swap := swap_between(before, other)) in pairs]
+    found = [_beside_fewer(current, *swap, other, report, steps) for swap, other in swaps if swap]
+    best, *rest = sorted((current, *filter(None, found)), key=lambda e: e.score)
+    return best, rivals_of(best, rest)
+
+
 def _without_what_runs_explain(current: Explanation, report: Report) -> Explanation:
     """The explanation without rates in whose place the runs' own numbers explain as much.
 
@@ -317,7 +337,12 @@ def still_alike(
 
 
 def _beside_fewer(
-    found: Explanation, cause: CauseId, other: EffectName, rival: Explanation, report: Report
+    found: Explanation,
+    cause: CauseId,
+    other: EffectName,
+    rival: Explanation,
+    report: Report,
+    steps: int = POLICY.swap_steps,
 ) -> Explanation | None:
     """An explanation with another effect in the place of a cause, at its values in a rival."""
     own = found.fit
@@ -326,7 +351,7 @@ def _beside_fewer(
     values = of_effects(rival.fit.point.effects, {other})
     begin = CoarseFit(effects, own.released, Point(own.point.z, {**kept, **values}), np.inf)
     enough = own.objective + POLICY.coarse_fit_leeway
-    fitted = _fitted(own.problem, own, cause, begin, POLICY.swap_steps, enough)
+    fitted = _fitted(own.problem, own, cause, begin, steps, enough)
     return None if fitted is None else Explanation(found.causes_with(other, cause), fitted)
 
 

@@ -7,7 +7,7 @@ from functools import partial
 from fish_env.inference.elimination import backward_elimination
 from fish_env.inference.estimate.again import to_publish
 from fish_env.inference.explanation import Explanation, reached
-from fish_env.inference.lookalikes import asked_of_lags, asked_of_rates
+from fish_env.inference.lookalikes import asked_of_lags, asked_of_rates, rates_asked_again
 from fish_env.inference.progress import Report
 from fish_env.inference.screening import Screen
 
@@ -27,10 +27,14 @@ def published(
     """
     if not current.fit.problem.drive.uneven:
         return _converged(current, report), ()
-    current, rates = asked_of_rates(current, shown, report)
-    current = _converged(current, report, judged=True)
+    begun = current
+    asked, rates = asked_of_rates(begun, shown, report)
+    current = _converged(asked, report, judged=True)
     best, lags = asked_of_lags(current, shown, report)
-    return best, (*rates, *lags) if best is current else lags
+    if best is current:
+        return best, (*rates, *lags)
+    best, rates = rates_asked_again(best, asked, (begun, *rates), report)
+    return best, (*rates, *lags)
 
 
 def _converged(current: Explanation, report: Report, judged: bool = False) -> Explanation:

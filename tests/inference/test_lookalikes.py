@@ -14,6 +14,7 @@ from fish_env.inference.lookalikes import (
     decided,
     late,
     rates,
+    rates_asked_again,
     still_alike,
     undecided,
 )
@@ -260,6 +261,19 @@ def test_a_rival_lag_is_asked_again_beside_fewer_causes(share, alike):
     before, rival = beside_another(share)
     fewer = Explanation((LAG,), fit(before.fit.problem, [LAG]))
     assert [e.causes for e in still_alike(fewer, before, [rival], [].append)] == alike
+
+
+@pytest.mark.parametrize("share", [1.0 - 1e-6, 0.9])
+def test_rates_are_compared_again_beside_another_cause(share):
+    """What was left out in favour of a look-alike beside one cause may fit best beside the next."""
+    right, wrong = beside_another(share)
+    stated = right.fit.problem
+    stated.out_of_step = (LAG, LIMIT)
+    lone = [Explanation((name,), fit(stated, [name])) for name in (LIMIT, LAG)]
+    best, alike = rates_asked_again(wrong, lone[0], [lone[1]], [].append)
+    assert {best.causes, *(e.causes for e in alike)} >= {right.causes}
+    assert (best.causes == right.causes) or share > 0.9
+    assert rates_asked_again(right, lone[1], [], [].append) == (right, ())
 
 
 def test_a_rival_lag_stays_one_beside_the_same_causes():

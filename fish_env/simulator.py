@@ -72,27 +72,45 @@ def schedule(rows: Iterable[Mapping[str, float]]) -> CommandSteps:
     Each row holds until the next; a command that a row leaves out keeps its value (first: 0).
 
     Raises:
-        ScheduleError: no rows, an unknown command, or times that do not increase.
+        ScheduleError: no rows, an unknown command, a value that is no finite number, or times that
+            do not increase.
     """
     times: list[float] = []
     values: list[list[float]] = []
     current = dict.fromkeys(INPUTS, 0.0)
-    for row in rows:
+    for row in _mappings(rows):
         unknown = set(row) - {"t", *INPUTS}
         if unknown or "t" not in row:
             named = shown(sorted(map(str, unknown)))
             problem = f"unknown command {named}" if unknown else "a row without 't'"
             raise ScheduleError(f"schedule: {problem}; rows have t and any of {', '.join(INPUTS)}")
+        wrong = next((name for name in row if not is_number(row[name])), None)
+        if wrong is not None:
+            raise ScheduleError(
+                f"schedule: {wrong} must be a finite number, got {shown(row[wrong])}"
+            )
         current |= {name: float(row[name]) for name in INPUTS if name in row}
         times.append(float(row["t"]))
         values.append(list(current.values()))
     if not times:
         raise ScheduleError("the schedule is empty: give at least one row of commands")
-    if np.any(np.diff(times) <= 0) or not np.all(np.isfinite(times)):
-        raise ScheduleError(f"schedule: times must be finite and increase, got {shown(times)}")
-    if not np.all(np.isfinite(values)):
-        raise ScheduleError("schedule: every command must be a finite number")
+    if np.any(np.diff(times) <= 0):
+        raise ScheduleError(f"schedule: times must increase, got {shown(times)}")
     return CommandSteps(np.array(times), np.array(values))
+
+
+def _mappings(rows: Iterable[Mapping[str, float]]) -> list[Mapping[str, float]]:
+    """The rows of a schedule.
+
+    Raises:
+        ScheduleError: no list of mappings.
+    """
+    given = list(rows) if isinstance(rows, Iterable) else [rows]
+    if not all(isinstance(row, Mapping) for row in given):
+        raise ScheduleError(
+            f'schedule {shown(rows)}: give rows like {{"t": 0, "tail_offset": 0.1}}'
+        )
+    return given
 
 
 def time_grid(sample_times: FloatArray, switches: FloatArray, dt: float) -> tuple[Grid, FloatArray]:

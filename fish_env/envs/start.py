@@ -17,7 +17,7 @@ from fish_env.envs.tasks.hold import between
 from fish_env.errors import ConfigError
 from fish_env.model.frames import quaternion_from_euler
 from fish_env.model.state import BASE_STATES
-from fish_env.reading import is_number
+from fish_env.reading import is_number, shown
 
 POSE_DRAWS = 6
 STATE_KEYS = {
@@ -54,13 +54,28 @@ def check_reset_options(given: Mapping[str, Any] | None) -> Mapping[str, Mapping
     Raises:
         ConfigError: an unknown key, or a value that is not a mapping.
     """
-    given = given or {}
+    given = reset_mapping(given)
     unknown = [key for key in given if key not in OPTION_KEYS]
     if unknown:
-        raise ConfigError(f"reset options {unknown} are unknown; use {', '.join(OPTION_KEYS)}")
+        raise ConfigError(
+            f"reset options {shown(unknown)} are unknown; use {', '.join(OPTION_KEYS)}"
+        )
     for key, value in given.items():
         if not isinstance(value, Mapping):
             raise ConfigError(f"reset option '{key}' must be a mapping of names to numbers")
+    return given
+
+
+def reset_mapping(given: Mapping[str, Any] | None) -> Mapping[str, Any]:
+    """Reset options, none as an empty mapping.
+
+    Raises:
+        ConfigError: no mapping.
+    """
+    if given is None:
+        return {}
+    if not isinstance(given, Mapping):
+        raise ConfigError(f"reset options {shown(given)}: a mapping of {', '.join(OPTION_KEYS)}")
     return given
 
 

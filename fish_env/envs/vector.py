@@ -24,6 +24,7 @@ from fish_env.envs.robotic_fish_3d import (
     action_space,
     observation_space,
 )
+from fish_env.envs.start import reset_mapping
 from fish_env.envs.viewing import Frame, Viewer, Watched
 from fish_env.errors import ConfigError
 from fish_env.reading import shown
@@ -127,7 +128,7 @@ class RoboticFish3DVectorEnv(Watched, VectorEnv[Float32Array, Float32Array, npt.
             options: as for the single environment, for all fish alike, and ``reset_mask``:
                 (num_envs,) bool.
         """
-        given = dict(options or {})
+        given = dict(reset_mapping(options))
         mask = given.pop("reset_mask", None)
         lanes = self._all if mask is None else self._masked(mask)
         self._seed(seed, lanes)

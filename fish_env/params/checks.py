@@ -77,7 +77,7 @@ def unknown_path(fish: FishData, path: str) -> str:
         below = [leaf.path for leaf in leaves(fish) if leaf.path.startswith(path)]
         return f"{origin}: {path} is a group, not a number; name one of {', '.join(below)}"
     hint = closest(path, (leaf.path for leaf in leaves(fish)))
-    return f"{origin}: no parameter {path}{hint or '; see values() for all paths'}"
+    return f"{origin}: no parameter {short(path)}{hint or '; see values() for all paths'}"
 
 
 def check_number(fish: FishData, key: str, value: Any) -> None:

@@ -11,10 +11,11 @@ from fish_env.comparison import compare
 from fish_env.data import load_dataset
 from fish_env.envs.batch import real_actions
 from fish_env.envs.options import env_options
+from fish_env.envs.robotic_fish_3d import RoboticFish3DEnv
 from fish_env.envs.vector import RoboticFish3DVectorEnv
 from fish_env.errors import ConfigError, ParameterError, ScheduleError
 from fish_env.params import load_fish
-from fish_env.simulator import Simulator
+from fish_env.simulator import Simulator, schedule
 from fish_env.steady import steady_motion
 from tests.command_line import run
 from tests.fixtures.measured_data import DESCRIPTION, RUN, good_folder
@@ -212,3 +213,22 @@ def test_a_randomisation_that_draws_an_impossible_fish_is_refused():
 def test_a_beat_that_outlasts_the_wait_is_refused():
     with pytest.raises(ScheduleError, match=r"tail_frequency 1e-300 Hz.*at least"):
         steady_motion(load_fish("zheng-2021-a"), [[0.0, 0.3, 1e-300, 0.0, 0.0]])
+
+
+@pytest.mark.parametrize("options", [5, "x", [1], {"k" * 100_000: 1}, {"goal": 5}], ids=range(5))
+def test_reset_options_that_are_none_are_refused(options):
+    env, batch = RoboticFish3DEnv(), RoboticFish3DVectorEnv(2)
+    for one in (env, batch):
+        assert "reset option" in str(fault(one.reset, seed=0, options=options))
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        None, 5, [5], "x", [{"t": "x"}], [{"t": 0, "tail_offset": "x"}], [{"t": 10**400}],
+        [{"t": 0, 5: 1, "a": 1}], [{"t": 0, "tail_offset": [1]}], [{"t": 0, "k" * 100_000: 1}],
+    ],
+    ids=range(10),
+)  # fmt: skip
+def test_a_schedule_that_is_none_is_refused(rows):
+    assert "schedule" in str(fault(schedule, rows))

@@ -196,6 +196,36 @@ def test_arrays_of_another_shape_are_refused(checkpoint, tmp_path):
         train(PPO, tmp_path, Quiet(), resume=True)
 
 
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("steps", None), ("steps", "x"), ("steps", -1), ("steps", float("nan")), ("steps", 1e300),
+        ("cpu_s", "x"), ("wall_s", float("inf")), ("evaluations", "x"), ("evaluations", [1]),
+        ("evaluations", [{}]), ("evaluations", [{"steps": 1, "success_rate": "x"}]),
+    ],
+)  # fmt: skip
+def test_a_progress_that_cannot_be_is_refused(key, value, checkpoint, tmp_path):
+    tree = read_plain(checkpoint)
+    tree["progress"][key] = value
+    file = tmp_path / "forged.zip"
+    write_plain(tree, file)
+    with pytest.raises(ConfigError, match="not a readable checkpoint") as caught:
+        load_checkpoint(file, PPO, make_stack(PPO), lambda learner: None)
+    assert str(caught.value).isprintable()
+
+
+def test_the_reason_of_a_wrong_network_is_one_line(checkpoint, tmp_path):
+    tree = read_plain(checkpoint)
+    tree["learner"]["weights"] = {"x": np.zeros(3)}
+    file = tmp_path / "forged.zip"
+    write_plain(tree, file)
+    stack = make_stack(PPO)
+    model = make_model(PPO, stack)
+    with pytest.raises(ConfigError, match="not a readable checkpoint") as caught:
+        load_checkpoint(file, PPO, stack, lambda state: restore_learner(model, state))
+    assert str(caught.value).isprintable()
+
+
 @pytest.mark.parametrize("value", [np.array([{}], object), object(), {1: 2}, {"a": [Trap]}])
 def test_what_is_not_plain_is_not_written(value, tmp_path):
     with pytest.raises(TypeError, match=r"tree.*not plain"):

@@ -14,12 +14,16 @@ from typing import Any
 
 from fish_env.archives import UNREADABLE
 from fish_env.errors import ConfigError
+from fish_env.reading import is_number, printable, short, shown
 from fish_env.version import WRITER
 from robofish_agents.training.config import DEFAULT_ENGINE, TrainConfig
 from robofish_agents.training.plain import read_plain, write_plain
 from robofish_agents.training.stack import Stack
 
 FORMAT = "robofish-checkpoint-2"
+KEYS = ("steps", "success_rate", "episode_return")
+"""What each evaluation has, of its numbers those that the training compares."""
+LONGEST_REASON = 200
 
 
 @dataclass
@@ -93,14 +97,31 @@ def load_checkpoint(
         _check_same(path, saved, config.tree())
         stack.restore(tree["stack"])
         restore(tree["learner"])
-        rows = tuple(tree["progress"].pop("evaluations"))
-        progress = Progress(**tree["progress"], evaluations=rows)
+        progress = _progress(tree["progress"], config)
     except (*UNREADABLE, TypeError, AttributeError, IndexError) as error:
-        reason = _earlier(path) or f"not a readable checkpoint ({error})"
+        why = short(printable(str(error)), LONGEST_REASON)
+        reason = _earlier(path) or f"not a readable checkpoint ({why})"
         raise ConfigError(
             f"{path}: {reason}; move it away to start again, or train into another folder"
         ) from None
     return progress
+
+
+def _progress(saved: dict[str, Any], config: TrainConfig) -> Progress:
+    """The progress that a checkpoint names.
+
+    Raises:
+        ValueError, TypeError, KeyError: it is none of this training.
+    """
+    rows = saved.pop("evaluations")
+    wrong = [name for name, value in saved.items() if not is_number(value) or value < 0]
+    if wrong or not isinstance(saved["steps"], int):
+        raise ValueError(f"its progress has wrong {shown(wrong or ['steps'])}")
+    if not isinstance(rows, list) or not all(is_number(row[key]) for row in rows for key in KEYS):
+        raise ValueError(f"its evaluations lack {', '.join(KEYS)}")
+    if not rows and saved["steps"] >= config.total_steps:
+        raise ValueError("it is finished and has no evaluations")
+    return Progress(**saved, evaluations=tuple(rows))
 
 
 def _earlier(path: Path) -> str | None:
@@ -119,7 +140,9 @@ def _check_same(path: Path, saved: dict[str, Any], now: dict[str, Any]) -> None:
     was, now = {"engine": DEFAULT_ENGINE} | saved, {"engine": DEFAULT_ENGINE} | now
     changed = [key for key in now if was.get(key) != now[key]]
     if changed:
-        words = "; ".join(f"{key} was {was.get(key)!r}, is {now[key]!r}" for key in changed)
+        words = "; ".join(
+            f"{key} was {shown(was.get(key))}, is {shown(now[key])}" for key in changed
+        )
         raise ConfigError(
             f"{path}: of another configuration ({words}); resume with the same one, or train into "
             "another folder"

@@ -19,8 +19,11 @@ from fish_env.model.runtime import Kernels, kernels
 from fish_env.params.packing import PATHS, RECORD_FIELDS, pack_tables, pack_values
 from fish_env.params.schema import FishParams
 from fish_env.params.tables import analytic_tail
-from fish_env.reading import is_number, shown
+from fish_env.reading import is_number, printable, short, shown
 
+LONGEST_NAME = 200
+"""Bytes of an effect's name that a file can have with ".py" behind it."""
+LONGEST_MESSAGE = 1000
 EffectValues = Mapping[str, Mapping[str, float]]
 PREFIX = "effects."
 SHORTEST_STEP_S, LONGEST_STEP_S = 1e-6, 0.1
@@ -144,9 +147,16 @@ class ExtendedModel:
 
         Raises:
             ScheduleError: no number from 1e-6 to 0.1 s.
+            EffectError: an effect needs steps that no simulation can take.
         """
         _check_range(dt)
-        return max(1, int(np.ceil(dt / self.longest_step() * (1.0 - 1e-9))))
+        longest = self.longest_step()
+        if longest < SHORTEST_STEP_S:
+            raise EffectError(
+                f"{_origin(self.fish)}: an effect has a time constant of {longest:g} s, shorter "
+                f"than {SHORTEST_STEP_S:g} s; use a longer one, or switch the effect off (0)"
+            )
+        return max(1, int(np.ceil(dt / longest * (1.0 - 1e-9))))
 
 
 def _check_range(dt: float) -> None:
@@ -192,7 +202,10 @@ def build_model(
         if name not in own and name not in catalogue():
             own[name] = _beside(fish, name)
     found = {name: own.get(name) or get_effect(name) for name in wanted}
-    complete = {name: found[name].complete(values) for name, values in wanted.items()}
+    complete = {
+        name: _complete(found[name], values, fish if name not in (effects or {}) else None)
+        for name, values in wanted.items()
+    }
     on = {name: v for name, v in complete.items() if v != found[name].neutral}
     everything = (*catalogue().values(), *own.values())
     moving = [e for e in everything if e.acts_on_motion]
@@ -206,8 +219,23 @@ def build_model(
     return ExtendedModel(fish, on, acting, measured)
 
 
+def _origin(fish: FishParams) -> str:
+    return str(fish.source_file or fish.name)
+
+
+def _complete(
+    effect: Effect, values: Mapping[str, float], fish: FishParams | None
+) -> dict[str, float]:
+    """Values for all parameters; an error names the fish, if its file gave them."""
+    try:
+        return effect.complete(values)
+    except EffectError as error:
+        named = "" if fish is None else f"{_origin(fish)}: "
+        raise EffectError(f"{named}{short(printable(str(error)), LONGEST_MESSAGE)}") from None
+
+
 def _beside(fish: FishParams, name: str) -> Effect:
-    if fish.source_file is not None and name.isidentifier():
+    if fish.source_file is not None and name.isidentifier() and len(name.encode()) <= LONGEST_NAME:
         candidate = fish.source_file.with_name(f"{name}.py")
         if candidate.is_file():
             if not fish.trust_effects:
@@ -223,6 +251,8 @@ def _beside(fish: FishParams, name: str) -> Effect:
     try:
         return get_effect(name)
     except EffectError as error:
+        reason = short(printable(str(error)), LONGEST_MESSAGE)
         raise EffectError(
-            f"{fish.name}: {error}; for an effect of your own put {name}.py beside the fish file"
+            f"{_origin(fish)}: {reason}; for an effect of your own put {short(printable(name))}.py "
+            "beside the fish file"
         ) from None

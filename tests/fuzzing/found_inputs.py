@@ -108,6 +108,16 @@ FISH: dict[str, str] = {
 }
 """Changes of a fish file, each of which must be refused."""
 
+EFFECTS: dict[str, str] = {
+    "a value below all": "servo_lag: {time_constant: -1}",
+    "a denormal time constant": "servo_lag: {time_constant: 1e-320}",
+    "a time constant of a nanosecond": "wake_memory: {time_constant: 1e-9}",
+    "an unknown effect": "no_such: {a: 1}",
+    "a name that no file can have": f"? {'k' * 100_000}\n  : {{a: 1}}",
+    "a parameter's name of 100,000 letters": f"servo_lag:\n    ? {'k' * 100_000}\n    : 1",
+}
+"""Effects of a fish file, each of which must be refused when the fish is to swim."""
+
 COMMAND_CELLS = ",0,.5,0,0,0,1,0,0\n"
 HEADER = "t,x,z,yaw,tail_offset,tail_amplitude,tail_frequency,block_displacement,block_angle\n"
 RUNS: dict[str, str] = {

@@ -21,6 +21,7 @@ from tests.command_line import run
 from tests.fixtures.measured_data import DESCRIPTION, RUN, good_folder
 from tests.fuzzing.found_inputs import (
     DESCRIPTIONS,
+    EFFECTS,
     FISH,
     OPTIONS,
     PATHS,
@@ -90,6 +91,25 @@ def test_a_fish_that_cannot_be_is_refused(change, tmp_path):
     base = "" if "base" in change else "base: zheng-2021-a\n"
     file.write_text(f"{base}name: mine\n{change}\n")
     assert "mine.yaml" in str(fault(load_fish, file))
+
+
+@pytest.mark.parametrize("effects", EFFECTS.values(), ids=EFFECTS)
+def test_effects_that_cannot_be_are_refused_by_their_file(effects, tmp_path):
+    file = tmp_path / "mine.yaml"
+    file.write_text(f"base: zheng-2021-a\nname: mine\neffects:\n  {effects}\n")
+    assert "mine.yaml" in str(fault(Simulator, file))
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        {"servo_lag": {"time_constant": 1e-320}}, {"k" * 100_000: {}}, {"\ud800": {}},
+        {"wave": {"k" * 100_000: 1.0}},
+    ],
+    ids=range(4),
+)  # fmt: skip
+def test_effects_that_cannot_be_are_refused_by_the_environment(effects):
+    assert str(fault(env_options, effects=effects)).isprintable()
 
 
 def test_a_long_chain_of_bases_is_refused(tmp_path):

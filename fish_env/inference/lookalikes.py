@@ -10,7 +10,7 @@ apart no better than by what they make up for, each is an alternative.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import partial
 
 import numpy as np
@@ -133,7 +133,7 @@ def asked_of_rates(
 
 
 def rates_asked_again(
-    current: Explanation, before: Explanation, others: Sequence[Explanation], report: Report
+    current: Explanation, before: Explanation, others: Iterable[Explanation], report: Report
 ) -> tuple[Explanation, tuple[Explanation, ...]]:
     """The explanation with the clock or drive that fits best, and those with one as good.
 

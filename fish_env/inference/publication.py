@@ -33,7 +33,8 @@ def published(
     best, lags = asked_of_lags(current, shown, report)
     if best is current:
         return best, (*rates, *lags)
-    best, rates = rates_asked_again(best, asked, (begun, *rates), report)
+    others = {e.causes: e for e in (begun, *rates)}.values()
+    best, rates = rates_asked_again(best, asked, others, report)
     return best, (*rates, *lags)
 
 

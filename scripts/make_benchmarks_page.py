@@ -86,16 +86,21 @@ def _latest(folder: Path, name: str) -> str:
 
 
 def _parts(folder: Path, name: str) -> list[Path]:
-    """The reports of the latest date in a folder, in the order in which they were made.
+    """The reports of the latest run in a folder, in the order in which they were made.
 
-    The first of a day is named by its date alone; parts that ran later that day have a number.
+    The first of a run is named by its date alone; later parts have a number too, and some may be of
+    later days.
     """
-    dated: dict[str, list[Path]] = {}
-    for file in folder.glob(f"{name}-[0-9]*.md"):
-        date = "-".join(file.stem.removeprefix(f"{name}-").split("-")[:3])
-        dated.setdefault(date, []).append(file)
-    latest = dated[max(dated)] if dated else []
-    return sorted(latest, key=lambda file: (len(file.stem), file.stem))
+    dated = {file: _dated(file, name) for file in folder.glob(f"{name}-[0-9]*.md")}
+    begun = max((date for date, number in dated.values() if number == 0), default="")
+    latest = [file for file, (date, _) in dated.items() if date >= begun]
+    return sorted(latest, key=lambda file: dated[file])
+
+
+def _dated(file: Path, name: str) -> tuple[str, int]:
+    """Date of a part, and its number; none is zero."""
+    *date, number = [*file.stem.removeprefix(f"{name}-").split("-"), "0"][:4]
+    return "-".join(date), int(number)
 
 
 def _summed(parts: list[Path], suite: Suite) -> str:
@@ -105,7 +110,9 @@ def _summed(parts: list[Path], suite: Suite) -> str:
     rows.sort(key=lambda row: (row.tier, row.seed))
     commits = ", ".join(f"{len(part['rows'])} at {part['commit']}" for part in found)
     said = f"{len(rows)} cases, each diagnosed once: {commits}."
-    return suite.page(found[0]["date"], said, suite.summarise(rows))
+    days = dict.fromkeys(part["date"] for part in found)
+    date = " to ".join([*days][:: max(1, len(days) - 1)])
+    return suite.page(date, said, suite.summarise(rows))
 
 
 def lowered(text: str) -> str:

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from fish_env.errors import OutputError
+from fish_env.version import PROGRAM
 
 STANDARD = "-"
 """As an output of a command: standard output; as an input: standard input."""
@@ -27,7 +28,7 @@ FORBIDDEN = '/\\:*?"<>|'
 """What the names of files cannot hold on every system."""
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 _LONGEST_STEM = 60
-_MARKED = 2000
+_MARKED, _MARKED_PDF = 2000, 100_000
 
 
 @contextmanager
@@ -216,18 +217,38 @@ def check_first_line(output: Path, first: str) -> None:
         raise _of_someone_else(output)
 
 
-def check_mark(output: Path, mark: str) -> None:
+def check_mark(output: Path, mark: str, beside: Path | None = None) -> None:
     """Refuses to replace a file that does not hold, near an end, what this program writes.
 
     Args:
         output: The file, which need not be there.
-        mark: Words within its first or last two kilobytes.
+        mark: Words within its first or last two kilobytes. Of a PDF file, the list of its objects,
+            20 bytes each, stands behind them.
+        beside: The file that holds them in its place, where it has no room for them.
 
     Raises:
         OutputError: It is another file.
     """
-    if output.exists() and mark.encode() not in _begin(output, _MARKED) + _end(output, _MARKED):
+    marked = beside or output
+    last = _MARKED_PDF if marked.suffix == ".pdf" else _MARKED
+    if output.exists() and mark.encode() not in _begin(marked, _MARKED) + _end(marked, last):
         raise _of_someone_else(output)
+
+
+def check_chosen(outputs: Iterable[Path], mark: str = PROGRAM) -> None:
+    """Refuses outputs whose names a program chose and that are links, or files of someone else.
+
+    Args:
+        outputs: Files that will be written, see :func:`check_no_links`.
+        mark: What one of this program holds, see :func:`check_mark`.
+
+    Raises:
+        OutputError: Names the file.
+    """
+    files = list(outputs)
+    check_no_links(files)
+    for file in files:
+        check_mark(file, mark)
 
 
 def _begin(file: Path, count: int) -> bytes:

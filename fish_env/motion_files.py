@@ -16,8 +16,8 @@ import numpy as np
 
 from fish_env.arrays import FloatArray
 from fish_env.errors import missing_extra
-from fish_env.files import check_mark, check_no_links, replacing, write_text
-from fish_env.version import PROGRAM, WRITER
+from fish_env.files import check_chosen, replacing, write_text
+from fish_env.version import WRITER
 
 
 def write_csv(columns: Mapping[str, FloatArray], stream: TextIO) -> None:
@@ -90,8 +90,7 @@ def check_description(path: str | Path) -> None:
     Raises:
         OutputError: Names the file in the description's place.
     """
-    check_no_links([description_file(path)])
-    check_mark(description_file(path), PROGRAM)
+    check_chosen([description_file(path)])
 
 
 def _description(columns: Iterable[str], file: str) -> dict[str, Any]:

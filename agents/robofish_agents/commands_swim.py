@@ -41,7 +41,7 @@ def swim(
     from fish_env.commands.numbers import console_for, write_json
     from robofish_agents.swimming import Wish, numbers_of, swim_and_show
 
-    wish = Wish(agent, task, suite, seed, path, out, video, replay, trust_effects)
+    wish = Wish(agent, task, suite, seed, path, out, video, replay, trust_effects, json)
     console = console_for(json, replay)
     episode = swim_and_show(console, wish)
     if json is not None:

@@ -16,7 +16,7 @@ from fish_env.envs.registration import ENV_ID
 from fish_env.envs.robotic_fish_3d import RoboticFish3DEnv
 from fish_env.envs.tasks import TASKS
 from fish_env.errors import ConfigError
-from fish_env.files import check_outputs
+from fish_env.files import check_chosen, check_outputs
 from fish_env.reading import Unreadable, plain_number, read_text
 from fish_env.rendering import check_installed
 from robofish_agents.controllers.line_of_sight import LineOfSight
@@ -28,6 +28,8 @@ from robofish_agents.keep import Keeper
 from robofish_agents.pictures import draw_actuators, draw_path, draw_tracking
 from robofish_agents.registry import agent_files, load_agents
 
+PATH, TRACKING, ACTUATORS = "path", "tracking", "actuators"
+"""Names of the pictures."""
 COLUMNS = ("north", "east", "depth")
 FARTHEST = 1000.0
 """m. A path as long as this takes three hours."""
@@ -49,6 +51,7 @@ class Wish:
     video: Path | None
     replay: Path | None
     trust_effects: bool = False
+    json: Path | None = None
 
 
 def swim_and_show(console: Console, wish: Wish) -> Episode:
@@ -56,6 +59,7 @@ def swim_and_show(console: Console, wish: Wish) -> Episode:
 
     Raises:
         ConfigError: an unknown agent, task or suite, or a path that is none.
+        OutputError: an output would replace what is read, or a file of someone else.
         MissingExtraError: a film is asked for, and what draws it is not installed.
     """
     if wish.task not in TASKS:
@@ -63,7 +67,9 @@ def swim_and_show(console: Console, wish: Wish) -> Episode:
     if wish.video is not None:
         check_installed()
     read = [wish.path, *suite_files(wish.suite), *agent_files(wish.agent)]
-    check_outputs([wish.video, wish.replay], read)
+    pictures = [wish.out / f"{name}.png" for name in _pictures(wish)]
+    check_outputs([wish.video, wish.replay, wish.json, *pictures], read)
+    check_chosen(pictures)
     agent = load_agents(wish.agent, wish.task)[0]
     waypoints = None if wish.path is None else read_waypoints(wish.path)
     env, options = _environment(wish, waypoints)
@@ -86,6 +92,11 @@ def swim_and_show(console: Console, wish: Wish) -> Episode:
     for file in _files(wish, episode, fish, keeper, waypoints):
         console.print(str(file), soft_wrap=True)
     return episode
+
+
+def _pictures(wish: Wish) -> list[str]:
+    """Names of the pictures; along a path of waypoints there is no tracking of goals."""
+    return [PATH, *([] if wish.path is not None else [TRACKING]), ACTUATORS]
 
 
 def read_waypoints(file: Path) -> FloatArray:
@@ -201,10 +212,10 @@ def _files(
     title = f"{ENV_ID}, {wish.agent}, suite {wish.suite}, seed {wish.seed}"
     path = fish.scene().path
     legs = waypoints if waypoints is not None else (path if len(path) else None)
-    files = [draw_path(episode, config, title, wish.out, "path", legs)]
+    files = [draw_path(episode, config, title, wish.out, PATH, legs)]
     if waypoints is None:
-        files.append(draw_tracking(episode, config, title, wish.out, "tracking"))
-    files.append(draw_actuators(episode, config, wish.out, "actuators"))
+        files.append(draw_tracking(episode, config, title, wish.out, TRACKING))
+    files.append(draw_actuators(episode, config, wish.out, ACTUATORS))
     if wish.replay is not None:
         files.append(keeper.write_replay(wish.replay, wish.agent))
     if wish.video is not None:

@@ -15,7 +15,7 @@ from fish_env.comparison import RunsComparison, SteadyComparison
 from fish_env.comparison.words import in_words
 from fish_env.diagnosis.headline import headline
 from fish_env.diagnosis.writing import EXTENDED, check_marks
-from fish_env.files import check_no_links, write_bytes
+from fish_env.files import check_chosen, check_no_links, write_bytes
 from fish_env.identification.dataset_fit import DatasetFit
 from fish_env.params import FishParams, load_fish
 from fish_env.version import versioned
@@ -119,11 +119,15 @@ class CompareResult(Result):
 
         Args:
             folder: Where the pictures stay; without it they are only shown.
+
+        Raises:
+            OutputError: A picture cannot be written, or would replace a file of someone else.
         """
-        from fish_env.plotting.comparison import draw_runs, draw_steady
+        from fish_env.plotting.comparison import draw_runs, draw_steady, picture_files
 
         with TemporaryDirectory(prefix="robofish-") as passing:
             target = Path(folder or passing)
+            check_chosen(picture_files(self.comparison, target))
             if isinstance(self.comparison, SteadyComparison):
                 return Pictures(draw_steady(self.comparison, target))
             return Pictures(draw_runs(self.comparison, target))
@@ -182,12 +186,17 @@ class FitResult(Result):
 
         Args:
             folder: Where the picture stays; without it it is only shown.
+
+        Raises:
+            OutputError: The picture cannot be written, or would replace a file of someone else.
         """
-        from fish_env.plotting.estimates import draw_estimates
+        from fish_env.plotting.estimates import draw_estimates, picture_files
 
         rows = [(e.name, e.before, e.value, e.low, e.high) for e in self.result.estimates]
         with TemporaryDirectory(prefix="robofish-") as passing:
-            return Pictures([draw_estimates(rows, self.title(), Path(folder or passing))])
+            target = Path(folder or passing)
+            check_chosen(picture_files(target))
+            return Pictures([draw_estimates(rows, self.title(), target)])
 
     def save(self, file: str | Path, results: str | Path | None = None) -> Path:
         """Writes the fitted fish, as `robofish fit --out` does.

@@ -18,7 +18,7 @@ from fish_env.comparison import RunComparison, RunsComparison, SteadyComparison,
 from fish_env.comparison.words import in_words, shown_unit
 from fish_env.data import Dataset, SteadyDataset, dataset_files, load_dataset
 from fish_env.errors import DatasetError
-from fish_env.files import check_outputs
+from fish_env.files import check_chosen, check_outputs
 from fish_env.params import FishParams, fish_files, load_fish
 
 Comparison = RunsComparison | SteadyComparison
@@ -50,13 +50,18 @@ def compare_dataset(
         trust_effects: Run the effect files that the fish's file names.
 
     Raises:
-        RoboticFishError: The data or the fish cannot be used; or a replay of a steady table.
+        RoboticFishError: The data or the fish cannot be used; a replay of a steady table; or an
+            output would replace a file of someone else.
     """
     measured = load_dataset(dataset)
     if replay is not None and isinstance(measured, SteadyDataset):
         raise DatasetError(f"{dataset}: a table of steady motion has no runs to replay")
     model = load_fish(fish or measured.fish, trust_effects)
     check_outputs([json_file, replay], [*dataset_files(dataset), *fish_files(model)])
+    if out is not None:
+        from fish_env.plotting.comparison import picture_files
+
+        check_chosen(picture_files(measured, out))
     comparison = _compare(console, measured, model, dt)
     print_comparison(console, comparison, every_run)
     if json_file is not None:

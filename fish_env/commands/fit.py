@@ -20,6 +20,7 @@ from fish_env.identification.dataset_fit import AUTO, DatasetFit, Estimate, fit_
 from fish_env.identification.left_out import mean_errors
 from fish_env.identification.series import SeriesProblem
 from fish_env.params import fish_files, fish_outputs, load_fish
+from fish_env.params.io import check_tables
 from fish_env.params.schema import FishParams
 
 SHOWN = {"m": ("mm", 1e3), "m/s": ("mm/s", 1e3), "rad/s": ("mrad/s", 1e3), "rad": ("mrad", 1e3)}
@@ -53,7 +54,8 @@ def fit_and_write(
         trust_inputs: Take signs, units and clocks as they are declared.
 
     Raises:
-        RoboticFishError: The data, the fish or an option cannot be used.
+        RoboticFishError: The data, the fish or an option cannot be used, or an output would
+            replace what is read, or a table of someone else.
     """
     measured = load_dataset(dataset)
     chosen = load_fish(fish or measured.fish, trust_effects)
@@ -63,6 +65,7 @@ def fit_and_write(
             _check_inputs(measured, chosen)
     written = [*fish_outputs(chosen, out).values(), *([results] if results else [])]
     check_outputs(written, [*dataset_files(dataset), *fish_files(chosen)])
+    check_tables(chosen, out)
     with console.status("reading data") as status:
         try:
             found = fit_dataset(

@@ -37,7 +37,7 @@ from fish_env.data.importing.writing import used_content
 from fish_env.data.place import Place
 from fish_env.data.writing import check_free
 from fish_env.errors import DatasetError
-from fish_env.files import check_outputs, same_file
+from fish_env.files import check_chosen, check_outputs, same_file
 
 Ask = Callable[[str], str]
 
@@ -317,8 +317,9 @@ def _runs_table(imported: Imported) -> Table:
 
 
 def _draw(console: Console, imported: Imported, out: Path) -> None:
-    from fish_env.plotting.imported import draw_imported
+    from fish_env.plotting.imported import draw_imported, picture_files
 
+    check_chosen(picture_files(imported.dataset, out))
     with console.status("drawing"):
         pictures = draw_imported(imported.dataset, out)
     shown = str(pictures[0]) if len(pictures) == 1 else f"{out}/import-*.png ({len(pictures)})"

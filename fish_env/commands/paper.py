@@ -10,8 +10,9 @@ from rich.console import Console
 from rich.table import Table
 
 from fish_env.commands.numbers import write_json
+from fish_env.files import check_chosen, check_outputs
 from fish_env.studies.paper import Statement, all_statements, run_study, with_servo_lag
-from fish_env.studies.paper.report import study_json, write_report
+from fish_env.studies.paper.report import check_reports, study_json, write_report
 
 
 def run_paper(console: Console, out: Path, json_file: Path | None = None) -> None:
@@ -21,15 +22,21 @@ def run_paper(console: Console, out: Path, json_file: Path | None = None) -> Non
         console: Where the statements go.
         out: The folder.
         json_file: File for the content of `paper.json` once more.
+
+    Raises:
+        OutputError: An output cannot be written, or would replace another or a file of someone
+            else.
     """
+    from fish_env.studies.paper.figures import draw_study, picture_files
+
+    check_outputs([json_file, *check_reports(out)])
+    check_chosen(picture_files(out))
     begun = time.monotonic()
     with console.status("starting") as status:
         study = run_study(lambda part: status.update(f"simulating: {part}"))
         status.update("writing")
         written = write_report(study, out)
         status.update("drawing")
-        from fish_env.studies.paper.figures import draw_study
-
         pictures = draw_study(study, out)
     statements = all_statements(study)
     console.print(_table("The paper's statements", statements))

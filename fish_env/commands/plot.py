@@ -9,9 +9,8 @@ import numpy as np
 from rich.console import Console
 
 from fish_env.errors import ConfigError
-from fish_env.files import check_mark, check_no_links
+from fish_env.files import check_chosen
 from fish_env.params import FishParams, load_fish
-from fish_env.version import PROGRAM
 
 Formats = tuple[str, ...]
 FORMATS = ("png", "svg", "pdf")
@@ -92,10 +91,7 @@ def plot_fish(
         raise ConfigError(f"no format '{unknown[0]}': choose from {', '.join(FORMATS)}")
     loaded = load_fish(fish, trust_effects)
     names = list(KINDS) if kind == "all" else [kind]
-    paths = [out / f"{name}.{ending}" for name in names for ending in formats]
-    check_no_links(paths)
-    for path in paths:
-        check_mark(path, PROGRAM)
+    check_chosen(out / f"{name}.{ending}" for name in names for ending in formats)
     written = []
     for name in names:
         with console.status(f"swimming and drawing: {name}"):

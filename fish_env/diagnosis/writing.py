@@ -12,7 +12,7 @@ from fish_env.diagnosis.entries import FORMAT
 from fish_env.diagnosis.headline import EXPERIMENT_FILE
 from fish_env.diagnosis.written import replace_part
 from fish_env.files import check_mark, check_no_links, write_text
-from fish_env.params.io import fish_outputs, save_fish
+from fish_env.params.io import check_tables, fish_outputs, save_fish
 from fish_env.params.schema import FishParams
 from fish_env.version import PROGRAM
 
@@ -54,6 +54,7 @@ def check_own(fish: FishParams, folder: Path) -> None:
         OutputError: names a link, or a file of the user with the name of one of a diagnosis.
     """
     check_no_links(outputs(fish, folder))
+    check_tables(fish, folder / EXTENDED)
     check_marks(folder / name for name in MARKS)
     check_marks(sorted((folder / FIGURES).glob("*")))
 

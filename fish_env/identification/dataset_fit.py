@@ -30,7 +30,7 @@ from fish_env.identification.objectives import (
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.hypotheses import Coefficient
 from fish_env.inference.progress import Report, silent
-from fish_env.params.io import load_fish, save_fish
+from fish_env.params.io import check_tables, load_fish, save_fish
 from fish_env.params.schema import FishParams
 from fish_env.version import versioned
 
@@ -134,8 +134,9 @@ class DatasetFit:
             results: JSON file for estimates and errors; None for none.
 
         Raises:
-            OutputError: a file cannot be written.
+            OutputError: a file cannot be written, or a table would replace one of someone else.
         """
+        check_tables(self.fish, path)
         save_fish(replace(self.fish, name=Path(path).stem), path)
         if results is not None:
             write_text(results, json.dumps(versioned(self.as_dict()), indent=1) + "\n")

@@ -11,14 +11,16 @@ from pathlib import Path
 from typing import Any
 
 from fish_env.errors import ParameterError
+from fish_env.files import check_first_line, check_mark, check_no_links
 from fish_env.params import trees
 from fish_env.params.building import EXTENDED_FORMAT, build_fish
 from fish_env.params.checks import closest, warn_of_effective_inertia
 from fish_env.params.files import read_yaml, write_yaml
 from fish_env.params.provenance import Origin, Posterior, Provenance
 from fish_env.params.schema import FishParams
-from fish_env.params.tables import write_table
+from fish_env.params.tables import HEAD, write_table
 from fish_env.reading import Unreadable, located, shown
+from fish_env.version import PROGRAM
 
 SUFFIXES = (".yaml", ".yml")
 MOST_BASES = 20
@@ -192,6 +194,23 @@ def merged_value(old: Any, new: Any) -> Any:
     if not (isinstance(old, Mapping) and isinstance(new, Mapping)):
         return new
     return merged(old, new) if ("table" in old) == ("table" in new) else new
+
+
+def check_tables(fish: FishParams, path: str | Path) -> None:
+    """Refuses a file for `save_fish` whose tables would replace what this program did not write.
+
+    Args:
+        fish: The parameters.
+        path: The file; the program chose the names of the tables beside it.
+
+    Raises:
+        OutputError: Names a table that is a link, or is not one of a fish of this program there.
+    """
+    file, *tables = fish_outputs(fish, path).values()
+    check_no_links(tables)
+    for table in tables:
+        check_first_line(table, HEAD)
+        check_mark(table, PROGRAM, beside=file)
 
 
 def save_fish(fish: FishParams, path: str | Path) -> list[Path]:

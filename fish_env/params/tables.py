@@ -29,6 +29,8 @@ EXTENSION_STEP = math.radians(1.0)
 # Angles typed with four decimals (1.5708) land a hair beyond pi/2; they mean pi/2.
 ROUNDING = 5e-5
 MIN_ROWS = 3
+HEAD = "alpha_rad,C"
+"""First line of the tables that are written."""
 ANGLE_SCALE = {"alpha_rad": 1.0, "alpha_deg": math.pi / 180.0}
 
 
@@ -236,6 +238,6 @@ def read_row(path: Path, line: int, row: list[str]) -> tuple[float, float]:
 
 
 def write_table(table: CoefficientTable, path: Path) -> None:
-    """Writes a table to a CSV file, in radians, with every digit."""
+    """Writes a table to a CSV file below `HEAD`, in radians, with every digit."""
     lines = [f"{a!r},{c!r}" for a, c in zip(table.alpha, table.value, strict=True)]
-    write_text(path, "\n".join(["alpha_rad,C", *lines, ""]))
+    write_text(path, "\n".join([HEAD, *lines, ""]))

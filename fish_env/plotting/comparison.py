@@ -10,14 +10,17 @@ import numpy as np
 from fish_env.arrays import FloatArray
 from fish_env.comparison import RunComparison, RunsComparison, SteadyComparison
 from fish_env.comparison.words import shown_unit
-from fish_env.data import COMMANDS
+from fish_env.data import COMMANDS, Dataset, Run, SteadyDataset
 from fish_env.files import file_name
-from fish_env.plotting.style import MEASURED, SIMULATED, colours, drawing, save
+from fish_env.plotting.style import FORMATS, MEASURED, SIMULATED, colours, drawing, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.lines import Line2D
 
+Comparison = RunsComparison | SteadyComparison
+PATHS, AGREEMENT, OVER_COMMANDS = "paths", "agreement", "over_commands"
+"""Names of pictures of all runs, or of a steady table."""
 COMMAND_UNITS = {
     "tail_offset": ("deg", 180.0 / np.pi),
     "tail_amplitude": ("deg", 180.0 / np.pi),
@@ -31,6 +34,27 @@ COMMAND_UNITS = {
 def label(name: str) -> str:
     """Axis label of a channel or observation, with its unit."""
     return f"{name.replace('_', ' ')} ({shown_unit(name)[0]})"
+
+
+def picture_files(compared: Dataset | SteadyDataset | Comparison, folder: Path) -> list[Path]:
+    """The files that :func:`draw_runs` or :func:`draw_steady` write.
+
+    Args:
+        compared: The comparison, or the data before it is made.
+        folder: Where they go.
+    """
+    if isinstance(compared, SteadyDataset | SteadyComparison):
+        names = [f"{name}.{ending}" for name in (AGREEMENT, OVER_COMMANDS) for ending in FORMATS]
+    else:
+        names = [f"{_run_name(run.id)}.png" for run in compared.runs]
+        first = compared.runs[0]
+        if {"x", "y"} <= set(first.channels if isinstance(first, Run) else first.measured):
+            names += [f"{PATHS}.{ending}" for ending in FORMATS]
+    return [folder / name for name in names]
+
+
+def _run_name(id: str) -> str:
+    return f"run_{file_name(id)}"
 
 
 def draw_runs(comparison: RunsComparison, folder: Path) -> list[Path]:
@@ -61,7 +85,7 @@ def draw_run(run: RunComparison, folder: Path) -> Path:
             _draw_path(path, run)
             path.legend(loc="best")
         figure.suptitle(f"{run.id}: measured and simulated", fontsize=10)
-        return save(figure, folder, f"run_{file_name(run.id)}", ("png",))
+        return save(figure, folder, _run_name(run.id), ("png",))
 
 
 def _draw_channel(ax: Axes, run: RunComparison, name: str) -> None:
@@ -103,7 +127,7 @@ def draw_paths(comparison: RunsComparison, folder: Path) -> Path:
         figure.supylabel("x, north (m)", fontsize=9)
         handles = axes[0].get_legend_handles_labels()
         figure.legend(handles[0][:2], handles[1][:2], loc="outside upper center", ncols=2)
-        return save(figure, folder, "paths")
+        return save(figure, folder, PATHS)
 
 
 def draw_steady(comparison: SteadyComparison, folder: Path) -> list[Path]:
@@ -137,7 +161,7 @@ def draw_agreement(comparison: SteadyComparison, folder: Path) -> Path:
                 f"R$^2$ {observation.r_squared:.2f}, gain {observation.gain:.2f}", loc="left"
             )
             ax.set_aspect("equal", adjustable="datalim")
-        return save(figure, folder, "agreement")
+        return save(figure, folder, AGREEMENT)
 
 
 def draw_over_commands(comparison: SteadyComparison, folder: Path) -> Path:
@@ -153,7 +177,7 @@ def draw_over_commands(comparison: SteadyComparison, folder: Path) -> Path:
             _draw_over_command(ax, comparison, name, order)
         handles = _legend_handles(comparison.commands[:, order[1]], list(COMMANDS)[order[1]])
         figure.legend(handles=handles, loc="outside upper center", ncols=min(len(handles), 5))
-        return save(figure, folder, "over_commands")
+        return save(figure, folder, OVER_COMMANDS)
 
 
 def _legend_handles(values: FloatArray, command: str) -> list[Line2D]:

@@ -7,10 +7,16 @@ from pathlib import Path
 
 import numpy as np
 
-from fish_env.plotting.style import BLUE, PALE, VERMILION, drawing, save
+from fish_env.plotting.style import BLUE, FORMATS, PALE, VERMILION, drawing, save
 
+NAME = "estimates"
 Row = tuple[str, float, float, float, float]
 """Name, value before, estimate, and ends of its 95 % interval."""
+
+
+def picture_files(folder: Path) -> list[Path]:
+    """The files that :func:`draw_estimates` writes into a folder."""
+    return [folder / f"{NAME}.{ending}" for ending in FORMATS]
 
 
 def draw_estimates(rows: Sequence[Row], title: str, folder: Path) -> Path:
@@ -32,4 +38,4 @@ def draw_estimates(rows: Sequence[Row], title: str, folder: Path) -> Path:
         ax.set_ylim(len(rows) - 0.5, -0.5)
         ax.set_xlabel("relative to the value before (|); bars: 95 % intervals")
         ax.set_title(title, loc="left")
-        return save(figure, folder, "estimates")
+        return save(figure, folder, NAME)

@@ -19,6 +19,15 @@ _ROW, _ABOVE, _BELOW = 0.95, 0.65, 0.5
 """Inches for each channel or command, above all and below."""
 
 
+def picture_files(dataset: Dataset, folder: Path) -> list[Path]:
+    """The files that :func:`draw_imported` writes into a folder."""
+    return [folder / f"{_name(run)}.png" for run in dataset.runs]
+
+
+def _name(run: Run) -> str:
+    return f"import-{run.id}"
+
+
 def draw_imported(dataset: Dataset, folder: Path) -> list[Path]:
     """Draws each run as `import-<run>.png`.
 
@@ -56,7 +65,7 @@ def draw_imported_run(run: Run, folder: Path) -> Path:
             fontsize=9,
             y=1.0 - 0.1 / height,
         )
-        return save(figure, folder, f"import-{run.id}", ("png",))
+        return save(figure, folder, _name(run), ("png",))
 
 
 def _draw_channel(ax: Axes, run: Run, name: str) -> None:

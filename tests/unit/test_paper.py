@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from fish_env.files import check_chosen
 from fish_env.plotting import style
 from fish_env.studies.paper import Study, all_statements, run_study, with_servo_lag
 from fish_env.studies.paper.report import write_report
@@ -132,10 +133,13 @@ def test_the_report_says_everything(study: Study, tmp_path: Path) -> None:
 def test_every_figure_is_drawn(
     study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from fish_env.studies.paper.figures import draw_study
+    from fish_env.studies.paper import figures
+    from fish_env.studies.paper.figures import draw_study, picture_files
 
     monkeypatch.setattr(style, "DOTS_PER_INCH", 40)
-    monkeypatch.setattr(style, "FORMATS", ("png",))
+    for module in (style, figures):
+        monkeypatch.setattr(module, "FORMATS", ("png",))
     pictures = draw_study(study, tmp_path)
     assert len(pictures) == len({path.name for path in pictures}) == 12
-    assert all(path.is_file() for path in pictures)
+    assert sorted(picture_files(tmp_path)) == sorted(tmp_path.iterdir())
+    check_chosen(picture_files(tmp_path))  # which lets a second study replace them

@@ -12,6 +12,7 @@ from fish_env.plotting.style import (
     BLACK,
     BLUE,
     COLOUR_MAP,
+    FORMATS,
     GREEN,
     VERMILION,
     colours,
@@ -29,6 +30,17 @@ if TYPE_CHECKING:
 DEG = 180.0 / np.pi
 F1, OFFSET, DISPLACEMENT = "$f_1$ (Hz)", "tail offset (deg)", "$\\Delta d$ (cm)"
 TIME = "time (s)"
+NAMES = (
+    "rectilinear_speed", "rectilinear_attitude", "rectilinear_paths", "turning_rate",
+    "turning_radius", "turning_rates", "turning_servo_lag", "gliding_speed", "spiral_attitude",
+    "spiral_velocity", "spiral_rate_and_speed", "spiral_path",
+)  # fmt: skip
+"""Names of all figures."""
+
+
+def picture_files(folder: Path) -> list[Path]:
+    """The files that :func:`draw_study` writes into a folder."""
+    return [folder / f"{name}.{ending}" for name in NAMES for ending in FORMATS]
 
 
 def draw_study(study: Study, folder: Path) -> list[Path]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from fish_env.comparison.errors import plain
-from fish_env.files import check_mark, check_no_links, write_text
+from fish_env.files import check_chosen, write_text
 from fish_env.studies.paper import ranges
 from fish_env.studies.paper.motions import Study
 from fish_env.studies.paper.statements import (
@@ -110,12 +110,21 @@ def _statement(statement: Statement) -> dict[str, Any]:
     return {**plain(statement), "verdict": statement.verdict}
 
 
+def check_reports(folder: Path) -> tuple[Path, Path]:
+    """Names what `write_report` will write, and refuses files of someone else with these names.
+
+    Raises:
+        OutputError: Names the file.
+    """
+    words, numbers = folder / "statements.md", folder / "paper.json"
+    check_chosen([words], TITLE)
+    check_chosen([numbers], '"version": ')
+    return words, numbers
+
+
 def write_report(study: Study, folder: Path) -> list[Path]:
     """Writes `statements.md` and `paper.json`; returns their paths."""
-    words, numbers = reports = [folder / "statements.md", folder / "paper.json"]
-    check_no_links(reports)
-    check_mark(words, TITLE)
-    check_mark(numbers, '"version": ')
+    words, numbers = check_reports(folder)
     write_text(words, statements_markdown(study))
     write_text(numbers, json.dumps(versioned(study_json(study)), indent=1, allow_nan=False) + "\n")
     return [words, numbers]

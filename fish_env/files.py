@@ -10,6 +10,7 @@ import csv
 import errno
 import io
 import os
+import stat
 import sys
 import uuid
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -161,7 +162,9 @@ def file_name(text: str) -> str:
 def check_outputs(
     outputs: Iterable[str | Path | None], inputs: Iterable[str | Path | None] = ()
 ) -> None:
-    """Refuses outputs that would replace a file that is read, or each other.
+    """Refuses outputs that would replace a file that is read, or each other, or cannot be written.
+
+    A command calls this before its work, which would be lost otherwise.
 
     Args:
         outputs: Files that will be written; None is passed over.
@@ -182,6 +185,48 @@ def check_outputs(
         if any(same_file(output, other) for other in written):
             raise OutputError(f"{output}: two outputs have this name; give one another name")
         written.append(output)
+        if str(output) != STANDARD:
+            _check_place(output)
+
+
+def _check_place(output: Path) -> None:
+    """Refuses a file that cannot be written where it is to be; leaves nothing behind.
+
+    Raises:
+        OutputError: Names the file or its folder, and the cause.
+    """
+    try:
+        target = Path(os.path.realpath(output))
+        kind = target.stat().st_mode
+        if stat.S_ISDIR(kind):
+            raise cannot_write(output, _error(errno.EISDIR))
+        if not stat.S_ISREG(kind):
+            return  # a device or a pipe is written to as it is
+        if not os.access(target, os.W_OK) and not _read_only(target):
+            raise cannot_write(output, _error(errno.EACCES))
+    except (FileNotFoundError, NotADirectoryError):
+        pass
+    except ValueError:
+        raise cannot_write(ascii(str(output)), _error(errno.EINVAL)) from None
+    except OSError as error:
+        raise error if isinstance(error, OutputError) else cannot_write(output, error) from None
+    folder = next(parent for parent in target.parents if os.path.exists(parent))
+    named = output.parent if output.parent.name else output
+    if not folder.is_dir():
+        raise cannot_write(folder, _error(errno.ENOTDIR))
+    if _read_only(folder):
+        raise cannot_write(named, _error(errno.EROFS))
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise cannot_write(named, _error(errno.EACCES))
+
+
+def _read_only(path: Path) -> bool:
+    """Whether a path lies on a disk that is mounted for reading alone."""
+    return hasattr(os, "statvfs") and bool(os.statvfs(path).f_flag & os.ST_RDONLY)
+
+
+def _error(number: int) -> OSError:
+    return OSError(number, os.strerror(number))
 
 
 def check_no_links(outputs: Iterable[Path]) -> None:
@@ -236,7 +281,9 @@ def check_mark(output: Path, mark: str, beside: Path | None = None) -> None:
 
 
 def check_chosen(outputs: Iterable[Path], mark: str = PROGRAM) -> None:
-    """Refuses outputs whose names a program chose and that are links, or files of someone else.
+    """Refuses outputs whose names a program chose: links, and files of someone else.
+
+    Those that cannot be written are refused too.
 
     Args:
         outputs: Files that will be written, see :func:`check_no_links`.
@@ -249,6 +296,7 @@ def check_chosen(outputs: Iterable[Path], mark: str = PROGRAM) -> None:
     check_no_links(files)
     for file in files:
         check_mark(file, mark)
+        _check_place(file)
 
 
 def _begin(file: Path, count: int) -> bytes:

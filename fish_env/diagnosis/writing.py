@@ -11,7 +11,7 @@ from typing import Any
 from fish_env.diagnosis.entries import FORMAT
 from fish_env.diagnosis.headline import EXPERIMENT_FILE
 from fish_env.diagnosis.written import replace_part
-from fish_env.files import check_mark, check_no_links, write_text
+from fish_env.files import check_mark, check_no_links, check_outputs, write_text
 from fish_env.params.io import check_tables, fish_outputs, save_fish
 from fish_env.params.schema import FishParams
 from fish_env.version import PROGRAM
@@ -57,6 +57,7 @@ def check_own(fish: FishParams, folder: Path) -> None:
     check_tables(fish, folder / EXTENDED)
     check_marks(folder / name for name in MARKS)
     check_marks(sorted((folder / FIGURES).glob("*")))
+    check_outputs([folder / FIGURES / "paths.svg"])
 
 
 def check_marks(files: Iterable[Path]) -> None:

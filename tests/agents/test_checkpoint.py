@@ -226,6 +226,72 @@ def test_the_reason_of_a_wrong_network_is_one_line(checkpoint, tmp_path):
     assert str(caught.value).isprintable()
 
 
+@pytest.mark.parametrize("checksum", [None, "", "0" * 64])
+def test_a_checkpoint_that_was_changed_is_refused(checksum, checkpoint, tmp_path):
+    """A single number of it; also with the checksum left out, as in the format before."""
+    members = dict(np.load(checkpoint, allow_pickle=False))
+    if checksum is None:
+        members.pop("digest")
+    elif checksum:
+        members["digest"] = np.array(checksum)
+    else:
+        name = next(name for name, value in members.items() if value.dtype == np.float32)
+        members[name] = members[name] + np.float32(1e-3)
+    with (tmp_path / CHECKPOINT).open("wb") as stream:
+        np.savez(stream, **members)
+    with pytest.raises(ConfigError, match=r"checkpoint\.zip: not a readable.* checksum") as caught:
+        train(PPO, tmp_path, Quiet(), resume=True)
+    assert str(caught.value).isprintable()
+
+
+FORGED_MOMENTS = {
+    "none": lambda s: s["0"].update(exp_avg=None),
+    "text": lambda s: s["0"].update(exp_avg="x"),
+    "shape": lambda s: s["0"].update(exp_avg=np.zeros((1, 1), np.float32)),
+    "kind": lambda s: s["0"].update(exp_avg=s["0"]["exp_avg"].astype(np.int64)),
+    "double": lambda s: s["0"].update(exp_avg=s["0"]["exp_avg"].astype(float)),
+    "nan": lambda s: s["0"].update(exp_avg=np.full_like(s["0"]["exp_avg"], np.nan)),
+    "negative": lambda s: s["0"].update(exp_avg_sq=s["0"]["exp_avg_sq"] - 1),
+    "step": lambda s: s["0"].update(step=np.zeros(3, np.float32)),
+    "step of text": lambda s: s["0"].update(step="x"),
+    "left out": lambda s: s["0"].pop("exp_avg_sq"),
+    "another": lambda s: s["0"].update(more=np.zeros(1)),
+    "place": lambda s: s.update({"99": s["0"]}),
+    "place below": lambda s: s.update({"-1": s["0"]}),
+}
+
+
+@pytest.mark.parametrize("forgery", FORGED_MOMENTS)
+def test_moments_that_cannot_be_are_refused(forgery, checkpoint, tmp_path):
+    """Their checksum is right; they ended in a traceback when the training went on."""
+    tree = read_plain(checkpoint)
+    FORGED_MOMENTS[forgery](tree["learner"]["optimisers"]["policy"]["state"])
+    refused(tree, tmp_path / CHECKPOINT)
+
+
+@pytest.mark.parametrize("rate", [None, "x", float("nan"), -1.0, True])
+def test_step_sizes_that_cannot_be_are_refused(rate, checkpoint, tmp_path):
+    tree = read_plain(checkpoint)
+    tree["learner"]["optimisers"]["policy"]["rates"] = [rate]
+    refused(tree, tmp_path / CHECKPOINT)
+
+
+def test_weights_that_are_not_finite_are_refused(checkpoint, tmp_path):
+    tree = read_plain(checkpoint)
+    weights = tree["learner"]["weights"]
+    weights |= {name: np.full_like(value, np.nan) for name, value in weights.items()}
+    refused(tree, tmp_path / CHECKPOINT)
+
+
+def refused(tree, file: Path) -> None:
+    """A training that goes on from a tree ends in one line; it has steps left to learn."""
+    tree["progress"]["steps"] = tree["learner"]["counts"]["num_timesteps"] = 128
+    write_plain(tree, file)
+    with pytest.raises(ConfigError, match=rf"{file.name}: not a readable checkpoint") as caught:
+        train(PPO, file.parent, Quiet(), resume=True)
+    assert str(caught.value).isprintable()
+
+
 @pytest.mark.parametrize("value", [np.array([{}], object), object(), {1: 2}, {"a": [Trap]}])
 def test_what_is_not_plain_is_not_written(value, tmp_path):
     with pytest.raises(TypeError, match=r"tree.*not plain"):

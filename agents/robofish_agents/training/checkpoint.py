@@ -1,7 +1,8 @@
 """Checkpoints: one file from which a later process continues with the same bits.
 
 It is written beside the old one and put in its place at once, so that a kill at any moment leaves
-a whole file. It holds arrays and JSON and no pickles, so that reading one can run no code.
+a whole file, and a checksum tells a damaged one. It holds arrays and JSON and no pickles, so that
+reading one can run no code.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from robofish_agents.training.config import DEFAULT_ENGINE, TrainConfig
 from robofish_agents.training.plain import read_plain, write_plain
 from robofish_agents.training.stack import Stack
 
-FORMAT = "robofish-checkpoint-2"
+FORMAT = "robofish-checkpoint-3"
 KEYS = ("steps", "success_rate", "episode_return")
 """What each evaluation has, of its numbers those that the training compares."""
 LONGEST_REASON = 200

@@ -12,12 +12,15 @@ import torch
 from stable_baselines3 import SAC
 from stable_baselines3.common.buffers import ReplayBuffer
 
+from fish_env.reading import is_number, shown
 from robofish_agents.training.model import Model
 
 COUNTS = ("num_timesteps", "_n_updates", "_episode_num", "_current_progress_remaining")
 LATEST = ("_last_obs", "_last_episode_starts", "_last_original_obs")
 EPISODES = ("ep_info_buffer", "ep_success_buffer")
 STORED = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+MOMENTS = ("step", "exp_avg", "exp_avg_sq")
+"""What Adam, the optimiser of every learner, keeps of a parameter."""
 Plain = dict[str, Any]
 
 
@@ -104,9 +107,31 @@ def restore_optimiser(optimiser: torch.optim.Optimizer, state: Plain) -> None:
     """
     whole = optimiser.state_dict()
     whole["state"] = {int(key): weights_tensors(values) for key, values in state["state"].items()}
+    _check_moments(optimiser, whole["state"])
     for group, rate in zip(whole["param_groups"], state["rates"], strict=True):
+        if not is_number(rate) or rate < 0.0:
+            raise ValueError(f"a step size of {shown(rate)}")
         group["lr"] = rate
     optimiser.load_state_dict(whole)
+
+
+def _check_moments(optimiser: torch.optim.Optimizer, state: Mapping[int, Plain]) -> None:
+    """Refuses moments that this optimiser cannot have, before it meets them in a step.
+
+    Raises:
+        ValueError: names the moment.
+    """
+    parameters = [one for group in optimiser.param_groups for one in group["params"]]
+    for place, values in state.items():
+        if not 0 <= place < len(parameters) or set(values) != set(MOMENTS):
+            raise ValueError(f"moments {shown(list(values))} of parameter {shown(place)}")
+        for name, value in values.items():
+            like = torch.zeros(()) if name == "step" else parameters[place]
+            fits = isinstance(value, torch.Tensor) and value.shape == like.shape
+            if not fits or value.dtype != like.dtype:
+                raise ValueError(f"moment {name} of parameter {place} does not fit")
+            if name != "exp_avg" and bool((value < 0).any()):
+                raise ValueError(f"moment {name} of parameter {place} is negative")
 
 
 def _replay(buffer: ReplayBuffer | None) -> Plain:
@@ -152,7 +177,14 @@ def weights_state(values: Mapping[str, Any]) -> Plain:
 
 
 def weights_tensors(values: Mapping[str, Any]) -> Plain:
-    """Arrays as tensors; other values as they are."""
+    """Arrays as tensors; other values as they are.
+
+    Raises:
+        ValueError: an array has numbers that are not finite.
+    """
+    for key, value in values.items():
+        if isinstance(value, np.ndarray) and not np.all(np.isfinite(value)):
+            raise ValueError(f"{shown(key)} is not finite")
     return {
         key: torch.from_numpy(np.array(value)) if isinstance(value, np.ndarray) else value
         for key, value in values.items()

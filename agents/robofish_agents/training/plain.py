@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fish_env.archives import read_arrays
+from fish_env.archives import digest, read_arrays
 from fish_env.files import replacing
 from fish_env.reading import Unreadable, parse_json, read_bytes
 
@@ -21,7 +21,7 @@ Tree = Any
 """None, bool, int, float, str, array, list of trees, or mapping from str to trees."""
 MOST_BYTES = 8_000_000_000
 """A replay buffer of a million steps has one."""
-TREE, ARRAY = "tree", "__array__"
+TREE, DIGEST, ARRAY = "tree", "digest", "__array__"
 
 
 def write_plain(tree: Tree, path: Path) -> None:
@@ -38,20 +38,26 @@ def write_plain(tree: Tree, path: Path) -> None:
     arrays: dict[str, npt.NDArray[Any]] = {}
     document = json.dumps(_without_arrays(tree, arrays, "tree"))
     with replacing(path) as part, part.open("wb") as stream:
-        np.savez(stream, **{TREE: np.array(document)}, **arrays)  # type: ignore[arg-type]
+        words = {TREE: np.array(document), DIGEST: np.array(digest(document, arrays))}
+        np.savez(stream, **words, **arrays)  # type: ignore[arg-type]
 
 
 def read_plain(path: Path) -> Tree:
     """Reads what :func:`write_plain` wrote.
 
     Raises:
-        OSError, ValueError, KeyError, BadZipFile: another kind of file, or a damaged one.
+        OSError, ValueError, KeyError, BadZipFile: another kind of file, or one that was changed.
     """
     try:
         content = read_bytes(path, MOST_BYTES)
         # It was written unpacked, so one that unpacks to more is forged.
         arrays = read_arrays(content, len(content))
-        return _with_arrays(parse_json(str(arrays[TREE])), arrays)
+        document, checksum = str(arrays.pop(TREE)), arrays.pop(DIGEST, None)
+        if checksum is None:
+            raise ValueError("it has no checksum; an earlier version wrote it, or it is damaged")
+        if str(checksum) != digest(document, arrays):
+            raise ValueError("its checksum does not fit; it was changed or is damaged")
+        return _with_arrays(parse_json(document), arrays)
     except Unreadable as error:
         raise ValueError(error.reason) from None
 

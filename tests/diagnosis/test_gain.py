@@ -117,8 +117,8 @@ def test_a_window_does_not_begin_with_a_soft_tail_unbent():
         problem.runs[0], problem.filtered(truth, noise)[0], problem.channels
     )[1:]
     unbent = [replace(piece, swimming=False) for piece in pieces]
-    left, before = (
-        np.sqrt(np.mean(np.concatenate(open_loop.errors(problem.with_runs(w), truth, noise)) ** 2))
+    left, before = (  # the last rows, which count for nothing, have no errors
+        np.sqrt(np.nanmean(np.vstack(open_loop.errors(problem.with_runs(w), truth, noise)) ** 2))
         for w in (pieces, unbent)
     )
     assert left < 0.3 * before

@@ -213,7 +213,7 @@ def _check_place(output: Path) -> None:
     folder = next(parent for parent in target.parents if os.path.exists(parent))
     named = output.parent if output.parent.name else output
     if not folder.is_dir():
-        raise cannot_write(folder, _error(errno.ENOTDIR))
+        raise cannot_write(output, _error(errno.ENOTDIR))
     if _read_only(folder):
         raise cannot_write(named, _error(errno.EROFS))
     if not os.access(folder, os.W_OK | os.X_OK):

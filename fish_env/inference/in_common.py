@@ -84,8 +84,10 @@ class Numbers:
         found: list[tuple[float, int]] = []
         for i, one in enumerate(effects):
             at, begin = begun(self.problem, one)
-            told = int(np.count_nonzero(self.spread[at]))
-            if one.effect in self.own.effects or told <= bool(one.rates) or begin is None:
+            # What moves one number alone is the effect of that number.
+            fewest = 2 if one.rates else 1
+            few = np.count_nonzero(self.spread[at]) < fewest
+            if one.effect in self.own.effects or few or begin is None:
                 continue
             fewer = _without(self.spread, _gone(self.problem, one, at))
             common = self._along(one, at)

@@ -34,7 +34,9 @@ def left_out_scores(explanation: Explanation) -> FloatArray:
         projected = slopes.T @ predicted
         squares = predicted @ predicted - projected @ np.linalg.solve(whole, projected)
         spread = np.linalg.slogdet(whole)[1] - np.linalg.slogdet(others)[1]
-        own = residuals if lin.marginal is None else filtered.residuals
+        own, varied = residuals, 0.0
+        if lin.marginal is not None:
+            own, varied = filtered.residuals, float(lin.marginal.log_dets[run])
         fitted = filtered.log_likelihood + 0.5 * own @ own
-        scores.append(fitted - 0.5 * (squares + spread))
+        scores.append(fitted - 0.5 * (squares + spread + varied))
     return np.array(scores)

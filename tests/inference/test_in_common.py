@@ -9,6 +9,7 @@ from fish_env.inference.estimate.fit import fit
 from fish_env.inference.estimate.run_variation import CommonEffect, RunVariation
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.in_common import Numbers, with_common_errors
+from fish_env.inference.left_out import left_out_scores
 from fish_env.inference.vehicle import Drive
 from tests.inference.stated import SIZE, Numbered, White, effect, size_of
 
@@ -123,6 +124,15 @@ def test_numbers_that_none_needs_go_and_those_of_single_runs_stay(seed):
     found = with_common_errors(current, THRESHOLD, [].append)
     assert found.causes == ()
     assert np.flatnonzero(found.fit.noise.spread).tolist() == [TRIM]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_numbers_that_none_needs_predict_a_run_that_was_left_out_worse(seed):
+    """Each may be anything then, which makes what is measured less likely."""
+    problem = Sensed(0.0, seed=seed)
+    none = fit(problem, noise=Spreading(spread=(0.0, 0.0, 0.0)), refit_noise=False)
+    with_numbers, without = explained(problem), Explanation((), none)
+    assert (left_out_scores(without) > left_out_scores(with_numbers)).all()
 
 
 def test_an_explanation_without_numbers_stays_as_it_is():

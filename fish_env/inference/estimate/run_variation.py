@@ -186,9 +186,14 @@ class Marginal:
         return np.asarray(self.rows((residuals - shift)[None])[0])
 
     @cached_property
+    def log_dets(self) -> FloatArray:
+        """(R,) what integrating costs in -2 log likelihood of each run."""
+        return np.array([np.log1p(variance).sum() for _, _, variance in self._parts])
+
+    @property
     def log_det(self) -> float:
-        """What integrating costs in -2 log likelihood."""
-        return float(sum(np.log1p(variance).sum() for _, _, variance in self._parts))
+        """What it costs in that of all runs."""
+        return float(self.log_dets.sum())
 
     def predicted(
         self, residuals: FloatArray, damping: float = 0.0, least: FloatArray | None = None

@@ -195,21 +195,22 @@ def _check_place(output: Path) -> None:
     Raises:
         OutputError: Names the file or its folder, and the cause.
     """
+    kind = None
     try:
         target = Path(os.path.realpath(output))
         kind = target.stat().st_mode
-        if stat.S_ISDIR(kind):
-            raise cannot_write(output, _error(errno.EISDIR))
-        if not stat.S_ISREG(kind):
-            return  # a device or a pipe is written to as it is
-        if not os.access(target, os.W_OK) and not _read_only(target):
-            raise cannot_write(output, _error(errno.EACCES))
     except (FileNotFoundError, NotADirectoryError):
         pass
     except ValueError:
         raise cannot_write(ascii(str(output)), _error(errno.EINVAL)) from None
     except OSError as error:
-        raise error if isinstance(error, OutputError) else cannot_write(output, error) from None
+        raise cannot_write(output, error) from None
+    if kind is not None and stat.S_ISDIR(kind):
+        raise cannot_write(output, _error(errno.EISDIR))
+    if kind is not None and not stat.S_ISREG(kind):
+        return  # a device or a pipe is written to as it is
+    if kind is not None and not os.access(target, os.W_OK) and not _read_only(target):
+        raise cannot_write(output, _error(errno.EACCES))
     folder = next(parent for parent in target.parents if os.path.exists(parent))
     named = output.parent if output.parent.name else output
     if not folder.is_dir():

@@ -72,7 +72,7 @@ def page(speed: Path = SPEED, diagnosis: Path = DIAGNOSIS) -> str:
 
 
 def _latest(folder: Path, name: str) -> str:
-    """The reports of the latest date in a folder, one after another, headings one level lower.
+    """The reports of the latest run in a folder, one after another, headings one level lower.
 
     Parts of a hidden suite are summed up as one.
     """
@@ -110,8 +110,7 @@ def _summed(parts: list[Path], suite: Suite) -> str:
     rows.sort(key=lambda row: (row.tier, row.seed))
     commits = ", ".join(f"{len(part['rows'])} at {part['commit']}" for part in found)
     said = f"{len(rows)} cases, each diagnosed once: {commits}."
-    days = dict.fromkeys(part["date"] for part in found)
-    date = " to ".join([*days][:: max(1, len(days) - 1)])
+    date = " to ".join(sorted({found[0]["date"], found[-1]["date"]}))
     return suite.page(date, said, suite.summarise(rows))
 
 

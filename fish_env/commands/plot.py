@@ -11,6 +11,7 @@ from rich.console import Console
 from fish_env.errors import ConfigError
 from fish_env.files import check_chosen
 from fish_env.params import FishParams, load_fish
+from fish_env.plotting.style import files_of
 
 Formats = tuple[str, ...]
 FORMATS = ("png", "svg", "pdf")
@@ -91,7 +92,7 @@ def plot_fish(
         raise ConfigError(f"no format '{unknown[0]}': choose from {', '.join(FORMATS)}")
     loaded = load_fish(fish, trust_effects)
     names = list(KINDS) if kind == "all" else [kind]
-    check_chosen(out / f"{name}.{ending}" for name in names for ending in formats)
+    check_chosen(files_of(out, names, formats))
     written = []
     for name in names:
         with console.status(f"swimming and drawing: {name}"):

@@ -11,7 +11,7 @@ from typing import Any
 from fish_env.diagnosis.entries import FORMAT
 from fish_env.diagnosis.headline import EXPERIMENT_FILE
 from fish_env.diagnosis.written import replace_part
-from fish_env.files import check_mark, check_no_links, check_outputs, write_text
+from fish_env.files import check_chosen, check_no_links, check_outputs, write_text
 from fish_env.params.io import check_tables, fish_outputs, save_fish
 from fish_env.params.schema import FishParams
 from fish_env.version import PROGRAM
@@ -72,8 +72,7 @@ def check_marks(files: Iterable[Path]) -> None:
     for file in files:
         mark = PROGRAM if FIGURE.fullmatch(file.name) else MARKS.get(file.name)
         if mark is not None:
-            check_no_links([file])
-            check_mark(file, mark)
+            check_chosen([file], mark)
 
 
 def write_answer(answer: Mapping[str, Any], extended: FishParams | None, folder: Path) -> None:

@@ -172,8 +172,8 @@ class RunData:
         """
         if self.most_rows < 1:
             return self
-        run = replace(self, devices=np.array(devices_of(channels)), recorded=self.measured)
-        return replace(run, measured=run._in_rows(run.moved))
+        run = replace(self, devices=np.array(devices_of(channels)))
+        return run._recorded_as(self.measured)
 
     def as_recorded(self) -> RunData:
         """The same run with all samples in the rows that their stamps ask for, where they stay."""
@@ -195,6 +195,10 @@ class RunData:
         recorded, gyro = self.recorded.copy(), np.isin(channels, ["p", "q", "r"])
         smeared = soon_after(self.commands, self.clock, IDENTIFICATION.smeared_gyro_s)
         recorded[np.ix_(smeared, gyro)] = np.nan
+        return self._recorded_as(recorded)
+
+    def _recorded_as(self, recorded: FloatArray) -> RunData:
+        """The same run with other samples (T, C), moved as its own are."""
         run = replace(self, recorded=recorded)
         return replace(run, measured=run._in_rows(run.moved))
 
@@ -296,10 +300,7 @@ class RunData:
         if count >= len(self.clock):
             return self
         part = self.cut(0, count)
-        if self.recorded is None:
-            return part
-        part = replace(part, recorded=self.recorded[:count])
-        return replace(part, measured=part._in_rows(part.moved))
+        return part if self.recorded is None else part._recorded_as(self.recorded[:count])
 
     def cut(self, first: int, last: int) -> RunData:
         """The same run with some of its samples, ``first`` to before ``last``."""

@@ -12,7 +12,7 @@ from fish_env.comparison import RunComparison, RunsComparison, SteadyComparison
 from fish_env.comparison.words import shown_unit
 from fish_env.data import COMMANDS, Dataset, Run, SteadyDataset
 from fish_env.files import file_name
-from fish_env.plotting.style import FORMATS, MEASURED, SIMULATED, colours, drawing, save
+from fish_env.plotting.style import MEASURED, SIMULATED, colours, drawing, files_of, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -44,13 +44,11 @@ def picture_files(compared: Dataset | SteadyDataset | Comparison, folder: Path) 
         folder: Where they go.
     """
     if isinstance(compared, SteadyDataset | SteadyComparison):
-        names = [f"{name}.{ending}" for name in (AGREEMENT, OVER_COMMANDS) for ending in FORMATS]
-    else:
-        names = [f"{_run_name(run.id)}.png" for run in compared.runs]
-        first = compared.runs[0]
-        if {"x", "y"} <= set(first.channels if isinstance(first, Run) else first.measured):
-            names += [f"{PATHS}.{ending}" for ending in FORMATS]
-    return [folder / name for name in names]
+        return files_of(folder, [AGREEMENT, OVER_COMMANDS])
+    first = compared.runs[0]
+    places = {"x", "y"} <= set(first.channels if isinstance(first, Run) else first.measured)
+    of_runs = files_of(folder, [_run_name(run.id) for run in compared.runs], ["png"])
+    return [*of_runs, *files_of(folder, [PATHS] if places else [])]
 
 
 def _run_name(id: str) -> str:

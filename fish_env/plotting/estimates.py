@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fish_env.plotting.style import BLUE, FORMATS, PALE, VERMILION, drawing, save
+from fish_env.plotting.style import BLUE, PALE, VERMILION, drawing, files_of, save
 
 NAME = "estimates"
 Row = tuple[str, float, float, float, float]
@@ -16,7 +16,7 @@ Row = tuple[str, float, float, float, float]
 
 def picture_files(folder: Path) -> list[Path]:
     """The files that :func:`draw_estimates` writes into a folder."""
-    return [folder / f"{NAME}.{ending}" for ending in FORMATS]
+    return files_of(folder, [NAME])
 
 
 def draw_estimates(rows: Sequence[Row], title: str, folder: Path) -> Path:

@@ -10,7 +10,7 @@ import numpy as np
 from fish_env.comparison.words import shown_unit
 from fish_env.data import COMMANDS, Dataset, Run
 from fish_env.plotting.comparison import COMMAND_UNITS, label
-from fish_env.plotting.style import BLUE, MEASURED, drawing, save
+from fish_env.plotting.style import BLUE, MEASURED, drawing, files_of, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,7 +21,7 @@ _ROW, _ABOVE, _BELOW = 0.95, 0.65, 0.5
 
 def picture_files(dataset: Dataset, folder: Path) -> list[Path]:
     """The files that :func:`draw_imported` writes into a folder."""
-    return [folder / f"{_name(run)}.png" for run in dataset.runs]
+    return files_of(folder, map(_name, dataset.runs), ["png"])
 
 
 def _name(run: Run) -> str:

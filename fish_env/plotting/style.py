@@ -6,7 +6,7 @@ colour vision; maps use cividis or viridis.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -113,6 +113,13 @@ def keep_literal(figure: Figure) -> None:
                 text.set_parse_math(False)
 
 
+def files_of(
+    folder: Path, names: Iterable[str], formats: Sequence[str] | None = None
+) -> list[Path]:
+    """The files of pictures in a folder, each in every format; default: `FORMATS`."""
+    return [folder / f"{name}.{ending}" for name in names for ending in formats or FORMATS]
+
+
 def save(figure: Figure, folder: Path, name: str, formats: tuple[str, ...] | None = None) -> Path:
     """Writes a figure as `<folder>/<name>.<format>` for each format; returns the first path.
 
@@ -120,7 +127,7 @@ def save(figure: Figure, folder: Path, name: str, formats: tuple[str, ...] | Non
         OutputError: A file cannot be written, or is a link.
     """
     keep_literal(figure)
-    paths = [folder / f"{name}.{ending}" for ending in formats or FORMATS]
+    paths = files_of(folder, [name], formats)
     check_no_links(paths)
     for path in paths:
         with replacing(path) as part:

@@ -133,12 +133,10 @@ def test_the_report_says_everything(study: Study, tmp_path: Path) -> None:
 def test_every_figure_is_drawn(
     study: Study, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from fish_env.studies.paper import figures
     from fish_env.studies.paper.figures import draw_study, picture_files
 
     monkeypatch.setattr(style, "DOTS_PER_INCH", 40)
-    for module in (style, figures):
-        monkeypatch.setattr(module, "FORMATS", ("png",))
+    monkeypatch.setattr(style, "FORMATS", ("png",))
     pictures = draw_study(study, tmp_path)
     assert len(pictures) == len({path.name for path in pictures}) == 12
     assert sorted(picture_files(tmp_path)) == sorted(tmp_path.iterdir())

@@ -67,7 +67,7 @@ class CommonEffect:
             where no effect does that. Others stay at neutral.
         beside: names of further variations, which stay: part of them may be the effect's too.
         rates: by how much each number changes with the one parameter that moves all of them (SI);
-            none where each has a parameter of its own. What is left of the numbers stays.
+            none where each has a parameter of its own. The remainder of a number stays.
     """
 
     effect: str

@@ -12,11 +12,11 @@ from fish_env.plotting.style import (
     BLACK,
     BLUE,
     COLOUR_MAP,
-    FORMATS,
     GREEN,
     VERMILION,
     colours,
     drawing,
+    files_of,
     save,
 )
 from fish_env.studies.paper import ranges
@@ -40,7 +40,7 @@ NAMES = (
 
 def picture_files(folder: Path) -> list[Path]:
     """The files that :func:`draw_study` writes into a folder."""
-    return [folder / f"{name}.{ending}" for name in NAMES for ending in FORMATS]
+    return files_of(folder, NAMES)
 
 
 def draw_study(study: Study, folder: Path) -> list[Path]:

@@ -18,18 +18,21 @@ from fish_env.inference.explanation import Explanation, known_before
 def left_out_scores(explanation: Explanation) -> FloatArray:
     """Log density of each run (runs,) as predicted by a fit to all others.
 
+    The fit to the others goes to their minimum also where the fit to all ended short of its own.
+
     Args:
         explanation: a fit to at least two runs.
     """
     fit = explanation.fit
     lin, known = fit.linearised, known_before(explanation)
-    whole = information(lin.slopes, known)
+    whole, remaining = information(lin.slopes, known), fit.remaining_gradient
     scores = []
     for run, filtered in enumerate(fit.filtered):
         mine = lin.run_of == run
         slopes, residuals = lin.slopes[mine], lin.residuals[mine]
         others = whole - slopes.T @ slopes
-        predicted = residuals + slopes @ np.linalg.solve(others, slopes.T @ residuals)
+        step = np.linalg.solve(others, slopes.T @ residuals - remaining)
+        predicted = residuals + slopes @ step
         # Predicted residuals scatter by I + S C S': by the matrix inversion lemma.
         projected = slopes.T @ predicted
         squares = predicted @ predicted - projected @ np.linalg.solve(whole, projected)

@@ -96,6 +96,17 @@ class Fit:
         inverse = np.linalg.inv(information(self.linearised.slopes, free.prior))
         return np.asarray(np.diag(scale @ inverse @ scale.T))
 
+    @cached_property
+    def remaining_gradient(self) -> FloatArray:
+        """Half the gradient (n,) of the objective that the steps left, beside active bounds.
+
+        Zero at the minimum; steps end before it, where what is left is small to the whole.
+        """
+        free, lin = Free(self.problem, self.effects, self.released), self.linearised
+        pull = gradient(lin.slopes, lin.residuals, free.prior, free.pack(self.point))
+        held = np.linalg.lstsq(self.active.T, pull, rcond=None)[0]
+        return np.asarray(pull - self.active.T @ held)
+
     def inflation(self, at: Sequence[int] | IntArray) -> float:
         """How much larger coloured residuals make the variance of some parameters (at least 1).
 

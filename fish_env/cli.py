@@ -114,9 +114,10 @@ def replay(
             metavar="FILE",
         ),
     ],
-    out: Annotated[Path, typer.Option(help="The page to write; - is standard output.")] = Path(
-        "replay.html"
-    ),
+    out: Annotated[
+        Path | None,
+        typer.Option(help="The page to write; - is standard output.", show_default="replay.html"),
+    ] = None,
     fish: Annotated[
         str | None, typer.Option(help="Fish whose size is drawn: preset or file.")
     ] = None,
@@ -133,8 +134,10 @@ def replay(
     """
     from fish_env.commands.numbers import console_for
     from fish_env.commands.replay import replay_files
+    from fish_env.files import named_or_chosen
 
-    replay_files(console_for(out), files, out, fish, case)
+    page = named_or_chosen(out, "replay.html")
+    replay_files(console_for(page), files, page, fish, case)
 
 
 @app.command()
@@ -193,9 +196,10 @@ def fit(
             "the errors on the data left out."
         ),
     ] = None,
-    out: Annotated[Path, typer.Option(help="The parameter file to write.")] = Path(
-        "identified.yaml"
-    ),
+    out: Annotated[
+        Path | None,
+        typer.Option(help="The parameter file to write.", show_default="identified.yaml"),
+    ] = None,
     results: Annotated[
         Path | None,
         typer.Option("--json", "--results", help="File for all numbers; - is standard output."),
@@ -215,10 +219,12 @@ def fit(
     """
     from fish_env.commands.fit import effects_from, fit_and_write
     from fish_env.commands.numbers import console_for
+    from fish_env.files import named_or_chosen
 
     fit_and_write(
-        console_for(results), dataset, fish, effects_from(effects), out, trust_effects, objective,
-        leave_out, results, trust_inputs,
+        console_for(results), dataset, fish, effects_from(effects),
+        named_or_chosen(out, "identified.yaml"), trust_effects, objective, leave_out, results,
+        trust_inputs,
     )  # fmt: skip
 
 

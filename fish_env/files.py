@@ -300,6 +300,22 @@ def check_chosen(outputs: Iterable[Path], mark: str = PROGRAM) -> None:
         _check_place(file)
 
 
+def named_or_chosen(given: Path | None, name: str) -> Path:
+    """An output that the user named; else one in the working folder, with a name of the program's.
+
+    Args:
+        given: What the user named.
+        name: What the program calls it.
+
+    Raises:
+        OutputError: The user named none, and a file of someone else has the program's name.
+    """
+    if given is not None:
+        return given
+    check_chosen([Path(name)])
+    return Path(name)
+
+
 def _begin(file: Path, count: int) -> bytes:
     """The first bytes of a file; none of what is no file or cannot be read."""
     if file.is_file():

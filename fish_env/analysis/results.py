@@ -18,6 +18,7 @@ from fish_env.diagnosis.writing import EXTENDED, check_marks
 from fish_env.files import check_chosen, check_no_links, write_bytes
 from fish_env.identification.dataset_fit import DatasetFit
 from fish_env.params import FishParams, load_fish
+from fish_env.params.io import check_tables_of
 from fish_env.version import versioned
 
 if TYPE_CHECKING:
@@ -297,6 +298,9 @@ class DiagnoseResult(Result):
         copies = {file: Path(folder) / file.relative_to(self.folder) for file in files}
         check_no_links(copies.values())
         check_marks(copies.values())
+        own = Path(folder) / EXTENDED
+        tables = (own.with_name(file.name) for file in self.folder.glob(f"{own.stem}.*.csv"))
+        check_tables_of(own, tables)
         for file, copy in copies.items():
             write_bytes(copy, file.read_bytes())
         return Path(folder) / REPORT

@@ -6,7 +6,7 @@ to the file that names them.
 """
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -207,8 +207,21 @@ def check_tables(fish: FishParams, path: str | Path) -> None:
         OutputError: Names a table that is a link, or is not one of a fish of this program there.
     """
     file, *tables = fish_outputs(fish, path).values()
-    check_no_links(tables)
+    check_tables_of(file, tables)
+
+
+def check_tables_of(file: Path, tables: Iterable[Path]) -> None:
+    """Refuses tables for a fish's file as :func:`check_tables` does.
+
+    Args:
+        file: The file, which names the program if it is of it.
+        tables: Its tables, which need not be there.
+
+    Raises:
+        OutputError: Names a table.
+    """
     for table in tables:
+        check_no_links([table])
         check_first_line(table, HEAD)
         check_mark(table, PROGRAM, beside=file)
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fish_env.analysis.results import CompareResult
+from fish_env.analysis.results import CompareResult, DiagnoseResult
 from fish_env.comparison import compare
 from fish_env.data import load_dataset
 from fish_env.errors import OutputError
@@ -46,12 +46,15 @@ REFUSED = {
     "statements.md": "paper --out {0}/out",
     "mine.tail.drag.csv": "fit {0}/runs --trust-inputs --out {0}/out/mine.yaml",
     "extended.tail.drag.csv": "diagnose {0}/runs --out {0}/out",
+    "identified.yaml": "fit {0}/runs --trust-inputs",
+    "replay.html": "replay {0}/runs/r01.csv",
 }
 
 
 @pytest.mark.parametrize("name", REFUSED)
 def test_a_file_of_the_user_is_kept(name, folder, capsys, monkeypatch):
     """It is so before anything is computed or written."""
+    monkeypatch.chdir(folder / "out")
     for place in (
         "fish_env.commands.compare._compare", "fish_env.commands.paper.run_study",
         "fish_env.commands.fit.fit_dataset", "robofish_agents.swimming.swim_episode",
@@ -101,6 +104,19 @@ def test_pictures_from_python_replace_no_file_of_the_user(folder):
     with pytest.raises(OutputError, match="did not write it"):
         CompareResult(comparison).plot(folder / "out")
     assert file.read_text() == "of the user"
+
+
+def test_a_diagnosis_saved_from_python_replaces_no_table_of_the_user(folder, tmp_path):
+    kept, mine = tmp_path / "kept", folder / "out" / "extended.tail.drag.csv"
+    save_fish(load_fish(folder / "mine.yaml"), kept / "extended.yaml")
+    mine.write_text("of the user")
+    with pytest.raises(OutputError, match="did not write it"):
+        DiagnoseResult({}, kept).save(folder / "out")
+    assert [mine.read_text()] == [file.read_text() for file in (folder / "out").iterdir()]
+    mine.unlink()
+    for _ in range(2):  # the second replaces its own
+        DiagnoseResult({}, kept).save(folder / "out")
+    assert load_fish(folder / "out" / "extended.yaml").tail == load_fish(folder / "mine.yaml").tail
 
 
 def test_a_fish_replaces_its_own_tables(folder):

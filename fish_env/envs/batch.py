@@ -14,6 +14,7 @@ from fish_env.arrays import FloatArray, IntArray
 from fish_env.envs import start
 from fish_env.envs.layout import (
     GOAL,
+    GUIDE,
     MAX_BEAT_S,
     OBSERVATION,
     OUTPUTS,
@@ -207,9 +208,22 @@ class FishBatch:
         self._history = np.array(state["history"], float)
         for path, values in self.drawn.items():
             values[:] = state["drawn"][path]
-        self._queue_at, self._ring_at = state["places"]
+        self._queue_at, self._ring_at = map(int, state["places"])
         self._noise_rngs = [None if saved is None else generator(saved) for saved in state["noise"]]
         self._started = state["started"]
+        if not self._places_exist():
+            raise ValueError("places in queues, noise or paths that do not exist")
+
+    def _places_exist(self) -> bool:
+        """Whether all numbers by which compiled code reads, which does not ask, are in range."""
+        rows, data = self._rows, self._data
+        places = ((self._queue_at, self._queue), (self._ring_at, self._ring))
+        points = data[rows.ROW_GOAL + GOAL.index("path_points")]
+        leg = data[rows.ROW_GUIDE + GUIDE.index("leg")]
+        most = 1 + (len(data) - rows.ROW_POINTS) // 3
+        on_path = (points >= 0) & (points <= most) & (leg >= 0) & (leg <= np.maximum(points - 2, 0))
+        inside = all(at in range(len(held)) for at, held in places)
+        return bool(inside and on_path.all() and (self._noise_used >= 0).all())
 
     @property
     def started(self) -> bool:

@@ -14,9 +14,11 @@ import numpy as np
 import pytest
 import torch
 
+from fish_env.envs.layout import GOAL, GUIDE
 from fish_env.errors import ConfigError
 from robofish_agents.training.checkpoint import FORMAT, Progress, load_checkpoint, save_checkpoint
 from robofish_agents.training.config import Ppo, Sac, TrainConfig
+from robofish_agents.training.forms import check_form
 from robofish_agents.training.learner_state import learner_state, restore_learner
 from robofish_agents.training.model import make_model
 from robofish_agents.training.plain import read_plain, write_plain
@@ -285,10 +287,95 @@ def test_weights_that_are_not_finite_are_refused(checkpoint, tmp_path):
 
 def refused(tree, file: Path) -> None:
     """A training that goes on from a tree ends in one line; it has steps left to learn."""
-    tree["progress"]["steps"] = tree["learner"]["counts"]["num_timesteps"] = 128
+    tree["progress"]["steps"] = 128
     write_plain(tree, file)
     with pytest.raises(ConfigError, match=rf"{file.name}: not a readable checkpoint") as caught:
         train(PPO, file.parent, Quiet(), resume=True)
+    assert str(caught.value).isprintable()
+
+
+FORGED_STATES = {
+    "steps of text": ("learner.counts.num_timesteps", "x"),
+    "half an update": ("learner.counts._n_updates", 0.5),
+    "no observations": ("learner.latest._last_obs", None),
+    "observations of text": ("learner.latest._last_obs", "x"),
+    "observations of another width": ("learner.latest._last_obs", np.zeros((1, 1))),
+    "observations that are not numbers": ("learner.latest._last_obs", np.nan),
+    "an episode of text": ("learner.episodes.ep_info_buffer", "x"),
+    "a success that is a list": ("learner.episodes.ep_success_buffer", [[1]]),
+    "no time": ("stack.cpu_s", None),
+    "returns of another width": ("stack.monitor.0", np.zeros((1, 1))),
+    "means of text": ("stack.means.0.0", "x"),
+    "means that are not numbers": ("stack.means.0.0", np.nan),
+    "no returns": ("stack.returns", None),
+    "a place of text": ("stack.envs.0.batch.places.0", "x"),
+    "a place before the queue": ("stack.envs.0.batch.places.0", -1),
+    "a place behind the ring": ("stack.envs.0.batch.places.1", 10**9),
+    "noise from before its beginning": ("stack.envs.0.batch.arrays._noise_used", -1),
+    "a history of another kind": ("stack.envs.0.batch.history", "x"),
+    "fish that are nowhere": ("stack.envs.0.batch.arrays._data", None),
+}
+
+
+@pytest.mark.parametrize("name", FORGED_STATES)
+def test_a_state_of_another_form_is_refused(name, checkpoint, tmp_path):
+    """Its checksum is right; each of them ended in a traceback when the training went on."""
+    place, value = FORGED_STATES[name]
+    tree = read_plain(checkpoint)
+    *above, last = [int(key) if key.isdecimal() else key for key in place.split(".")]
+    held = tree
+    for key in above:
+        held = held[key]
+    whole = isinstance(held[last], np.ndarray) and isinstance(value, int | float)
+    held[last] = np.full_like(held[last], value) if whole else value
+    refused(tree, tmp_path / CHECKPOINT)
+
+
+@pytest.mark.parametrize("task", ["path", "hold"])
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("path_points", 1e9), ("path_points", -1.0), ("leg", 1e9), ("leg", -1.0), ("leg", np.nan)],
+)
+def test_legs_that_do_not_exist_are_refused(name, value, task):
+    """Compiled code reads waypoints by their number, wherever that is in memory."""
+    config = replace(PPO, task=task)
+    stack = make_stack(config)
+    stack.outside.reset()
+    state = stack.state()
+    make_stack(config).restore(state)
+    rows = stack.fish.parts[0].env.batch._rows
+    at = rows.ROW_GUIDE + GUIDE.index("leg")
+    if name == "path_points":
+        at = rows.ROW_GOAL + GOAL.index("path_points")
+    state["envs"][0]["batch"]["arrays"]["_data"][at] = value
+    with pytest.raises(ValueError, match=r"paths that do not exist|does not fit"):
+        make_stack(config).restore(state)
+
+
+@pytest.mark.parametrize(
+    ("value", "like"),
+    [
+        (1, 2), (1, 2.0), (np.array(1.5), 2.0), (True, 0.0), (False, True), ("a", "b"),
+        ([1, 2], (3, 4)), ({"a": 1}, {"a": 2}), (None, None), (np.zeros(2), np.ones(2)),
+        (np.array([np.inf]), np.array([-np.inf])), (2**100, 1),
+    ],
+)  # fmt: skip
+def test_values_of_one_form(value, like):
+    check_form(value, like, "here")
+
+
+@pytest.mark.parametrize(
+    ("value", "like"),
+    [
+        ("1", 2), (1.5, 2), (True, 2), (np.nan, 2.0), (np.inf, 2.0), (None, 2.0), (1, True),
+        (1, "b"), (1, None), ([1], [1, 2]), ([1], 1), ({}, {"a": 1}), ({"a": 1, "b": 2}, {"a": 1}),
+        ([1], {"a": 1}), (np.zeros(2), np.zeros(3)), (np.zeros(2, np.float32), np.zeros(2)),
+        ([0.0, 0.0], np.zeros(2)), (np.array([np.nan, 0.0]), np.zeros(2)), (np.zeros(2), 1.0),
+    ],
+)  # fmt: skip
+def test_values_of_another_form(value, like):
+    with pytest.raises(ValueError, match=r"here.* does not fit") as caught:
+        check_form(value, like, "here")
     assert str(caught.value).isprintable()
 
 

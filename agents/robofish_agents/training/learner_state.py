@@ -13,6 +13,7 @@ from stable_baselines3 import SAC
 from stable_baselines3.common.buffers import ReplayBuffer
 
 from fish_env.reading import is_number, shown
+from robofish_agents.training.forms import check_form
 from robofish_agents.training.model import Model
 
 COUNTS = ("num_timesteps", "_n_updates", "_episode_num", "_current_progress_remaining")
@@ -54,8 +55,10 @@ def restore_learner(model: Model, state: Plain) -> None:
     for name, optimiser in _optimisers(model).items():
         restore_optimiser(optimiser, state["optimisers"][name])
     entropy = _entropy(model)
+    check_form(state["entropy"], None if entropy is None else entropy.detach().numpy(), "entropy")
     if entropy is not None:
         entropy.data.copy_(torch.as_tensor(state["entropy"]))
+    _check_forms(model, state)
     for name in COUNTS:
         setattr(model, name, state["counts"][name])
     for name in LATEST:
@@ -66,6 +69,23 @@ def restore_learner(model: Model, state: Plain) -> None:
         _restore_replay(model.replay_buffer, state["replay"])
     model.action_space.np_random.bit_generator.state = state["actions"]
     restore_random(state["random"])
+
+
+def _check_forms(model: Model, state: Plain) -> None:
+    """Refuses counters, observations and episodes that this learner cannot have.
+
+    Raises:
+        ValueError: names what does not fit.
+    """
+    check_form(state["counts"], {name: getattr(model, name) for name in COUNTS}, "counts")
+    if any(value is not None for value in state["latest"].values()):
+        space = model.observation_space
+        seen = np.zeros((model.n_envs, *(space.shape or ())), space.dtype)
+        latest = (seen, np.zeros(model.n_envs, bool), seen)
+        check_form(state["latest"], dict(zip(LATEST, latest, strict=True)), "latest")
+    for name, like in zip(EPISODES, ({"r": 0.0, "l": 0, "t": 0.0}, 0.0), strict=True):
+        rows = state["episodes"][name]
+        check_form(rows, [like] * len(rows), name)
 
 
 def _optimisers(model: Model) -> dict[str, torch.optim.Optimizer]:
@@ -143,10 +163,16 @@ def _replay(buffer: ReplayBuffer | None) -> Plain:
 
 def _restore_replay(buffer: ReplayBuffer | None, state: Plain) -> None:
     assert buffer is not None
-    buffer.pos, buffer.full = state["position"], state["full"]
-    rows = buffer.buffer_size if buffer.full else buffer.pos
-    for name in STORED:
-        getattr(buffer, name)[:rows] = state["stored"][name]
+    place, full = state["position"], state["full"]
+    check_form([place, full], [0, False], "replay")
+    if not 0 <= place < buffer.buffer_size:
+        raise ValueError(f"replay: a position of {shown(place)}")
+    buffer.pos, buffer.full = place, full
+    rows = buffer.buffer_size if full else place
+    stored = {name: getattr(buffer, name)[:rows] for name in STORED}
+    check_form(state["stored"], stored, "replay")
+    for name, values in stored.items():
+        values[:] = state["stored"][name]
 
 
 def random_state() -> Plain:

@@ -13,6 +13,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 
 from fish_env.envs.sb3 import FishVecEnv
 from robofish_agents.training.config import MOST_FISH, TrainConfig
+from robofish_agents.training.forms import check_form
 from robofish_agents.training.history_env import HistoryVecEnv
 
 FIRST_SEED = 10_000_000
@@ -117,6 +118,8 @@ class Stack:
         Raises:
             KeyError, ValueError: the state is not that of such fish.
         """
+        self.outside.reset()  # so that everything has the form that it has in a training
+        check_form(state, self._like(state), "stack")
         self.fish.cpu_s = state["cpu_s"]
         for part, env in zip(self.fish.parts, state["envs"], strict=True):
             part.env.load_state(env)
@@ -127,6 +130,13 @@ class Stack:
             running.mean, running.var, running.count = saved
         outside.returns = state["returns"]
         outside.old_obs, outside.old_reward = state["latest"]
+
+    def _like(self, state: dict[str, Any]) -> dict[str, Any]:
+        """The present state, with rewards of a last step if another state has some."""
+        own, (_, rewards) = self.state(), state["latest"]
+        if np.size(rewards):
+            own["latest"][1] = np.zeros(self.fish.num_envs, np.float32)
+        return own
 
     def _means(self) -> list[RunningMeanStd]:
         """Returns the running means of observations and returns."""

@@ -30,6 +30,7 @@ from robofish_agents.policies.files import ACTIONS, PolicyFile
 from robofish_agents.training.actor_critic import ActorCritic, Recipe, network_of
 from robofish_agents.training.books import Books
 from robofish_agents.training.config import TrainConfig
+from robofish_agents.training.forms import check_form
 from robofish_agents.training.learner_state import (
     optimiser_state,
     random_state,
@@ -299,8 +300,12 @@ class TensorEngine:
         for (learner, optimiser), (weights, moments) in zip(self._pairs(), saved, strict=True):
             learner.load_state_dict(weights_tensors(weights))
             restore_optimiser(optimiser, moments)
+        known, space = self._known, self.stack.outside.observation_space
+        seen = np.zeros((self.stack.fish.num_envs, *(space.shape or ())), space.dtype)
+        check_form(state["latest"], None if state["latest"] is None else seen, "latest")
+        check_form(state["known"], [known.mean, known.var, float(known.count)], "known")
         self._latest = state["latest"]
-        self._known.mean, self._known.var, self._known.count = state["known"]
+        known.mean, known.var, known.count = state["known"]
         restore_random(state["random"])
 
     def _pairs(self) -> list[tuple[ActorCritic, torch.optim.Adam]]:

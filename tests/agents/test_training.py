@@ -16,6 +16,7 @@ from fish_env.errors import ConfigError
 from robofish_agents.policies import read_policy
 from robofish_agents.training.config import Evaluation, History, Imitation, Ppo, Sac, TrainConfig
 from robofish_agents.training.run import CHECKPOINT, POLICY, Outcome, train
+from robofish_agents.training.settings import LearningRate
 
 ROOT = Path(__file__).resolve().parents[2]
 PPO = TrainConfig(
@@ -139,6 +140,13 @@ def test_the_folder_says_what_was_done(whole):
     rows = (folder / "evaluations.csv").read_text().splitlines()
     assert len(rows) == 1 + len(whole.progress.evaluations)
     assert list((folder / "tensorboard").iterdir())
+
+
+@pytest.mark.parametrize("config", [PPO, SAC], ids=["ppo", "sac"])
+def test_a_training_that_diverges_says_so(config, tmp_path):
+    own = replace(getattr(config, config.algorithm), learning_rate=LearningRate(1e30))
+    with pytest.raises(ConfigError, match=rf"diverged.*{config.algorithm}\.learning_rate\.start"):
+        train(replace(config, **{config.algorithm: own}), tmp_path, Quiet())
 
 
 @pytest.mark.slow

@@ -9,6 +9,7 @@ from typing import Any
 from stable_baselines3 import PPO
 from stable_baselines3.common import logger
 
+from fish_env.errors import ConfigError
 from robofish_agents.policies.export import export_policy
 from robofish_agents.policies.files import PolicyFile
 from robofish_agents.training.books import Books
@@ -18,6 +19,9 @@ from robofish_agents.training.imitation import imitate
 from robofish_agents.training.learner_state import learner_state, restore_learner
 from robofish_agents.training.model import make_model
 from robofish_agents.training.stack import Stack
+
+OF_NO_NUMBERS = "Expected parameter"
+"""How PyTorch begins to say that a distribution is asked for with NaN."""
 
 
 class Sb3Engine:
@@ -39,10 +43,22 @@ class Sb3Engine:
         imitate(self.model, self.stack, self.config, self.config.imitate)
 
     def learn(self, books: Books) -> None:
-        """Learns from the books' steps to those of the configuration."""
+        """Learns from the books' steps to those of the configuration.
+
+        Raises:
+            ConfigError: the policy has diverged.
+        """
         steps = books.progress.steps
         left = self.config.total_steps - steps
-        self.model.learn(left, callback=Between(books), reset_num_timesteps=steps == 0)
+        try:
+            self.model.learn(left, callback=Between(books), reset_num_timesteps=steps == 0)
+        except ValueError as error:
+            if not str(error).startswith(OF_NO_NUMBERS):
+                raise
+            raise ConfigError(
+                "the policy has diverged, its actions are no longer numbers; lower "
+                f"{self.config.algorithm}.learning_rate.start"
+            ) from None
 
     def log_to(self, folder: Path) -> Callable[[str, float], object]:
         """Opens a TensorBoard log in a folder; returns a function that logs a name and a value."""

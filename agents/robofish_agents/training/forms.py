@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import gymnasium as gym
 import numpy as np
 
 from fish_env.reading import is_number, shown
@@ -42,6 +43,11 @@ def check_form(value: Any, like: Any, place: str) -> None:
         _check(type(value) is type(like), value, place)
     else:
         _check(_is_scalar(value, isinstance(like, int)), value, place)
+
+
+def observations_of(space: gym.Space[Any], count: int) -> np.ndarray:
+    """An array of the form of a number of observations (count, ...)."""
+    return np.zeros((count, *(space.shape or ())), space.dtype)
 
 
 def _is_alike(value: Any, like: np.ndarray) -> bool:

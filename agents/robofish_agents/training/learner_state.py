@@ -13,7 +13,7 @@ from stable_baselines3 import SAC
 from stable_baselines3.common.buffers import ReplayBuffer
 
 from fish_env.reading import is_number, shown
-from robofish_agents.training.forms import check_form
+from robofish_agents.training.forms import check_form, observations_of
 from robofish_agents.training.model import Model
 
 COUNTS = ("num_timesteps", "_n_updates", "_episode_num", "_current_progress_remaining")
@@ -54,11 +54,10 @@ def restore_learner(model: Model, state: Plain) -> None:
     model.policy.load_state_dict(weights_tensors(state["weights"]))
     for name, optimiser in _optimisers(model).items():
         restore_optimiser(optimiser, state["optimisers"][name])
+    _check_forms(model, state)
     entropy = _entropy(model)
-    check_form(state["entropy"], None if entropy is None else entropy.detach().numpy(), "entropy")
     if entropy is not None:
         entropy.data.copy_(torch.as_tensor(state["entropy"]))
-    _check_forms(model, state)
     for name in COUNTS:
         setattr(model, name, state["counts"][name])
     for name in LATEST:
@@ -72,15 +71,16 @@ def restore_learner(model: Model, state: Plain) -> None:
 
 
 def _check_forms(model: Model, state: Plain) -> None:
-    """Refuses counters, observations and episodes that this learner cannot have.
+    """Refuses a weight of entropy, counters, observations and episodes of another learner.
 
     Raises:
         ValueError: names what does not fit.
     """
+    entropy = _entropy(model)
+    check_form(state["entropy"], None if entropy is None else entropy.detach().numpy(), "entropy")
     check_form(state["counts"], {name: getattr(model, name) for name in COUNTS}, "counts")
     if any(value is not None for value in state["latest"].values()):
-        space = model.observation_space
-        seen = np.zeros((model.n_envs, *(space.shape or ())), space.dtype)
+        seen = observations_of(model.observation_space, model.n_envs)
         latest = (seen, np.zeros(model.n_envs, bool), seen)
         check_form(state["latest"], dict(zip(LATEST, latest, strict=True)), "latest")
     for name, like in zip(EPISODES, ({"r": 0.0, "l": 0, "t": 0.0}, 0.0), strict=True):

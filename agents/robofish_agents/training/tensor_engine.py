@@ -30,7 +30,7 @@ from robofish_agents.policies.files import ACTIONS, PolicyFile
 from robofish_agents.training.actor_critic import ActorCritic, Recipe, network_of
 from robofish_agents.training.books import Books
 from robofish_agents.training.config import TrainConfig
-from robofish_agents.training.forms import check_form
+from robofish_agents.training.forms import check_form, observations_of
 from robofish_agents.training.learner_state import (
     optimiser_state,
     random_state,
@@ -300,9 +300,11 @@ class TensorEngine:
         for (learner, optimiser), (weights, moments) in zip(self._pairs(), saved, strict=True):
             learner.load_state_dict(weights_tensors(weights))
             restore_optimiser(optimiser, moments)
-        known, space = self._known, self.stack.outside.observation_space
-        seen = np.zeros((self.stack.fish.num_envs, *(space.shape or ())), space.dtype)
-        check_form(state["latest"], None if state["latest"] is None else seen, "latest")
+        if state["latest"] is not None:
+            outside = self.stack.outside
+            seen = observations_of(outside.observation_space, outside.num_envs)
+            check_form(state["latest"], seen, "latest")
+        known = self._known
         check_form(state["known"], [known.mean, known.var, float(known.count)], "known")
         self._latest = state["latest"]
         known.mean, known.var, known.count = state["known"]

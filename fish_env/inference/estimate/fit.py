@@ -100,7 +100,7 @@ class Fit:
     def remaining_gradient(self) -> FloatArray:
         """Half the gradient (n,) of the objective that the steps left, beside active bounds.
 
-        Zero at the minimum; steps end before it, where what is left is small to the whole.
+        Zero at the minimum; steps end before it, where little more can be gained.
         """
         free, lin = Free(self.problem, self.effects, self.released), self.linearised
         pull = gradient(lin.slopes, lin.residuals, free.prior, free.pack(self.point))

@@ -121,7 +121,7 @@ soak: setup  ## 1e8 steps of the batch, then train, evaluate and diagnose for SO
 	$(BIN)/python -m scripts.reliability.soak --hours $(SOAK_HOURS)
 
 ray: $(VENV)/.with-ray  ## test campaigns and sweeps on a Ray cluster that loses a node, and training with RLlib
-	$(BIN)/python -m pytest tests/cluster/ray_*.py
+	$(BIN)/python -m scripts.reliability.cluster
 
 versions: $(VENV)/.with-reliability  ## run tests on the oldest and newest supported versions
 	$(BIN)/python -m scripts.reliability.versions

@@ -76,7 +76,7 @@ def test_an_error_is_one_line_and_is_not_tried_again(ray, tmp_path):
 
 def test_another_version_is_refused_by_name(ray, tmp_path, monkeypatch):
     monkeypatch.setattr("fish_env.cluster.tasks.VERSION", "0.0.1")
-    with pytest.raises(WrongVersion, match=r"machine that asks 0\.0\.1.*Install the same version"):
+    with pytest.raises(WrongVersion, match=r"the command 0\.0\.1.*Install the same version"):
         results(ray, works.square, tasks(tmp_path))
 
 

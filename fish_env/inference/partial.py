@@ -72,6 +72,7 @@ def confirmed(
         if smaller is None:
             return None
         accepted = smaller
+    judged = False
     while others := [name for name in accepted.causes if name not in measured]:
         found = implausible_estimates(accepted.fit)
         weakest = _blamed(others, found)
@@ -80,7 +81,9 @@ def confirmed(
             report(f"rejecting {name_of(weakest)}: its estimate is implausible ({words})")
             rejected = [weakest]
         else:
-            rejected = StandIns(accepted, threshold).replaced(others)
+            # A fit without the rejected ones explains less, and has no more to say on the others.
+            rejected = [] if judged else StandIns(accepted, threshold).replaced(others)
+            judged = True
             for name in rejected:
                 report(f"rejecting {name_of(name)}: generic forces explain as much")
         if not rejected:
@@ -180,9 +183,10 @@ class StandIns:
     def __init__(self, found: Explanation, threshold: float) -> None:
         self.fit, self.causes, self.threshold = found.fit, found.causes, threshold
         self.projector = Projector(self.fit)
+        self._lengths: dict[tuple[CauseId, ...], float] = {}
 
     def replaced(self, judged: Sequence[CauseId]) -> list[CauseId]:
-        """Causes that forces may stand in for: the weakest, then others without it.
+        """Causes that forces may stand in for: the weakest, then others beside it or such forces.
 
         Args:
             judged: causes in question.
@@ -196,31 +200,51 @@ class StandIns:
             found.append(weakest)
         return found
 
-    def log_p(self, without: Sequence[CauseId] = ()) -> dict[CauseId, float]:
+    def log_p(self, doubtful: Sequence[CauseId] = ()) -> dict[CauseId, float]:
         """Log p-value of what each cause explains that no sum of forces makes good.
 
-        A sum of more forces than the cause has parameters pays for each of them what a force has to
-        explain to be believed: of two descriptions that explain as much the shorter one counts.
-        Source: minimum description length (Rissanen, 1978), Automatica 14, 465.
+        A cause that forces may stand in for is known no better than these forces. So the best
+        description with another cause is compared with the best one without it, of those with all
+        doubtful causes, without the first of them, without the first two, and so on.
 
         Args:
-            without: causes that are out of the model before.
+            doubtful: causes that forces may stand in for, weakest first.
         """
-        before = self.removed(*without) if without else None
-        lost = before.loss if before else 0.0
-        beside, few = self._explained(before)
+        states = [tuple(doubtful[:count]) for count in range(len(doubtful) + 1)]
+        best = min(self._length(*state) for state in states)
         log_p = {}
         for name in self.causes:
-            if name in without:
+            if name in doubtful:
                 continue
             own = self._numbers(name)
-            removed = self.removed(*without, name)
-            instead, many = self._explained(removed)
-            longer = max(many - few - len(own), 0)
-            gap = removed.loss - lost + beside - instead - 2.0 * self.threshold * longer
+            gap = min(self._length(*state, name) for state in states) - best
             squared = max(gap, 0.0) / self.fit.inflation(own)
             log_p[name] = float(chi2_log_tail(squared, len(own)))
         return log_p
+
+    def _length(self, *without: CauseId) -> float:
+        """-2 log likelihood without causes, beside the best sum of forces, and what that costs.
+
+        Forces that outnumber the parameters of the causes pay for each what a force has to explain
+        to be believed: of two descriptions that explain as much the shorter one counts. Source:
+        minimum description length (Rissanen, 1978), Automatica 14, 465.
+
+        Args:
+            without: causes that are out of the model.
+        """
+        if without not in self._lengths:
+            removed = self.removed(*without) if without else None
+            explained, forces = self._explained(removed)
+            numbers = sum(len(self._numbers(name)) for name in without)
+            longer = max(forces - self._fewest - numbers, 0)
+            lost = removed.loss if removed else 0.0
+            self._lengths[without] = lost - explained - 2.0 * self.threshold * longer
+        return self._lengths[without]
+
+    @cached_property
+    def _fewest(self) -> int:
+        """How many forces are indicated beside all causes."""
+        return self._explained(None)[1]
 
     def _numbers(self, name: CauseId) -> list[int]:
         """Numbers, among all free parameters, of those that switch a cause on."""

@@ -136,6 +136,42 @@ def test_a_cause_is_judged_beside_what_was_rejected_before_it():
     assert after == pytest.approx(StandIns(alone, THRESHOLD).log_p(), rel=0.2)
 
 
+def both_fitted(seed, north, bias):
+    """A boat in a wind that nobody knows of, fitted with a current and a rudder askew."""
+    values = {NORTH: north, BIAS: bias}
+    boat = BoatProblem(sail(np.random.default_rng(seed), FITTED, values, foreign=wind))
+    return Explanation(("current", "rudder_bias"), fit(boat, ("current", "rudder_bias")))
+
+
+@pytest.mark.parametrize("seed", [4, 5, 8, 9])
+def test_a_cause_that_a_force_replaces_takes_no_other_with_it(seed):
+    """Without the rudder askew, whose place forces may take, forces hide the current too."""
+    found = confirmed(both_fitted(seed, 0.03, 0.05), THRESHOLD)
+    assert found is not None
+    assert found.causes == ("current",)
+
+
+@pytest.mark.parametrize("bias", [0.02, 0.05])
+@pytest.mark.parametrize("seed", [4, 5, 8, 9])
+def test_an_imitation_beside_a_cause_that_a_force_replaces_is_not_confirmed(seed, bias):
+    """What explains the wind as a current does is no current beside the rudder either."""
+    assert confirmed(both_fitted(seed, 0.0, bias), THRESHOLD) is None
+
+
+@pytest.mark.parametrize("seed", [4, 5, 8, 9])
+def test_beside_a_doubtful_cause_or_forces_the_better_description_counts(seed):
+    """As much is left of a cause as beside the doubtful one, or beside the forces, or between."""
+    both = both_fitted(seed, 0.03, 0.05)
+    forces = StandIns(both, THRESHOLD)
+    again = fit(
+        both.fit.problem, ("current",), noise=both.fit.noise, refit_noise=False, iterations=10
+    )
+    alone = StandIns(Explanation(("current",), again), THRESHOLD).log_p()["current"]
+    beside, either = (forces.log_p(doubtful)["current"] for doubtful in ((), ("rudder_bias",)))
+    assert min(beside, alone) <= either <= max(beside, alone)
+    assert either < alone / 1.5
+
+
 @pytest.mark.parametrize("seed", [4, 5, 6])
 def test_a_cause_that_improves_no_simulation_is_dropped(seed):
     """No rudder is askew: the current is all that simulations get better by."""

@@ -26,6 +26,7 @@ MOST_TABLE_BYTES = 100_000_000
 DEEPEST = 40
 """Levels of nesting; the deepest file of this package has six."""
 LONGEST_SHOWN = 60
+LONGEST_REASON = 120
 LARGEST = sys.float_info.max
 _PAGE = 65_536
 _NO_FILE = "is a pipe or a device, not a file"
@@ -87,6 +88,16 @@ def printable(text: str) -> str:
     return "".join(
         c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in line
     )
+
+
+def words_of(error: BaseException, most: int = LONGEST_REASON) -> str:
+    """Returns what an error of a library says, on one line that a message can hold.
+
+    Args:
+        error: The error.
+        most: Characters from which it is cut.
+    """
+    return short(printable(str(error)), most)
 
 
 def printable_lines(text: str) -> bool:
@@ -231,7 +242,7 @@ def parse_json(text: str) -> Any:
     try:
         return json.loads(text, object_pairs_hook=_without_repeats)
     except (ValueError, RecursionError) as error:
-        reason = short(printable(str(error)), 120)
+        reason = words_of(error)
         raise Unreadable(f"this is no JSON ({reason})", "correct it") from None
 
 

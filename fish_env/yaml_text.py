@@ -14,7 +14,15 @@ from yaml.reader import Reader
 from yaml.resolver import Resolver
 from yaml.scanner import Scanner
 
-from fish_env.reading import DEEPEST, Unreadable, printable, read_text, short
+from fish_env.reading import (
+    DEEPEST,
+    LONGEST_REASON,
+    Unreadable,
+    printable,
+    read_text,
+    short,
+    words_of,
+)
 
 MOST_VALUES = 60_000
 """Values in a file, those behind an alias counted as often as they stand in it."""
@@ -156,10 +164,10 @@ def parse_yaml(text: str, loader: type[Loader] = Loader) -> Any:
         line = f"line {mark.line + 1}: " if mark is not None else ""
         problem = printable(error.problem or error.context or "wrong")
         raise Unreadable(
-            f"not valid YAML, {line}{short(problem, 120)}", "correct that line"
+            f"not valid YAML, {line}{short(problem, LONGEST_REASON)}", "correct that line"
         ) from None
     except (yaml.YAMLError, RecursionError, *_BAD_VALUE) as error:
-        reason = short(printable(str(error)), 120)
+        reason = words_of(error)
         raise Unreadable(f"not valid YAML ({reason})", "correct it") from None
 
 

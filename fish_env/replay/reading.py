@@ -24,10 +24,10 @@ from fish_env.reading import (
     MOST_TABLE_BYTES,
     Unreadable,
     located,
-    printable,
     read_bytes,
     read_standard_input,
     short,
+    words_of,
 )
 from fish_env.replay.motion import Motion, Role, motion_from_channels, motion_from_run
 from fish_env.trajectory import POSE_COLUMNS
@@ -111,7 +111,7 @@ def _standard_table() -> pd.DataFrame:
     except Unreadable as error:
         raise DatasetError(f"standard input {error}") from None
     except (ValueError, OverflowError, RecursionError) as error:
-        reason = short(printable(str(error)), 120)
+        reason = words_of(error)
         raise DatasetError(f"standard input: no CSV table ({reason}); check it") from None
 
 
@@ -129,7 +129,7 @@ def _read_table(file: Path) -> pd.DataFrame:
     except Unreadable as error:
         raise DatasetError(f"{file}: {error}") from None
     except (ValueError, OSError, OverflowError, RecursionError) as error:
-        reason = short(printable(str(error)), 120)
+        reason = words_of(error)
         raise DatasetError(f"{file}: cannot be read as a table ({reason}); check it") from None
     raise DatasetError(f"{file}: a replay reads .csv and .parquet files, not '{file.suffix}'")
 

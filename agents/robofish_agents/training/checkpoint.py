@@ -15,7 +15,7 @@ from typing import Any
 
 from fish_env.archives import UNREADABLE
 from fish_env.errors import ConfigError
-from fish_env.reading import is_number, printable, short, shown
+from fish_env.reading import is_number, shown, words_of
 from fish_env.version import WRITER
 from robofish_agents.training.config import DEFAULT_ENGINE, TrainConfig
 from robofish_agents.training.plain import read_plain, write_plain
@@ -100,7 +100,7 @@ def load_checkpoint(
         restore(tree["learner"])
         progress = _progress(tree["progress"], config)
     except (*UNREADABLE, TypeError, AttributeError, IndexError) as error:
-        why = short(printable(str(error)), LONGEST_REASON)
+        why = words_of(error, LONGEST_REASON)
         reason = _earlier(path) or f"not a readable checkpoint ({why})"
         raise ConfigError(
             f"{path}: {reason}; move it away to start again, or train into another folder"

@@ -7,7 +7,7 @@ sum explains the data as well. All sums are formed in the linear model of one fi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -72,27 +72,45 @@ def confirmed(
         if smaller is None:
             return None
         accepted = smaller
-    judged = False
-    while others := [name for name in accepted.causes if name not in measured]:
-        found = implausible_estimates(accepted.fit)
-        weakest = _blamed(others, found)
-        if weakest is not None:
-            words = "; ".join(one.words for one in found)
-            report(f"rejecting {name_of(weakest)}: its estimate is implausible ({words})")
-            rejected = [weakest]
-        else:
-            # A fit without the rejected ones explains less, and has no more to say on the others.
-            rejected = [] if judged else StandIns(accepted, threshold).replaced(others)
-            judged = True
-            for name in rejected:
-                report(f"rejecting {name_of(name)}: generic forces explain as much")
-        if not rejected:
-            return accepted
-        smaller = without_in_step(accepted, rejected)
+    plausible = _plausible(accepted, measured, report)
+    others = [name for name in plausible.causes if name not in measured] if plausible else []
+    if plausible is None or not others:
+        return plausible
+    replaced = StandIns(plausible, threshold).replaced(others)
+    for name in replaced:
+        report(f"rejecting {name_of(name)}: generic forces explain as much")
+    if not replaced:
+        return plausible
+    # A fit without these explains less: it says only whether estimates are plausible.
+    smaller = without_in_step(plausible, replaced)
+    return _plausible(smaller, measured, report) if smaller else None
+
+
+def _plausible(
+    found: Explanation, measured: Collection[CauseId], report: Report
+) -> Explanation | None:
+    """The explanation without causes whose estimates are implausible, one fit after another.
+
+    Args:
+        found: causes with their fit.
+        measured: causes that stay whatever their estimates.
+        report: told what is dropped and why.
+
+    Returns:
+        None where no cause is left, or a simulation without one diverges.
+    """
+    while others := [name for name in found.causes if name not in measured]:
+        odd = implausible_estimates(found.fit)
+        blamed = _blamed(others, odd)
+        if blamed is None:
+            return found
+        words = "; ".join(one.words for one in odd)
+        report(f"rejecting {name_of(blamed)}: its estimate is implausible ({words})")
+        smaller = without_in_step(found, (blamed,))
         if smaller is None:
             return None
-        accepted = smaller
-    return accepted if accepted.causes else None
+        found = smaller
+    return found if found.causes else None
 
 
 def _dependent(found: Explanation) -> frozenset[CauseId]:

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import argparse
 from collections import Counter, defaultdict
+from collections.abc import Iterable, Mapping
 from importlib import metadata
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 from scripts.bench.harness import machine, versions
+from scripts.junit import outcomes
 from scripts.results import RESULTS, write_dated
 
 LIBRARIES = (
@@ -22,18 +23,17 @@ LIBRARIES = (
 )  # fmt: skip
 
 
-def outcomes(file: Path) -> tuple[dict[str, dict[str, int]], float]:
+def counted(tests: Iterable[Mapping[str, Any]]) -> tuple[dict[str, dict[str, int]], float]:
     """How many tests of each file passed, failed or were skipped, and the seconds of all.
 
     Args:
-        file: report of pytest in JUnit's format.
+        tests: see :func:`scripts.junit.outcomes`.
     """
     counts: defaultdict[str, Counter[str]] = defaultdict(Counter)
-    root, seconds = ElementTree.parse(file).getroot(), 0.0
-    for case in root.iter("testcase"):
-        found = {child.tag for child in case} & {"failure", "error", "skipped"}
-        counts[case.get("classname", "?").rpartition(".")[2]][min(found, default="passed")] += 1
-        seconds += float(case.get("time", 0.0))
+    seconds = 0.0
+    for test in tests:
+        counts[test["test"].partition("::")[0]][test["outcome"]] += 1
+        seconds += test["seconds"]
     return {name: dict(counter) for name, counter in sorted(counts.items())}, round(seconds, 1)
 
 
@@ -42,7 +42,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("file", type=Path, help="report of pytest in JUnit's format")
     told = parser.parse_args()
-    tests, seconds = outcomes(told.file)
+    tests, seconds = counted(outcomes(told.file))
     content: dict[str, Any] = {
         "tests": tests, "seconds": seconds, "versions": versions(LIBRARIES), "machine": machine(),
         "package": metadata.version("robotic-fish"),

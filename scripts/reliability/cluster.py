@@ -6,30 +6,17 @@
 from __future__ import annotations
 
 import argparse
-import importlib.metadata
-import platform
 import subprocess
 import sys
 import tempfile
-import xml.etree.ElementTree as xml
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
+from scripts.bench.harness import machine, versions
+from scripts.junit import outcomes
 from scripts.results import RESULTS, ROOT, write_dated
 
 PACKAGES = ("ray", "torch", "gymnasium", "numpy")
-
-
-def outcomes(report: Path) -> list[dict[str, Any]]:
-    """Name, outcome and duration of each test in a JUnit report that pytest wrote."""
-    found = []
-    for case in xml.parse(report).iter("testcase"):
-        bad = [part.tag for part in case if part.tag in ("failure", "error", "skipped")]
-        name = f"{case.attrib['classname'].rpartition('.')[2]}::{case.attrib['name']}"
-        seconds = round(float(case.attrib["time"]), 2)
-        found.append({"test": name, "outcome": (bad or ["passed"])[0], "seconds": seconds})
-    return found
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -44,8 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if not report.exists():
             sys.exit(status)
         found = outcomes(report)
-    versions = {name: importlib.metadata.version(name) for name in PACKAGES}
-    content = {"versions": {"python": platform.python_version()} | versions, "tests": found}
+    content = {"versions": versions(PACKAGES), "machine": machine(), "tests": found}
     file = write_dated(options.out, "cluster", content)
     print(f"written: {file.name}")
     sys.exit(status)

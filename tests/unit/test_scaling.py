@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import pytest
 
-from scripts.reliability.cluster import outcomes
 from scripts.reliability.scaling import Costs, simulate
 
 FREE = Costs(10.0, 0.0, 0.0, 0.0, 0, 0, 0.0)
@@ -34,16 +33,3 @@ def test_many_cores_wait_for_the_one_process():
 def test_bytes_take_the_time_of_the_network():
     costs = replace(FREE, task_bytes=10**6, result_bytes=10**6, bytes_per_s=2e7)
     assert simulate(costs, 1000, 10_000).wall_s == pytest.approx(1000.0, rel=0.02)
-
-
-def test_the_outcome_of_every_cluster_test_is_kept(tmp_path):
-    report = tmp_path / "report.xml"
-    report.write_text(
-        '<testsuites><testsuite><testcase classname="tests.cluster.ray_tasks" name="runs" '
-        'time="1.234"/><testcase classname="tests.cluster.ray_tasks" name="fails" time="0.5">'
-        '<failure message="wrong"/></testcase></testsuite></testsuites>'
-    )
-    assert outcomes(report) == [
-        {"test": "ray_tasks::runs", "outcome": "passed", "seconds": 1.23},
-        {"test": "ray_tasks::fails", "outcome": "failure", "seconds": 0.5},
-    ]

@@ -172,9 +172,12 @@ class SeriesProblem(Stepped):
 
     def default_noise(self) -> NoiseModel:
         """Sensor noise from differences of the data, and a disturbance of a few millinewton."""
+        return self.differing_noise() if self.drive.uneven else small_disturbance(self.sensor_sd)
+
+    def differing_noise(self) -> NoiseModel:
+        """The noise model to begin from where each run has a drive, and errors, of its own."""
         noise = small_disturbance(self.sensor_sd)
-        uneven = replace(noise, phase_sd=UNEVEN_PHASE_SD, spread=USUAL)
-        return uneven if self.drive.uneven else noise
+        return replace(noise, phase_sd=UNEVEN_PHASE_SD, spread=USUAL)
 
     def fitted_noise(
         self,

@@ -10,16 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
 from fish_env.inference.adequacy import disturbance_at_limit, implausible_estimates
 from fish_env.inference.effort import Effort
 from fish_env.inference.estimate.again import to_search
-from fish_env.inference.estimate.fit import Fit, fit
+from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.settle import usual_runs
-from fish_env.inference.explanation import Explanation, fitted_again, reached
+from fish_env.inference.explanation import Explanation, fitted_again, on_few_runs
 from fish_env.inference.hypotheses import EffectName
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause
@@ -68,9 +67,7 @@ def measured(nothing: Explanation, report: Report) -> Explanation | None:
     begin = [Point(z, values) for z in baselines(own)]
     # The runs' own numbers have gone far to make up for what was measured.
     fresh = usual_runs(to_search(own.problem), begin[0], noise)
-    few = fresh.subset(POLICY.few_runs)
-    tried = [reached(partial(fit, few, effects, point, noise, rounds=1)) for point in begin]
-    best = min((f for f in tried if f), key=lambda f: f.objective, default=None)
+    best = on_few_runs(fresh, effects, begin, noise)
     whole = fitted_again(fresh, best, best.noise) if best else None
     if whole is None:
         return None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any, TypeVar
@@ -19,7 +19,7 @@ from fish_env.inference.estimate.information import information, prior_precision
 from fish_env.inference.hypotheses import CauseId, EffectName, EffectParameterId
 from fish_env.inference.in_place import begun_without
 from fish_env.inference.policy import POLICY
-from fish_env.inference.problem import Problem
+from fish_env.inference.problem import Point, Problem
 
 T = TypeVar("T")
 LEAST_PRECISION = 1e-12
@@ -217,3 +217,12 @@ def in_steps_of(problem: Problem, current: Explanation) -> Explanation:
 def fitted_again(problem: Problem, at: CoarseFit | Fit, noise: Any, rounds: int = 2) -> Fit | None:
     """As :func:`taken_on`; None where the simulation diverges."""
     return reached(partial(taken_on, problem, at, noise, rounds))
+
+
+def on_few_runs(
+    problem: Problem, effects: Sequence[EffectName], begin: Sequence[Point], noise: Any
+) -> Fit | None:
+    """The best fit to a few of the runs from some points; None where each diverges."""
+    few = problem.subset(POLICY.few_runs)
+    tried = [reached(partial(fit, few, effects, point, noise, rounds=1)) for point in begin]
+    return min((f for f in tried if f), key=lambda f: f.objective, default=None)

@@ -18,6 +18,7 @@ from fish_env.inference.adequacy import (
     disturbance_at_limit,
     implausible_estimates,
 )
+from fish_env.inference.afresh import searched_afresh
 from fish_env.inference.attribution import Attribution, attribute, extended
 from fish_env.inference.budget import Budget, error_budget
 from fish_env.inference.effort import FULL, Effort
@@ -111,6 +112,8 @@ def investigate(
     """
     problem = baseline.problem
     attribution = attribute(baseline, causes, rng, effort, report)
+    if effort.retries and disturbance_at_limit(attribution.accepted.fit):
+        attribution = searched_afresh(attribution, causes, rng, report)
     shown = attribution.preconditions
     report("testing the residual")
     left = adequacy(attribution.accepted.fit, rng)

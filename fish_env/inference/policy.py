@@ -57,6 +57,8 @@ class DecisionPolicy(Numbers):
         most_leads: best of these effects and the first pick that are fitted with all other picks.
         trial_steps: steps of a trial of an effect that a disturbance at its limit hides.
         most_close_trials: largest number of effects from trials that are fitted to all runs.
+        most_beside_nominal: causes added to a nominal vehicle before a search from it is given up.
+        halving: one of so many settings that were tried on one run is tried on more.
         swap_steps: steps of a fit with another lag, from one with the lag in whose place it is.
         rate_steps: most steps of a fit with another clock or beat, or none, in the place of one.
         least_independent_share: share of a signal that those picked before it must leave.
@@ -161,6 +163,8 @@ class DecisionPolicy(Numbers):
     most_leads: int = number(2, 1, 40, EFFORT)
     trial_steps: int = number(4, 1, 40, f"a lag that is right is found in three; {EFFORT}")
     most_close_trials: int = number(2, 1, 20, EFFORT)
+    most_beside_nominal: int = number(3, 0, 20, EFFORT)
+    halving: int = number(8, 1, 1000, EFFORT)
     swap_steps: int = number(4, 1, 40, EFFORT)
     rate_steps: int = number(10, 1, 40, f"a fit without a wrong rate settles in nine; {EFFORT}")
     least_independent_share: float = number(0.05, 0.0, 0.5, BY_HAND)

@@ -352,6 +352,10 @@ class Problem(Protocol):
         """
         return None
 
+    def differing_noise(self) -> Any:
+        """Noise model to begin from where each run may differ from the others by what is usual."""
+        return self.default_noise()
+
     def follows_drive(self, noise: Any) -> bool:
         """Whether a noise model follows a drive that is out of step."""
         return False

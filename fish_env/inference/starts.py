@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -79,13 +79,25 @@ def probed(
     cause, effect = signal.cause, problem.known[signal.cause.effect]
     shaped = len(effect.switching) < len(effect.parameters)
     alternatives = (cause.probes[signal.probe],) if shaped and not every else cause.probes
-    every_one = [p for probes in alternatives for p in probes]
-    settings = [p for i, p in enumerate(every_one) if p not in every_one[:i]]
-    opposite = [o for o in (mirrored(effect, p) for p in settings) if o not in settings]
-    settings += [o for o in opposite if any(o[p.name] != p.neutral for p in effect.switching)]
+    settings = on_both_sides(effect, (p for probes in alternatives for p in probes))
     begin = [effect_values(problem, cause.effect, p) for p in settings]
     measured = of_effects(problem.drive.in_step, {cause.effect})
     return [{**begin[0], **measured}, *begin] if measured else begin
+
+
+def on_both_sides(effect: Effect, probes: Iterable[Probe]) -> list[Probe]:
+    """Different settings of an effect, then those on the other side of neutral.
+
+    Args:
+        effect: the effect.
+        probes: some of its settings, perhaps repeated.
+    """
+    settings: list[Probe] = []
+    for probe in probes:
+        if probe not in settings:
+            settings.append(probe)
+    opposite = [o for o in (mirrored(effect, p) for p in settings) if o not in settings]
+    return settings + [o for o in opposite if any(o[p.name] != p.neutral for p in effect.switching)]
 
 
 def combined(

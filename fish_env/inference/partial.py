@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fish_env.arrays import FloatArray, IntArray
+from fish_env.arrays import BoolArray, FloatArray, IntArray
 from fish_env.inference.adequacy import (
     Implausible,
     contradicts_priors,
@@ -333,26 +333,45 @@ class StandIns:
     def _explained(self, removed: Removed | None) -> tuple[float, int]:
         """What the best sum of forces explains, in -2 log likelihood, and how many there are.
 
-        They are picked one after another.
+        They are picked one after another, behind each that may come first. The sum that gives the
+        shortest description is the best.
         """
-        pool, count = self._pool, 0
-        if not pool:
+        if not self._pool:
             return 0.0, 0
-        info, score = self._system(pool, removed)
+        info, score = self._system(self._pool, removed)
+        inflation = np.array([s.variance_inflation for s in self._pool])
+        passing = np.flatnonzero(self._passes(score**2 / np.diag(info) / inflation))
+        sums = [self._summed(info, score, inflation, int(first)) for first in passing]
+        return max(sums, key=lambda one: one[0] + 2.0 * self.threshold * one[1], default=(0.0, 0))
+
+    def _summed(
+        self, info: FloatArray, score: FloatArray, inflation: FloatArray, first: int
+    ) -> tuple[float, int]:
+        """The sum of forces that begins with one of them, as :meth:`_explained` returns it.
+
+        Args:
+            info: (N, N) information about all forces.
+            score: (N,) of them.
+            inflation: (N,) of their variances.
+            first: number of the force that comes first.
+        """
         whole, explained = np.diag(info).copy(), 0.0
-        inflation = np.array([s.variance_inflation for s in pool])
-        for _ in range(POLICY.most_forces):
+        for count in range(POLICY.most_forces):
             left = np.diag(info)
             gains = np.where(
                 left > POLICY.least_independent_share * whole,
                 score**2 / np.maximum(left, 1e-300),
                 0.0,
             )
-            best = int(np.argmax(gains / inflation))
-            if chi2_log_tail(float(gains[best] / inflation[best]), 1) >= self.threshold:
-                break
-            explained, count = explained + float(gains[best]), count + 1
+            best = int(np.argmax(gains / inflation)) if count else first
+            if not self._passes(gains[best] / inflation[best]):
+                return explained, count
+            explained += float(gains[best])
             along = info[best] / info[best, best]
             score = score - along * score[best]
             info = info - np.outer(info[best], along)
-        return explained, count
+        return explained, POLICY.most_forces
+
+    def _passes(self, squared: FloatArray) -> BoolArray:
+        """Whether forces with these statistics are believed."""
+        return np.asarray(chi2_log_tail(squared, 1) < self.threshold)

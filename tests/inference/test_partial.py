@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from fish_env.inference.adequacy import contradicts_priors
+from fish_env.inference.effects import DeclaredEffect, EffectParameter
 from fish_env.inference.estimate.fit import fit
 from fish_env.inference.explanation import Explanation
+from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.partial import (
     StandIns,
     confirmed,
@@ -22,6 +24,7 @@ from fish_env.inference.simulated import sustained
 from fish_env.inference.vehicle import Coefficients, Drive
 from tests.inference.boat import sail
 from tests.inference.boat_problem import BoatProblem
+from tests.inference.stated import Stated
 from tests.inference.test_boat import BIAS, EAST, FITTED, NORTH, problems, wind
 
 THRESHOLD = -10.0
@@ -122,6 +125,59 @@ def test_a_coefficient_removed_with_an_effect_gets_its_prior_back(reverse):
     lost = step @ hessian @ step + 2.0 * z * step[0] + z**2
     np.testing.assert_allclose(removed.shift, step[removed.own], rtol=1e-6)
     assert removed.loss == pytest.approx(lost, rel=1e-6)
+
+
+class Forced(Stated):
+    """A problem whose generic forces act along given directions (forces, samples of all runs)."""
+
+    forces: np.ndarray
+
+    def generic_terms(self, fit):
+        return Along(self.forces)
+
+
+class Along:
+    """Forces along directions."""
+
+    def __init__(self, directions):
+        self.directions = directions
+        self.columns = np.arange(len(directions))
+
+    def words(self, column):
+        return f"direction {column}", "along"
+
+    def swings(self, column):
+        return False
+
+    def unit(self, column):
+        return 1.0
+
+    def changes(self, columns):
+        return self.directions[columns].T
+
+
+def test_the_most_indicated_force_need_not_come_first():
+    """One is nearly what a cause does, two others are together; behind the one it takes three."""
+    rng = np.random.default_rng(8)
+    shape = (3, 40)
+    a, b, *others = np.linalg.qr(rng.standard_normal((120, 5)))[0].T
+    one, other = (
+        EffectParameter(name, "-", 0.0, plausible=(-1.0, 1.0)) for name in ("one", "other")
+    )
+    noise = rng.standard_normal(shape)
+    at = [EffectParameterId("wide", name) for name in ("one", "other")]
+
+    def residuals(z, effects):
+        left = (0.5 - effects[at[0]]) * a + (0.5 - effects[at[1]]) * b
+        return noise + 60.0 * left.reshape(shape)
+
+    stated = Forced(residuals, (DeclaredEffect("wide", (one, other)),))
+    stated.forces = np.array([a + b, a, b]) + [[0.6], [0.05], [0.05]] * np.array(others)
+    point = Point(stated.start.z, dict.fromkeys(at, 0.4))
+    found = Explanation(("wide",), fit(stated, ("wide",), point))
+    assert StandIns(found, THRESHOLD).replaced(found.causes) == ["wide"]
+    stated.forces = stated.forces[:2]
+    assert StandIns(found, THRESHOLD).replaced(found.causes) == []
 
 
 def test_a_cause_is_judged_beside_what_was_rejected_before_it():

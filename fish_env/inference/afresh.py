@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -71,7 +72,9 @@ def beside_nominal(problem: Problem, causes: Sequence[Cause], report: Report) ->
         causes: causes to consider.
         report: told what is being done.
     """
-    nominal = Nominal(to_search(problem), problem.drive.in_step)
+    own = to_search(problem)
+    noise = own.differing_noise()
+    nominal = Nominal(usual_runs(own, own.start, noise), noise, problem.drive.in_step)
     for _ in range(POLICY.most_beside_nominal):
         report(f"trying each cause beside {listed(nominal.effects) or 'the nominal model'}")
         more = nominal.with_likeliest(causes)
@@ -90,11 +93,13 @@ class Nominal:
     """Runs of a vehicle with nominal coefficients, and effects of some size.
 
     Attributes:
-        problem: the runs.
+        problem: the runs, with no number of their own.
+        noise: noise model to begin from.
         values: parameters of the effects.
     """
 
     problem: Problem
+    noise: Any
     values: Values
 
     @property
@@ -123,12 +128,10 @@ class Nominal:
     def fitted(self) -> Explanation | None:
         """The fit with all effects; None where its disturbance is at its limit."""
         begin = Point(self.problem.start.z, self.values)
-        noise = self.problem.differing_noise()
-        fresh = usual_runs(self.problem, begin, noise)
-        few = on_few_runs(fresh, self.effects, [begin], noise)
+        few = on_few_runs(self.problem, self.effects, [begin], self.noise)
         if few is None or disturbance_at_limit(few):
             return None
-        whole = fitted_again(fresh, few, few.noise)
+        whole = fitted_again(self.problem, few, few.noise)
         if whole is None or disturbance_at_limit(whole):
             return None
         return Explanation(self.effects, whole)
@@ -149,6 +152,5 @@ class Nominal:
 
     def _objective(self, runs: Problem, values: Values) -> float:
         """-2 log likelihood of some runs, each evaluated anew."""
-        begin, noise = Point(runs.start.z, values), runs.differing_noise()
         effects = tuple(dict.fromkeys(id.effect for id in values))
-        return objective_at(usual_runs(runs, begin, noise), effects, begin, noise)
+        return objective_at(runs, effects, Point(runs.start.z, values), self.noise)

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from math import ceil
 from typing import Any
 
 import numpy as np
@@ -115,15 +116,15 @@ class Nominal:
         Source: successive halving (Jamieson and Talwalkar, 2016, "Non-stochastic best arm
         identification and hyperparameter optimization", AISTATS).
         """
-        settings: list[Values] = [{**self.values, **more} for more in self._further(causes)]
-        for count in (1, POLICY.few_runs):
-            runs = self.problem.subset(count)
-            tried = self._ranked(runs, settings)
-            settings = [own for _, own in tried[: -(-len(tried) // POLICY.halving)]]
-        without = self._objective(runs, self.values)
-        if not tried or tried[0][0] > without - POLICY.evidence_doubt:
+        one, few = self.problem.subset(1), self.problem.subset(POLICY.few_runs)
+        further: list[Values] = [{**self.values, **more} for more in self._further(causes)]
+        tried = self._ranked(one, further)
+        likely = [values for _, values in tried[: ceil(len(tried) / POLICY.halving)]]
+        best = next(iter(self._ranked(few, likely)), None)
+        without = self._objective(few, self.values)
+        if best is None or best[0] > without - POLICY.evidence_doubt:
             return None
-        return replace(self, values=settings[0])
+        return replace(self, values=best[1])
 
     def fitted(self) -> Explanation | None:
         """The fit with all effects; None where its disturbance is at its limit."""

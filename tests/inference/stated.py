@@ -145,6 +145,25 @@ class Stated(Problem):
         return np.full_like(rows, np.nan) if self.diverging(effects, noise) else rows
 
 
+class Directions:
+    """Generic forces, each along its direction in the residuals (forces, D)."""
+
+    def __init__(self, along: FloatArray) -> None:
+        self.along, self.columns = along, np.arange(len(along))
+
+    def words(self, column: int) -> tuple[str, str]:
+        return f"direction {column}", "along"
+
+    def swings(self, column: int) -> bool:
+        return False
+
+    def unit(self, column: int) -> float:
+        return 1.0
+
+    def changes(self, columns: IntArray) -> FloatArray:
+        return self.along[columns].T
+
+
 class Numbered(Stated):
     """A stated problem whose runs have numbers of their own, ``own`` (runs, K), from zero on.
 

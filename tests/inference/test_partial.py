@@ -24,7 +24,7 @@ from fish_env.inference.simulated import sustained
 from fish_env.inference.vehicle import Coefficients, Drive
 from tests.inference.boat import sail
 from tests.inference.boat_problem import BoatProblem
-from tests.inference.stated import Stated
+from tests.inference.stated import Directions, Stated
 from tests.inference.test_boat import BIAS, EAST, FITTED, NORTH, problems, wind
 
 THRESHOLD = -10.0
@@ -133,27 +133,7 @@ class Forced(Stated):
     forces: np.ndarray
 
     def generic_terms(self, fit):
-        return Along(self.forces)
-
-
-class Along:
-    """Forces along directions."""
-
-    def __init__(self, directions):
-        self.directions = directions
-        self.columns = np.arange(len(directions))
-
-    def words(self, column):
-        return f"direction {column}", "along"
-
-    def swings(self, column):
-        return False
-
-    def unit(self, column):
-        return 1.0
-
-    def changes(self, columns):
-        return self.directions[columns].T
+        return Directions(self.forces)
 
 
 def test_the_most_indicated_force_need_not_come_first():

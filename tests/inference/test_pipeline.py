@@ -12,7 +12,7 @@ from fish_env.inference.explanation import Explanation
 from fish_env.inference.pipeline import cross_validated, with_slow_causes, with_weaker_causes
 from fish_env.inference.probes import causes_of
 from fish_env.inference.screening import Screen
-from tests.inference.stated import Evaluated, Stated, White, apart, effect
+from tests.inference.stated import Directions, Evaluated, Stated, White, apart, effect
 
 SHOWN = Screen((), -11.0, 0.05)
 LEFT = Adequacy(False, -11.0, (Misfit("u", "heave", -12.0, 0.01),))
@@ -20,31 +20,11 @@ NAMES = ("wave", *(f"effect {i}" for i in range(60)))
 UNKNOWN = "unknown"
 
 
-class Pushes:
-    """A force on each sample, in all runs alike."""
-
-    def __init__(self, problem):
-        self.problem = problem
-        self.columns = np.arange(problem.samples)
-
-    def words(self, column):
-        return f"sample {column}", "heave"
-
-    def swings(self, column):
-        return False
-
-    def unit(self, column):
-        return 1.0
-
-    def changes(self, columns):
-        return np.tile(np.eye(self.problem.samples)[:, columns], (self.problem.run_count, 1))
-
-
 class Pushed(Stated):
-    """A problem with generic forces."""
+    """A problem with a generic force on each sample, in all runs alike."""
 
     def generic_terms(self, fit):
-        return Pushes(self)
+        return Directions(np.tile(np.eye(self.samples), (1, self.run_count)))
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,7 @@ from fish_env.inference.hypotheses import CauseId, EffectName, EffectParameterId
 from fish_env.inference.in_place import begun_without
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
+from fish_env.inference.small_errors import SmallErrors
 
 T = TypeVar("T")
 LEAST_PRECISION = 1e-12
@@ -117,6 +118,11 @@ class Explanation:
         lifted = [own.problem.baseline.ids.index(one) for one in own.released]
         penalty = known[lifted] @ own.point.z[lifted] ** 2
         return float(own.objective + penalty + self._narrowed(np.arange(len(known))))
+
+    @cached_property
+    def small_errors(self) -> SmallErrors:
+        """All other effects, acting a little."""
+        return SmallErrors.of(self.fit)
 
     def narrowed_by(self, dropped: Collection[CauseId]) -> float:
         """What the score would lose without some causes, were estimates and misfit the same.

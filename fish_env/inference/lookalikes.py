@@ -11,24 +11,22 @@ apart no better than by what they make up for, each is an alternative.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from functools import partial
 
 import numpy as np
 
+from fish_env.inference.contenders import Swap, asked, fitted_without
 from fish_env.inference.elimination import surely_acts
 from fish_env.inference.estimate.again import finished
-from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter, where_ended
+from fish_env.inference.estimate.coarse_fit import CoarseFit, CoarseFitter
 from fish_env.inference.estimate.fit import Fit
-from fish_env.inference.explanation import Explanation, reached, swap_between
+from fish_env.inference.explanation import Explanation, swap_between
 from fish_env.inference.hypotheses import (
     CauseId,
     EffectName,
-    listed,
     name_of,
     of_effects,
 )
 from fish_env.inference.in_place import (
-    in_step,
     moved_to_runs,
     replaced,
     surprising_runs,
@@ -39,15 +37,18 @@ from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
 from fish_env.inference.progress import Report
 from fish_env.inference.projection import Signal
-from fish_env.inference.rivals import alike, as_likely, rivals_of
+from fish_env.inference.rivals import (
+    alike,
+    as_likely,
+    as_likely_among_small_errors,
+    rivals_of,
+)
 from fish_env.inference.screening import Screen
 from fish_env.inference.search import at_noise
 from fish_env.inference.substitution import swapped, what_may_lack
 
 Pair = tuple[EffectName, EffectName]
 """A cause, and what looks like it."""
-Swap = tuple[CauseId, EffectName, CoarseFit]
-"""A cause, what looks like it, and where a fit with that in its place begins, or has led."""
 
 
 def late(current: Explanation) -> list[Pair]:
@@ -110,7 +111,7 @@ def asked_of_lags(
     else:
         swaps = _within_reach(current.fit, pairs, POLICY.coarse_fit_leeway)
     leeway = POLICY.coarse_fit_leeway
-    best, rivals = _asked(runs, current, swaps, POLICY.swap_steps, leeway, report)
+    best, rivals = asked(runs, current, swaps, POLICY.swap_steps, leeway, report)
     if best is not current:
         best = Explanation(best.causes, finished(best.fit))
     return best, rivals
@@ -129,7 +130,7 @@ def asked_of_rates(
         current = _on_equal_terms(current)
     leeway = POLICY.evidence_doubt + POLICY.linear_doubt
     swaps = _swaps(current.fit, pairs)
-    return _asked(current.fit.problem, current, swaps, POLICY.rate_steps, leeway, report)
+    return asked(current.fit.problem, current, swaps, POLICY.rate_steps, leeway, report)
 
 
 def rates_asked_again(
@@ -166,7 +167,7 @@ def _without_what_runs_explain(current: Explanation, report: Report) -> Explanat
         report(f"fitting without {name_of(cause)}")
         enough = own.objective + POLICY.evidence_doubt + current.narrowed_by((cause,))
         begin = without_causes(own, (cause,))
-        fitted = _fitted(own.problem, own, cause, begin, POLICY.rate_steps, enough)
+        fitted = fitted_without(own.problem, own, cause, begin, POLICY.rate_steps, enough)
         if fitted is None or surprising_runs(fitted, cause):
             continue
         without = Explanation(tuple(c for c in current.causes if c != cause), fitted)
@@ -198,7 +199,7 @@ def _put_back(before: Explanation, cause: CauseId, fitted: Fit) -> Explanation |
     own = before.fit
     values = {**fitted.point.effects, **of_effects(own.point.effects, {str(cause)})}
     begin = CoarseFit(own.effects, own.released, Point(fitted.point.z, values), np.inf)
-    again = _fitted(own.problem, fitted, cause, begin, POLICY.rate_steps, fitted.objective)
+    again = fitted_without(own.problem, fitted, cause, begin, POLICY.rate_steps, fitted.objective)
     return None if again is None else Explanation(before.causes, again)
 
 
@@ -209,7 +210,7 @@ def _swaps(own: Fit, pairs: Sequence[tuple[CauseId, Signal]]) -> list[Swap]:
         own: fit with the causes.
         pairs: causes, each with the signal of what looks like it.
     """
-    return [(c, signal.cause.effect, with_lookalike(own, c, signal)) for c, signal in pairs]
+    return [Swap(c, signal.cause.effect, with_lookalike(own, c, signal)) for c, signal in pairs]
 
 
 def _within_reach(
@@ -233,84 +234,8 @@ def _within_reach(
         enough = fitter.base + lack[cause]
         coarse = swapped(fitter, own, cause, signal, enough)
         if coarse is not None and coarse.objective < enough:
-            found.append((cause, signal.cause.effect, coarse))
+            found.append(Swap(cause, signal.cause.effect, coarse))
     return found
-
-
-def _asked(
-    runs: Problem,
-    current: Explanation,
-    swaps: Sequence[Swap],
-    steps: int,
-    leeway: float,
-    report: Report,
-) -> tuple[Explanation, tuple[Explanation, ...]]:
-    """The best of an explanation and those with look-alikes in it, and those as good.
-
-    Args:
-        runs: those of the explanation, in the steps to compare in.
-        current: causes with their fit; where it was made in other steps it does not compete.
-        swaps: causes, each with what looks like it and where a fit with that begins.
-        steps: most Gauss-Newton steps of each fit.
-        leeway: by how much the objective of a rival may be larger. Of residuals with a colour the
-            evidence tells less than their objectives do.
-        report: told what is being done.
-    """
-    own, found = current.fit, list[Explanation]()
-    coarse = runs is not own.problem
-    enough = np.inf if coarse else own.objective + leeway
-    closest = _closest(runs, current, swaps, steps, leeway, report)
-    for cause, other, begin in closest[: POLICY.most_lookalikes]:
-        causes = current.causes_with(other, cause)
-        report(f"fitting {listed(causes, ' and ')}")
-        whole = _fitted(runs, own, cause, begin, steps, enough)
-        if whole is not None and whole.objective < enough:
-            found.append(Explanation(causes, whole))
-    if not found:
-        return current, ()
-    if coarse:
-        return min(found, key=lambda e: e.score), ()
-    best, *others = sorted((current, *found), key=lambda e: e.score)
-    return best, rivals_of(best, others)
-
-
-def _closest(
-    runs: Problem,
-    current: Explanation,
-    swaps: Sequence[Swap],
-    steps: int,
-    leeway: float,
-    report: Report,
-) -> list[Swap]:
-    """Causes, each with a look-alike that explains as much in a few runs and its fit, best first.
-
-    See :func:`_asked`.
-    """
-    own, few = current.fit, runs.subset(POLICY.few_runs)
-    usual = at_noise(few, own, own.noise, steps) if swaps else None
-    least = usual.objective if usual else np.inf
-    behind, found = leeway * few.run_count / runs.run_count, list[Swap]()
-    for cause, other, begin in swaps:
-        report(f"trying {other} instead of {name_of(cause)}")
-        tried = _fitted(few, own, cause, begin, steps, least + behind)
-        if tried is not None:
-            found.append((cause, other, where_ended(tried)))
-            least = min(least, tried.objective)
-    close = [one for one in found if one[2].objective < least + behind]
-    return sorted(close, key=lambda one: one[2].objective)
-
-
-def _fitted(
-    runs: Problem, own: Fit, cause: CauseId, begin: CoarseFit, steps: int, enough: float
-) -> Fit | None:
-    """A fit without a cause under the same noise; None where the simulation diverges.
-
-    It is given up where no step will lead below an objective.
-    """
-    kept = reached(partial(in_step, runs, own, cause, begin))
-    if kept is None:
-        return None
-    return at_noise(kept, begin, own.noise, steps, enough)
 
 
 def still_alike(
@@ -324,6 +249,10 @@ def still_alike(
         rivals: what could not be told from that.
         report: told what is being done.
     """
+
+    def lack(rival: Explanation) -> float:
+        return max(rival.fit.objective - before.fit.objective, 0.0)
+
     still, pairs = list[Explanation](), late(found)
     for rival in rivals:
         swap = swap_between(before, rival)
@@ -331,7 +260,9 @@ def still_alike(
             continue
         if found is before:
             still.append(rival)
-        elif (other := _beside_fewer(found, *swap, rival, report)) and alike(found, other):
+        elif (other := _beside_fewer(found, *swap, rival, report, lack=lack(rival))) and (
+            alike(found, other) or as_likely_among_small_errors(found, other)
+        ):
             still.append(other)
     return tuple(still)
 
@@ -343,15 +274,19 @@ def _beside_fewer(
     rival: Explanation,
     report: Report,
     steps: int = POLICY.swap_steps,
+    lack: float = 0.0,
 ) -> Explanation | None:
-    """An explanation with another effect in the place of a cause, at its values in a rival."""
+    """An explanation with another effect in the place of a cause, at its values in a rival.
+
+    None where it would explain less by more than what it lacks already.
+    """
     own = found.fit
     report(f"fitting {other} instead of {name_of(cause)}")
     effects, kept = replaced(own, cause, other)
     values = of_effects(rival.fit.point.effects, {other})
     begin = CoarseFit(effects, own.released, Point(own.point.z, {**kept, **values}), np.inf)
-    enough = own.objective + POLICY.coarse_fit_leeway
-    fitted = _fitted(own.problem, own, cause, begin, steps, enough)
+    enough = own.objective + POLICY.coarse_fit_leeway + lack
+    fitted = fitted_without(own.problem, own, cause, begin, steps, enough)
     return None if fitted is None else Explanation(found.causes_with(other, cause), fitted)
 
 
@@ -367,11 +302,11 @@ def undecided(current: Explanation, shown: Screen, report: Report) -> tuple[Expl
         report: told what is being done.
     """
     own, found = current.fit, list[Explanation]()
-    for cause, other, coarse in _within_reach(own, _shown(late(current), shown)):
-        report(f"fitting {other}, which explains nearly as much as {name_of(cause)}")
-        fitted = at_noise(own.problem, coarse, own.noise, POLICY.swap_steps)
+    for swap in _within_reach(own, _shown(late(current), shown)):
+        report(f"fitting {swap.other}, which explains nearly as much as {name_of(swap.cause)}")
+        fitted = at_noise(own.problem, swap.begin, own.noise, POLICY.swap_steps)
         if fitted is not None:
-            found.append(Explanation(current.causes_with(other, cause), fitted))
+            found.append(Explanation(current.causes_with(swap.other, swap.cause), fitted))
     return tuple(found)
 
 
@@ -389,7 +324,11 @@ def decided(
         report: told what is being done.
     """
     best, rivals = asked_of_rates(found, shown, report)
-    return best, tuple(other for other in rivals if as_likely(best, other))
+    return best, tuple(
+        other
+        for other in rivals
+        if as_likely(best, other) or as_likely_among_small_errors(best, other)
+    )
 
 
 def _shown(pairs: Sequence[Pair], shown: Screen) -> list[tuple[CauseId, Signal]]:

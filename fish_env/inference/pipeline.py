@@ -35,7 +35,7 @@ from fish_env.inference.explanation import Explanation, reached
 from fish_env.inference.gain import gap_closed
 from fish_env.inference.lookalikes import decided, still_alike, undecided
 from fish_env.inference.parallel import side_by_side
-from fish_env.inference.partial import Describe, confirmed
+from fish_env.inference.partial import Describe, beyond_small_errors, confirmed, needed
 from fish_env.inference.policy import POLICY
 from fish_env.inference.probes import Cause, causes_of
 from fish_env.inference.problem import Problem
@@ -43,6 +43,7 @@ from fish_env.inference.progress import Report, silent
 from fish_env.inference.result import ResidualModel, Result
 from fish_env.inference.screening import screen
 from fish_env.inference.simulated import sustained
+from fish_env.inference.switched_off import may_not_act
 from fish_env.inference.verdict import EXTENDING, Verdict, decide, without_minor
 
 
@@ -141,7 +142,21 @@ def investigate(
     budget = budget_of(attribution, verdict, left, held_out, rng)
     if budget is not None:
         verdict = without_minor(verdict, budget.minor(slow=problem.out_of_step))
+    if effort.retries:
+        attribution, verdict = among_small_errors(attribution, verdict)
     return Result(attribution, left, shown, verdict, gap, residual, budget)
+
+
+def among_small_errors(attribution: Attribution, verdict: Verdict) -> tuple[Attribution, Verdict]:
+    """With intervals as wide as small errors of all else make them.
+
+    A cause is not named whose interval then holds its neutral value.
+    """
+    accepted = attribution.accepted
+    wide = replace(accepted, fit=accepted.small_errors.widened(accepted.fit))
+    faint = [cause for cause in verdict.causes if may_not_act(wide.fit, cause)]
+    verdict = without_minor(verdict, {*verdict.minor, *faint}) if faint else verdict
+    return replace(attribution, accepted=wide), verdict
 
 
 def unnamed(found: Result, held_out: Problem | None, rng: np.random.Generator) -> Result:
@@ -182,6 +197,8 @@ def partly(
     """
     found = confirmed(attribution.accepted, left.threshold, report)
     found = sustained(found, rng, report) if found else None
+    found = beyond_small_errors(found, left.threshold, report) if found else None
+    found = needed(found, report) if found else None
     if found is None:
         return attribution, verdict
     found, rates = decided(found, attribution.shown, report)

@@ -73,6 +73,8 @@ class DecisionPolicy(Numbers):
         adequacy_certain: multiple of the threshold's log p-value that chance does not reach.
         force_pool: most indicated generic forces that are considered beside causes.
         most_forces: largest number of generic forces that together stand in for a cause.
+        small_errors: share of effects that act a little.
+        small_error: size of one, as a share of the largest plausible one.
         prior_reach_sd: prior standard deviations that a coefficient may move.
         extreme_prior_sd: prior standard deviations that are implausible beside an effect.
         implausible_prior_sd: prior standard deviations, or plausible sizes, that are implausible.
@@ -163,7 +165,7 @@ class DecisionPolicy(Numbers):
     most_leads: int = number(2, 1, 40, EFFORT)
     trial_steps: int = number(4, 1, 40, f"a lag that is right is found in three; {EFFORT}")
     most_close_trials: int = number(2, 1, 20, EFFORT)
-    most_beside_nominal: int = number(3, 0, 20, EFFORT)
+    most_beside_nominal: int = number(2, 0, 20, EFFORT)
     halving: int = number(8, 1, 1000, EFFORT)
     swap_steps: int = number(4, 1, 40, EFFORT)
     rate_steps: int = number(10, 1, 40, f"a fit without a wrong rate settles in nine; {EFFORT}")
@@ -179,6 +181,12 @@ class DecisionPolicy(Numbers):
     )
     force_pool: int = number(16, 1, 1000, EFFORT)
     most_forces: int = number(8, 1, 100, EFFORT)
+    small_errors: float = number(
+        0.13, 0.0, 1.0, "specification of real robots: five to ten effects of the catalogue"
+    )
+    small_error: float = number(
+        0.15, 0.0, 1.0, "specification of real robots: a tenth to a fifth of a usual size"
+    )
     prior_reach_sd: float = number(5.0, 3.0, 12.0, BY_HAND)
     extreme_prior_sd: float = number(4.9, 3.0, 12.0, "one coefficient in a million passes it")
     implausible_prior_sd: float = number(10.0, 5.0, 50.0, BY_HAND)

@@ -178,6 +178,34 @@ def probes_of(
     return tuple(alternatives)
 
 
+def mildest(effect: Effect, step: float = 0.0) -> tuple[Probe, ...]:
+    """The smallest settings that steps (s) follow, one for each parameter that switches it on.
+
+    With what only shapes the effect in the middle of what is plausible.
+    """
+    shapes = [p for p in effect.parameters if p.shapes]
+    setting = {s.name: _middle(s)[0] for s in shapes}
+    for share in SHARES:
+        probes = _alternative(effect, effect.switching, setting, share)
+        if all(effect.is_followed(probe, step) for probe in probes):
+            return probes
+    return ()
+
+
+def share_of_usual(effect: Effect, probe: Probe) -> float:
+    """The largest size in a setting, as a share of the farthest that is plausible.
+
+    What is off at infinity acts by its inverse.
+    """
+    shares = [
+        _far(p) / probe[p.name]
+        if np.isinf(p.neutral)
+        else (probe[p.name] - p.neutral) / (_far(p) - p.neutral)
+        for p in effect.switching
+    ]
+    return max(map(abs, shares))
+
+
 def each_alone(probes: tuple[tuple[Probe, ...], ...]) -> tuple[tuple[Probe, ...], ...]:
     """The alternatives and, where many settings are tested together, each by itself as well.
 

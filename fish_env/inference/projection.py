@@ -214,6 +214,20 @@ class Projector:
         found_of_parts = side_by_side(partial(together, part) for part in parts)
         return [signal for part in found_of_parts for signal in part]
 
+    def information(self, followed: FloatArray, left: FloatArray) -> FloatArray:
+        """(m, m) information about settings after a refit.
+
+        Args:
+            followed: (n, m) how the free parameters follow each.
+            left: (D, m) change of the residuals that this leaves.
+        """
+        return inner(left, left) + followed.T @ (self.prior[:, None] * followed)
+
+    def score(self, followed: FloatArray, left: FloatArray, count_prior: bool = True) -> FloatArray:
+        """(m,) gradient by such settings, see :meth:`information` and :meth:`signal`."""
+        score = -left.T @ self.lin.residuals
+        return score + followed.T @ (self.prior * self.vector) if count_prior else score
+
     def _signal(
         self,
         cause: Cause,
@@ -225,15 +239,13 @@ class Projector:
     ) -> Signal | None:
         if not np.isfinite(left).all():
             return None
-        projected = inner(left, left) + followed.T @ (self.prior[:, None] * followed)
+        projected = self.information(followed, left)
         energy = np.einsum("ij,ij->j", columns, columns)
         weak = np.diag(projected) < POLICY.smallest_signal
         if np.any(weak) or np.any(energy < POLICY.smallest_change):
             return None
         projected += 1e-9 * np.diag(np.diag(projected))
-        score = -left.T @ self.lin.residuals
-        if count_prior:
-            score += followed.T @ (self.prior * self.vector)
+        score = self.score(followed, left, count_prior)
         step = np.linalg.solve(projected, score)
         remaining = self.lin.residuals + left @ step
         inflation = self.variance_inflation(left, remaining)

@@ -21,13 +21,48 @@ from fish_env.inference.switched_off import may_not_act
 
 def rivals_of(best: Explanation, others: Iterable[Explanation]) -> tuple[Explanation, ...]:
     """Those of other explanations that the runs cannot tell from the best one."""
-    return tuple(
+    return tuple(e for e in others if alike(best, e) and _is_another(best, e))
+
+
+def told_apart_among_small_errors(
+    found: Sequence[Explanation],
+) -> tuple[Explanation, tuple[Explanation, ...]]:
+    """The best of some explanations and its rivals, all other effects acting a little.
+
+    As :func:`rivals_of`, and what the best one explains more than a rival such errors may make up
+    for.
+
+    Args:
+        found: explanations that differ in a cause or two.
+    """
+    gains = gains_by_small_errors(found)
+    scores = [e.score - gain for e, gain in zip(found, gains, strict=True)]
+    order = np.argsort(scores).tolist()
+    best, least = found[order[0]], scores[order[0]]
+    others = [(found[i], scores[i] - least) for i in order[1:]]
+    return best, tuple(
         e
-        for e in others
-        if alike(best, e)
-        and not same_causes(best.fit.problem, best.causes, e.causes)
-        and not implausible_estimates(e.fit)
-        and not _is_at_limit(best, e)
+        for e, gap in others
+        if (_is_small(best, e, gap) or alike(best, e)) and _is_another(best, e)
+    )
+
+
+def gains_by_small_errors(found: Sequence[Explanation]) -> list[float]:
+    """What small errors of all effects that no explanation differs in gain beside each of them.
+
+    Else what one lacks of another would come back as a small error.
+    """
+    effects = [{*e.fit.effects} for e in found]
+    apart = set().union(*effects) - effects[0].intersection(*effects)
+    return [e.small_errors.gain(without=apart) for e in found]
+
+
+def _is_another(best: Explanation, other: Explanation) -> bool:
+    """Whether another explanation says something else than the best one, and is plausible."""
+    return not (
+        same_causes(best.fit.problem, best.causes, other.causes)
+        or implausible_estimates(other.fit)
+        or _is_at_limit(best, other)
     )
 
 
@@ -89,7 +124,17 @@ def alike(best: Explanation, other: Explanation) -> bool:
 
 def as_likely(best: Explanation, other: Explanation) -> bool:
     """Whether the evidence for two explanations differs too little to tell them apart."""
-    gap = other.score - best.score
+    return _is_small(best, other, other.score - best.score)
+
+
+def as_likely_among_small_errors(best: Explanation, other: Explanation) -> bool:
+    """As :func:`as_likely`, if all other effects may act a little."""
+    gains = gains_by_small_errors([best, other])
+    return _is_small(best, other, other.score - gains[1] - best.score + gains[0])
+
+
+def _is_small(best: Explanation, other: Explanation, gap: float) -> bool:
+    """Whether a difference in evidence is small beside the colour of what tells two apart."""
     left, there = best.fit.linearised.residuals, other.fit.linearised.residuals
     apart = (there - left)[:, None]
     noise = left - apart[:, 0] * (apart[:, 0] @ left) / max(float(apart[:, 0] @ apart[:, 0]), 1e-12)

@@ -18,9 +18,10 @@ from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.settle import evaluated
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import CauseId, name_of
-from fish_env.inference.partial import StandIns, surely_measured
+from fish_env.inference.partial import surely_measured
 from fish_env.inference.policy import POLICY
 from fish_env.inference.progress import Report, silent
+from fish_env.inference.stand_ins import StandIns
 from fish_env.inference.substitution import without_in_step
 
 

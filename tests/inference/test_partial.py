@@ -13,7 +13,6 @@ from fish_env.inference.estimate.fit import fit
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import EffectParameterId
 from fish_env.inference.partial import (
-    StandIns,
     confirmed,
     independent,
     owed_to_coefficients,
@@ -21,6 +20,7 @@ from fish_env.inference.partial import (
 from fish_env.inference.pipeline import infer
 from fish_env.inference.problem import Point
 from fish_env.inference.simulated import sustained
+from fish_env.inference.stand_ins import StandIns
 from fish_env.inference.vehicle import Coefficients, Drive
 from tests.inference.boat import sail
 from tests.inference.boat_problem import BoatProblem

@@ -229,8 +229,12 @@ def experiment_entry(proposal: Proposal | None) -> Plain:
 def minor_notes(verdict: Verdict) -> list[str]:
     """Causes that the extended model holds and the verdict does not name."""
     little = f"less than {POLICY.least_named_share:.1%} of the misfit, in every channel"
+    small = f"beside the other causes it makes up {little}, as errors of their models may"
+    reasons = {
+        **dict.fromkeys(verdict.minor, small),
+        **dict.fromkeys(verdict.faint, "it may not act, if everything else is wrong a little"),
+    }
     return [
-        f"{name_of(cause)} is in the extended model but not named: beside the other causes it "
-        f"makes up {little}, as errors of their models may."
-        for cause in verdict.minor
+        f"{name_of(cause)} is in the extended model but not named: {reason}."
+        for cause, reason in reasons.items()
     ]

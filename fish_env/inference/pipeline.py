@@ -155,8 +155,7 @@ def among_small_errors(attribution: Attribution, verdict: Verdict) -> tuple[Attr
     accepted = attribution.accepted
     wide = replace(accepted, fit=accepted.small_errors.widened(accepted.fit))
     faint = [cause for cause in verdict.causes if may_not_act(wide.fit, cause)]
-    verdict = without_minor(verdict, {*verdict.minor, *faint}) if faint else verdict
-    return replace(attribution, accepted=wide), verdict
+    return replace(attribution, accepted=wide), without_minor(verdict, faint=faint)
 
 
 def unnamed(found: Result, held_out: Problem | None, rng: np.random.Generator) -> Result:

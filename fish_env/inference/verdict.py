@@ -35,16 +35,18 @@ class Verdict:
         alternatives: other sets of causes that explain the data alike; of ``partial`` all such
             sets, that of the extended model first.
         minor: causes of the extended model that are too small to be named.
+        faint: causes of the extended model that may not act, if all else acts a little.
     """
 
     name: str
     causes: tuple[CauseId, ...] = ()
     alternatives: tuple[tuple[CauseId, ...], ...] = ()
     minor: tuple[CauseId, ...] = ()
+    faint: tuple[CauseId, ...] = ()
 
     def named(self, causes: Sequence[CauseId]) -> tuple[CauseId, ...]:
-        """Those of some causes that are not too small to be named."""
-        return tuple(cause for cause in causes if cause not in self.minor)
+        """Those of some causes that are neither too small nor too faint to be named."""
+        return tuple(cause for cause in causes if cause not in (*self.minor, *self.faint))
 
 
 def decide(
@@ -87,19 +89,22 @@ def verdict_of(
     return Verdict("not_excited" if blind else "no_misfit")
 
 
-def without_minor(verdict: Verdict, minor: Collection[CauseId]) -> Verdict:
-    """The verdict without the names of causes that are too small to be named.
+def without_minor(
+    verdict: Verdict, minor: Collection[CauseId] = (), faint: Collection[CauseId] = ()
+) -> Verdict:
+    """The verdict without the names of causes that are too small or too faint to be named.
 
     Explanations that differ from what is named in such causes alone are no alternatives. Where no
     certain cause would be left, the verdict stays as it is.
 
     Args:
         verdict: verdict that may name them.
-        minor: the causes.
+        minor: causes that are too small.
+        faint: causes that may not act.
     """
-    quiet = replace(verdict, minor=tuple(minor))
+    quiet = replace(verdict, minor=(*verdict.minor, *minor), faint=(*verdict.faint, *faint))
     causes = quiet.named(verdict.causes)
-    if not (minor and causes):
+    if not ((minor or faint) and causes):
         return verdict
     sets: dict[frozenset[CauseId], tuple[CauseId, ...]] = {}
     for alternative in map(quiet.named, verdict.alternatives):
@@ -108,4 +113,5 @@ def without_minor(verdict: Verdict, minor: Collection[CauseId]) -> Verdict:
     if verdict.name == "partial":
         return replace(quiet, causes=causes, alternatives=alternatives if len(sets) > 1 else ())
     others = tuple(rest for rest in alternatives if not {*causes} <= {*rest})
-    return replace(verdict_of(True, causes, others, blind=False), minor=quiet.minor)
+    loud = verdict_of(True, causes, others, blind=False)
+    return replace(loud, minor=quiet.minor, faint=quiet.faint)

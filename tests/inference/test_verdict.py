@@ -56,3 +56,10 @@ def test_a_verdict_without_any_other_certain_cause_stays():
 def test_a_cause_that_leaves_coefficients_alone_leaves_parameters():
     found = without_minor(Verdict("cause", (MASS, "lag")), ["lag"])
     assert found == Verdict("parameters", (MASS,), minor=("lag",))
+
+
+def test_what_is_too_faint_is_told_apart_from_what_is_too_small():
+    verdict = without_minor(Verdict("cause", ("drag", "lag", "play")), ["lag"])
+    found = without_minor(verdict, faint=["play"])
+    assert found == Verdict("cause", ("drag",), minor=("lag",), faint=("play",))
+    assert found.named(("lag", "drag", "play")) == ("drag",)

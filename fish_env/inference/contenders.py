@@ -90,17 +90,19 @@ def _closest(
     Each among small errors. See :func:`asked`.
     """
     own, few = current.fit, runs.subset(POLICY.few_runs)
+    share = few.run_count / runs.run_count
     usual = at_noise(few, own, own.noise, steps) if swaps else None
+    enough = usual.objective + POLICY.out_of_reach * share if usual else np.inf
     found, tried = [Explanation(current.causes, usual)] if usual else [], list[Swap]()
     for swap in swaps:
         report(f"trying {swap.other} instead of {name_of(swap.cause)}")
-        fitted = fitted_without(few, own, swap.cause, swap.begin, steps, np.inf)
+        fitted = fitted_without(few, own, swap.cause, swap.begin, steps, enough)
         if fitted is not None:
             found.append(Explanation(current.causes_with(swap.other, swap.cause), fitted))
             tried.append(swap)
     if not tried:
         return []
-    gains, share = np.array(gains_by_small_errors(found)), few.run_count / runs.run_count
+    gains = np.array(gains_by_small_errors(found))
     left = np.array([e.fit.objective for e in found]) - gains
     close = [i for i in np.argsort(left).tolist() if left[i] < left.min() + leeway * share]
     first = len(found) - len(tried)

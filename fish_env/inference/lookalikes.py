@@ -249,10 +249,6 @@ def still_alike(
         rivals: what could not be told from that.
         report: told what is being done.
     """
-
-    def lack(rival: Explanation) -> float:
-        return max(rival.fit.objective - before.fit.objective, 0.0)
-
     still, pairs = list[Explanation](), late(found)
     for rival in rivals:
         swap = swap_between(before, rival)
@@ -260,9 +256,10 @@ def still_alike(
             continue
         if found is before:
             still.append(rival)
-        elif (other := _beside_fewer(found, *swap, rival, report, lack=lack(rival))) and (
-            alike(found, other) or as_likely_among_small_errors(found, other)
-        ):
+            continue
+        lack = max(rival.fit.objective - before.fit.objective, 0.0)
+        other = _beside_fewer(found, *swap, rival, report, lack=lack)
+        if other and (alike(found, other) or as_likely_among_small_errors(found, other)):
             still.append(other)
     return tuple(still)
 

@@ -123,7 +123,7 @@ def beyond_small_errors(
     """
     measured = surely_measured(found)
     while judged := [c for c in found.causes if not isinstance(c, Coefficient)]:
-        wide = found.small_errors.widened(found.fit)
+        wide = found.small_errors.widened()
         log_p = {cause: log_p_of(wide, cause) for cause in judged if cause not in measured}
         weakest = max(log_p, key=lambda cause: log_p[cause], default=None)
         if weakest is None or log_p[weakest] < threshold:

@@ -153,7 +153,7 @@ def among_small_errors(attribution: Attribution, verdict: Verdict) -> tuple[Attr
     A cause is not named whose interval then holds its neutral value.
     """
     accepted = attribution.accepted
-    wide = replace(accepted, fit=accepted.small_errors.widened(accepted.fit))
+    wide = replace(accepted, fit=accepted.small_errors.widened())
     faint = [cause for cause in verdict.causes if may_not_act(wide.fit, cause)]
     return replace(attribution, accepted=wide), without_minor(verdict, faint=faint)
 

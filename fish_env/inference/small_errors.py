@@ -34,12 +34,14 @@ class SmallErrors:
     """What small errors change in the residuals of a fit, in units of their usual size.
 
     Attributes:
+        fit: the fit that they are beside.
         names: (m,) effect of each.
         followed: (n, m) how the free parameters of the fit follow it.
         information: (m, m) about their sizes, after a refit.
         score: (m,) gradient by their sizes.
     """
 
+    fit: Fit
     names: tuple[str, ...]
     followed: FloatArray
     information: FloatArray
@@ -50,7 +52,7 @@ class SmallErrors:
         """Of every effect that is looked for and not in a fit, at any setting that shows."""
         settings, count = _settings(fit.problem, fit.effects), len(fit.ids)
         if not settings:
-            return cls((), np.empty((count, 0)), np.empty((0, 0)), np.empty(0))
+            return cls(fit, (), np.empty((count, 0)), np.empty((0, 0)), np.empty(0))
         columns = residual_changes(fit, [(name, probe) for name, probe, _ in settings])
         columns = columns * [unit for _, _, unit in settings]
         energy = np.where(np.isfinite(columns).all(axis=0), np.sum(columns**2, axis=0), 0.0)
@@ -60,6 +62,7 @@ class SmallErrors:
         followed = projector.coefficients(columns)
         left = columns - projector.lin.slopes @ followed
         return cls(
+            fit,
             tuple(settings[i][0] for i in shown),
             followed,
             projector.information(followed, left),
@@ -81,15 +84,13 @@ class SmallErrors:
         """The likeliest share of the usual spread that their sizes have; zero if none shows."""
         return max(SHARES, key=lambda share: _gain(self.information, self.score, share))
 
-    def widened(self, fit: Fit) -> Fit:
+    def widened(self) -> Fit:
         """The fit with its estimates as sure as such errors leave them.
 
         They are off by where the likeliest sizes of these errors would take them, and by as much as
         is unknown of these sizes.
-
-        Args:
-            fit: the fit that they are beside.
         """
+        fit = self.fit
         if self.share == 0.0:
             return fit
         moved = Free(fit.problem, fit.effects, fit.released).scale() @ self.followed
@@ -120,13 +121,10 @@ def _settings(problem: Problem, known: tuple[str, ...]) -> list[tuple[str, Probe
     Any of them may act, and a few do: its variance is that share of what it is if it acts. Which
     oscillations there may be is left out, as they are countless.
     """
-    looked_for = [name for name, effect in problem.known.items() if effect.diagnosed]
     sd = POLICY.small_error * np.sqrt(POLICY.small_errors)
-    found = []
-    for name in looked_for:
-        effect = problem.known[name]
-        if name in known or phase_of(effect):
-            continue
-        for probe in mildest(effect, problem.longest_step):
-            found.append((name, probe, float(sd / share_of_usual(effect, probe))))
-    return found
+    return [
+        (name, probe, float(sd / share_of_usual(effect, probe)))
+        for name, effect in problem.known.items()
+        if effect.diagnosed and name not in known and not phase_of(effect)
+        for probe in mildest(effect, problem.longest_step)
+    ]

@@ -81,7 +81,7 @@ def test_the_gain_is_that_of_the_exact_evidence(share):
 def test_where_nothing_else_is_wrong_estimates_stay_as_sure_as_they_are():
     rng = np.random.default_rng(2)
     own = Linear(directions(rng, 20, 200.0), {CAUSE: 0.7}, rng).fitted(CAUSE)
-    assert own.small_errors.widened(own.fit) is own.fit
+    assert own.small_errors.widened() is own.fit
 
 
 def test_intervals_hold_the_truth_among_small_errors():
@@ -91,7 +91,7 @@ def test_intervals_hold_the_truth_among_small_errors():
         along = directions(rng, 14, 200.0)
         along[2:] += 2.0 * along[0]  # what small errors do a refit of the cause follows
         own = Linear(along, {CAUSE: 0.7, **small(rng, 12)}, rng).fitted(CAUSE)
-        ends = [f.interval(size_of(CAUSE)) for f in (own.fit, own.small_errors.widened(own.fit))]
+        ends = [f.interval(size_of(CAUSE)) for f in (own.fit, own.small_errors.widened())]
         held += [low < 0.7 < high for low, high in ends]
     alone, among = held / draws
     assert among >= 0.93
@@ -101,9 +101,10 @@ def test_intervals_hold_the_truth_among_small_errors():
 def test_likelihood_intervals_grow_as_normal_ones_do():
     rng = np.random.default_rng(4)
     own = Linear(directions(rng, 14, 200.0), {CAUSE: 0.7, **small(rng, 12)}, rng).fitted(CAUSE).fit
-    errors, size = SmallErrors.of(own), size_of(CAUSE)
-    profiled = errors.widened(replace(own, profiles={size: own.interval(size)}))
-    assert profiled.interval(size) == pytest.approx(errors.widened(own).interval(size))
+    size = size_of(CAUSE)
+    profiled = replace(own, profiles={size: own.interval(size)})
+    likely, normal = (SmallErrors.of(one).widened().interval(size) for one in (profiled, own))
+    assert likely == pytest.approx(normal)
 
 
 def mistaken(rng):

@@ -214,7 +214,7 @@ class Projector:
         found_of_parts = side_by_side(partial(together, part) for part in parts)
         return [signal for part in found_of_parts for signal in part]
 
-    def information(self, followed: FloatArray, left: FloatArray) -> FloatArray:
+    def information(self, followed: FloatArray, left: FloatArray | SingleArray) -> FloatArray:
         """(m, m) information about settings after a refit.
 
         Args:

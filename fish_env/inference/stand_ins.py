@@ -12,7 +12,6 @@ from fish_env.arrays import BoolArray, FloatArray, IntArray
 from fish_env.inference.adequacy import generic_signals
 from fish_env.inference.estimate.free import Free
 from fish_env.inference.estimate.information import eliminated
-from fish_env.inference.estimate.products import inner
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import CauseId, Coefficient
 from fish_env.inference.policy import POLICY
@@ -179,7 +178,7 @@ class StandIns:
         """Information (N, N) and score (N,) of forces beside all causes, or without one."""
         left = np.hstack([s.left for s in signals])
         followed = np.hstack([np.asarray(s.followed) for s in signals])
-        info = inner(left, left) + followed.T @ (self.projector.prior[:, None] * followed)
+        info = self.projector.information(followed, left)
         score = np.concatenate([s.score for s in signals])
         if removed is not None:
             seen = removed.seen(self.projector.hessian @ followed)

@@ -93,27 +93,24 @@ def _closest(
     share = few.run_count / runs.run_count
     usual = at_noise(few, own, own.noise, steps) if swaps else None
     enough = usual.objective + POLICY.out_of_reach * share if usual else np.inf
-    found, tried = [Explanation(current.causes, usual)] if usual else [], list[Swap]()
+    known, tried = [Explanation(current.causes, usual)] if usual else [], []
     for swap in swaps:
         report(f"trying {swap.other} instead of {name_of(swap.cause)}")
         fitted = fitted_without(few, own, swap.cause, swap.begin, steps, enough)
         if fitted is not None:
-            found.append(Explanation(current.causes_with(swap.other, swap.cause), fitted))
-            tried.append(swap)
+            causes = current.causes_with(swap.other, swap.cause)
+            tried.append((swap, Explanation(causes, fitted)))
     if not tried:
         return []
-    gains = np.array(gains_by_small_errors(found))
-    left = np.array([e.fit.objective for e in found]) - gains
-    close = [i for i in np.argsort(left).tolist() if left[i] < left.min() + leeway * share]
-    first = len(found) - len(tried)
+    found, first = [*known, *(e for _, e in tried)], len(known)
+    gains = gains_by_small_errors(found)
+    left = [e.fit.objective - gain for e, gain in zip(found, gains, strict=True)]
+    near = min(left) + leeway * share
+    ranked = sorted(zip(left[first:], gains[first:], tried, strict=True), key=lambda one: one[0])
     return [
-        replace(
-            tried[i - first],
-            begin=where_ended(found[i].fit),
-            lack=max(float(gains[i] - gains[0]), 0.0) / share,
-        )
-        for i in close
-        if i >= first
+        replace(swap, begin=where_ended(e.fit), lack=max(gain - gains[0], 0.0) / share)
+        for value, gain, (swap, e) in ranked
+        if value < near
     ]
 
 

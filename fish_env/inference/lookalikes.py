@@ -37,12 +37,7 @@ from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
 from fish_env.inference.progress import Report
 from fish_env.inference.projection import Signal
-from fish_env.inference.rivals import (
-    alike,
-    as_likely,
-    as_likely_among_small_errors,
-    rivals_of,
-)
+from fish_env.inference.rivals import agreed, as_likely_among_small_errors, rivals_of
 from fish_env.inference.screening import Screen
 from fish_env.inference.search import at_noise
 from fish_env.inference.substitution import swapped, what_may_lack
@@ -259,7 +254,7 @@ def still_alike(
             continue
         lack = max(rival.fit.objective - before.fit.objective, 0.0)
         other = _beside_fewer(found, *swap, rival, report, lack=lack)
-        if other and (alike(found, other) or as_likely_among_small_errors(found, other)):
+        if other and (as_likely_among_small_errors(found, other) or not agreed(found, other)):
             still.append(other)
     return tuple(still)
 
@@ -321,11 +316,7 @@ def decided(
         report: told what is being done.
     """
     best, rivals = asked_of_rates(found, shown, report)
-    return best, tuple(
-        other
-        for other in rivals
-        if as_likely(best, other) or as_likely_among_small_errors(best, other)
-    )
+    return best, tuple(other for other in rivals if as_likely_among_small_errors(best, other))
 
 
 def _shown(pairs: Sequence[Pair], shown: Screen) -> list[tuple[CauseId, Signal]]:

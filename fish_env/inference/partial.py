@@ -7,7 +7,7 @@ sum explains the data as well. All sums are formed in the linear model of one fi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -39,6 +39,8 @@ from fish_env.inference.switched_off import distance, from_off, off_values
 
 Describe = Callable[[Fit, float, Problem | None], ResidualModel | None]
 """Models what a fit leaves: the fit, the log p-value that a term has to pass, runs to judge on."""
+Rejected = Callable[[Explanation, Sequence[CauseId]], tuple[CauseId, str] | None]
+"""A test of causes: an explanation, those of its causes in question -> the worst, and why."""
 
 
 def confirmed(
@@ -67,7 +69,7 @@ def confirmed(
         if smaller is None:
             return None
         accepted = smaller
-    plausible = _plausible(accepted, measured, report)
+    plausible = rejected_in_turn(accepted, _implausible, report)
     others = [name for name in plausible.causes if name not in measured] if plausible else []
     if plausible is None or not others:
         return plausible
@@ -78,34 +80,43 @@ def confirmed(
         return plausible
     # A fit without these explains less: it says only whether estimates are plausible.
     smaller = without_in_step(plausible, replaced)
-    return _plausible(smaller, measured, report) if smaller else None
+    return rejected_in_turn(smaller, _implausible, report) if smaller else None
 
 
-def _plausible(
-    found: Explanation, measured: Collection[CauseId], report: Report
-) -> Explanation | None:
-    """The explanation without causes whose estimates are implausible, one fit after another.
+def rejected_in_turn(found: Explanation, rejected: Rejected, report: Report) -> Explanation | None:
+    """The explanation without causes that a test rejects, one fit after another.
+
+    What was measured of a drive stays.
 
     Args:
-        found: causes with their fit.
-        measured: causes that stay whatever their estimates.
+        found: causes that act beside something unknown.
+        rejected: the test, of an explanation and those of its causes that are in question.
         report: told what is dropped and why.
 
     Returns:
-        None where no cause is left, or a simulation without one diverges.
+        The causes that are left with their fit; None where none is, or a simulation diverges.
     """
+    measured = surely_measured(found)
     while others := [name for name in found.causes if name not in measured]:
-        odd = implausible_estimates(found.fit)
-        blamed = _blamed(others, odd)
-        if blamed is None:
+        told = rejected(found, others)
+        if told is None:
             return found
-        words = "; ".join(one.words for one in odd)
-        report(f"rejecting {name_of(blamed)}: its estimate is implausible ({words})")
-        smaller = without_in_step(found, (blamed,))
+        cause, reason = told
+        report(f"rejecting {name_of(cause)}: {reason}")
+        smaller = without_in_step(found, (cause,))
         if smaller is None:
             return None
         found = smaller
     return found if found.causes else None
+
+
+def _implausible(found: Explanation, others: Sequence[CauseId]) -> tuple[CauseId, str] | None:
+    """The first cause with an implausible estimate, and what is implausible."""
+    odd = implausible_estimates(found.fit)
+    blamed = _blamed(others, odd)
+    if blamed is None:
+        return None
+    return blamed, f"its estimate is implausible ({'; '.join(one.words for one in odd)})"
 
 
 def beyond_small_errors(
@@ -121,19 +132,17 @@ def beyond_small_errors(
     Returns:
         The causes that are left with their fit; None where none is.
     """
-    measured = surely_measured(found)
-    while judged := [c for c in found.causes if not isinstance(c, Coefficient)]:
-        wide = found.small_errors.widened()
-        log_p = {cause: log_p_of(wide, cause) for cause in judged if cause not in measured}
-        weakest = max(log_p, key=lambda cause: log_p[cause], default=None)
-        if weakest is None or log_p[weakest] < threshold:
-            return found
-        report(f"rejecting {name_of(weakest)}: small errors explain as much")
-        smaller = without_in_step(found, (weakest,))
-        if smaller is None:
+
+    def rejected(found: Explanation, others: Sequence[CauseId]) -> tuple[CauseId, str] | None:
+        judged = [cause for cause in others if not isinstance(cause, Coefficient)]
+        if not judged:
             return None
-        found = smaller
-    return found if found.causes else None
+        wide = found.small_errors.widened()
+        log_p = {cause: log_p_of(wide, cause) for cause in judged}
+        weakest = max(judged, key=lambda cause: log_p[cause])
+        return None if log_p[weakest] < threshold else (weakest, "small errors explain as much")
+
+    return rejected_in_turn(found, rejected, report)
 
 
 def needed(found: Explanation, report: Report = silent) -> Explanation | None:

@@ -162,17 +162,15 @@ def probes_of(
     """
     if phase_of(effect):
         return _oscillations(effect, length)
-    switches = effect.switching
     shapes = [p for p in effect.parameters if p.shapes]
     further = SHARES[1:] if between else SHARES[-1:]
     alternatives: list[tuple[Probe, ...]] = []
     for values in product(*(_shape_values(s) for s in shapes)):
         setting = dict(zip([s.name for s in shapes], values, strict=True))
         for shares in (SHARES, *((share,) for share in further)):
-            candidates = [_alternative(effect, switches, setting, share) for share in shares]
-            slow = [c for c in candidates if all(effect.is_followed(p, step) for p in c)]
-            if slow and slow[0] not in alternatives:
-                alternatives.append(slow[0])
+            slow = _first_followed(effect, setting, shares, step)
+            if slow and slow not in alternatives:
+                alternatives.append(slow)
     if effect.drifts_in_phase:
         alternatives.insert(0, tuple(_milder(effect, probe) for probe in alternatives[0]))
     return tuple(alternatives)
@@ -185,8 +183,15 @@ def mildest(effect: Effect, step: float = 0.0) -> tuple[Probe, ...]:
     """
     shapes = [p for p in effect.parameters if p.shapes]
     setting = {s.name: _middle(s)[0] for s in shapes}
-    for share in SHARES:
-        probes = _alternative(effect, effect.switching, setting, share)
+    return _first_followed(effect, setting, SHARES, step)
+
+
+def _first_followed(
+    effect: Effect, setting: Probe, shares: Sequence[float], step: float
+) -> tuple[Probe, ...]:
+    """An alternative at the first of some sizes that steps (s) follow; empty where none is."""
+    for share in shares:
+        probes = _alternative(effect, setting, share)
         if all(effect.is_followed(probe, step) for probe in probes):
             return probes
     return ()
@@ -319,11 +324,9 @@ def phase_grid(effect: Effect, cycles: float) -> tuple[Probe, ...]:
     return tuple({size.name: float(value)} for value in np.linspace(low, high, count))
 
 
-def _alternative(
-    effect: Effect, switches: Sequence[EffectParameter], setting: Probe, share: float
-) -> tuple[Probe, ...]:
-    off = {p.name: p.neutral for p in switches}
-    return tuple({**off, **setting, p.name: _between(p, share)} for p in switches)
+def _alternative(effect: Effect, setting: Probe, share: float) -> tuple[Probe, ...]:
+    off = {p.name: p.neutral for p in effect.switching}
+    return tuple({**off, **setting, p.name: _between(p, share)} for p in effect.switching)
 
 
 def _shape_values(parameter: EffectParameter) -> tuple[float, ...]:

@@ -128,7 +128,9 @@ def as_likely(best: Explanation, other: Explanation) -> bool:
 
 
 def as_likely_among_small_errors(best: Explanation, other: Explanation) -> bool:
-    """As :func:`as_likely`, if all other effects may act a little."""
+    """As :func:`as_likely`, or if all other effects may act a little."""
+    if as_likely(best, other):
+        return True
     gains = gains_by_small_errors([best, other])
     return _is_small(best, other, other.score - gains[1] - best.score + gains[0])
 

@@ -17,12 +17,11 @@ import numpy as np
 from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.settle import evaluated
 from fish_env.inference.explanation import Explanation
-from fish_env.inference.hypotheses import CauseId, name_of
-from fish_env.inference.partial import surely_measured
+from fish_env.inference.hypotheses import CauseId
+from fish_env.inference.partial import rejected_in_turn
 from fish_env.inference.policy import POLICY
 from fish_env.inference.progress import Report, silent
 from fish_env.inference.stand_ins import StandIns
-from fish_env.inference.substitution import without_in_step
 
 
 @dataclass(frozen=True)
@@ -68,20 +67,17 @@ def sustained(
     Returns:
         The causes that are left with their fit; None where none is.
     """
-    measured = surely_measured(found)
-    while others := [name for name in found.causes if name not in measured]:
+
+    def rejected(found: Explanation, others: Sequence[CauseId]) -> tuple[CauseId, str] | None:
         sizes = simulated_sizes(found, others, rng)
         if sizes is None:
-            return found
+            return None
         worst = max(others, key=lambda name: sizes[name].contradiction)
         if sizes[worst].contradiction < 0.0:
-            return found
-        report(f"rejecting {name_of(worst)}: simulation asks for {sizes[worst].words}")
-        smaller = without_in_step(found, (worst,))
-        if smaller is None:
             return None
-        found = smaller
-    return found if found.causes else None
+        return worst, f"simulation asks for {sizes[worst].words}"
+
+    return rejected_in_turn(found, rejected, report)
 
 
 def simulated_sizes(

@@ -24,6 +24,7 @@ from fish_env.commands.options import (
     Json,
     MeasuredBeats,
     OtherFish,
+    Patient,
     Quick,
     Seed,
     TrustEffects,
@@ -152,6 +153,7 @@ def diagnose(
     seed: Seed = 0,
     json: Json = None,
     trust_effects: TrustEffects = False,
+    patient: Patient = False,
 ) -> None:
     """Find what the simulation lacks: a cause with its size, or that no known cause fits.
 
@@ -165,8 +167,9 @@ def diagnose(
     from fish_env.commands.numbers import console_for
 
     diagnose_dataset(
-        console_for(json), dataset, out, fish, quick, seed, measured_beats, trust_effects, json
-    )
+        console_for(json), dataset, out, fish, quick, seed, measured_beats, trust_effects, json,
+        patient,
+    )  # fmt: skip
 
 
 @app.command()

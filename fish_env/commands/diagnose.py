@@ -37,6 +37,7 @@ def diagnose_dataset(
     measured_beats: bool = False,
     trust_effects: bool = False,
     json_file: Path | None = None,
+    patient: bool = False,
 ) -> dict[str, Any]:
     """Diagnoses a dataset, prints the verdict and writes the files.
 
@@ -50,6 +51,7 @@ def diagnose_dataset(
         measured_beats: Take the tail's frequencies from the hull's swaying.
         trust_effects: Run the effect files that the fish's file names.
         json_file: File for the content of `diagnosis.json` once more.
+        patient: Search without a limit on how often the runs are simulated.
 
     Raises:
         RoboticFishError: The data or the fish cannot be used.
@@ -67,7 +69,9 @@ def diagnose_dataset(
             progress.update(task, description=step)
 
         try:
-            answer = diagnose(dataset, out, seed, quick, fish, tell, measured_beats, trust_effects)
+            answer = diagnose(
+                dataset, out, seed, quick, fish, tell, measured_beats, trust_effects, patient
+            )
         except KeyboardInterrupt:
             raise Interrupted(
                 f"stopped; nothing was written, {out} is as it was. Start again; --quick takes "

@@ -31,6 +31,10 @@ OtherFish = Annotated[
 Quick = Annotated[
     bool, typer.Option("--quick", help="Fit 20 s of two runs; do not compare rival causes.")
 ]
+Patient = Annotated[
+    bool,
+    typer.Option("--patient", help="Search on where the search would end for its length."),
+]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of all random numbers.")]
 MeasuredBeats = Annotated[
     bool,

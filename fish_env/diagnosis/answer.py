@@ -30,7 +30,6 @@ from fish_env.identification.beats import beats_of, by_run, uneven
 from fish_env.identification.generic_forces import wrench_unit
 from fish_env.identification.series import series_of
 from fish_env.identification.variation import USUAL_BEAT, USUAL_SAG
-from fish_env.inference.effort import effort_of
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.free import least_of, spread_of
 from fish_env.inference.estimate.run_variation import shown_spread
@@ -52,7 +51,7 @@ def as_dict(diagnosis: Diagnosis) -> Plain:
         "inputs": diagnosis.inputs.as_list(),
         "verdict_once_corrected": diagnosis.verdict.name,
         "fish": diagnosis.problem.fish.name,
-        "left_out": list(effort_of(diagnosis.quick).left_out),
+        "left_out": list(diagnosis.left_out),
         "noise": _noise(diagnosis.accepted),
         "noise_floor": _floors(diagnosis),
         "outliers": outliers.as_dict(diagnosis.outliers),
@@ -61,7 +60,12 @@ def as_dict(diagnosis: Diagnosis) -> Plain:
         "gain": gain_entry(diagnosis.gain),
         "localisation": as_plain(diagnosis.localisation),
         "residual_model": residual_entry(diagnosis.residual),
-        "notes": [*diagnosis.dataset.notes, *_chance(diagnosis), *minor_notes(diagnosis.verdict)],
+        "notes": [
+            *diagnosis.dataset.notes,
+            *_chance(diagnosis),
+            *minor_notes(diagnosis.verdict),
+            *_cut_short(diagnosis),
+        ],
     }
     return {**answer, "doubts": doubts(answer)}
 
@@ -199,6 +203,17 @@ def _chance(diagnosis: Diagnosis) -> list[str]:
         f"The fitted runs indicate {_wrench(asked)} ({asked['rms']:.2g} "
         f"{wrench_unit(asked['direction'])}), little more than chance would. It does not improve "
         f"the prediction of other runs (log likelihood {gain:+.2g}), so it counts as chance."
+    ]
+
+
+def _cut_short(diagnosis: Diagnosis) -> list[str]:
+    """That the search did not come to an end of its own."""
+    if not diagnosis.cut_short:
+        return []
+    passes = round(diagnosis.problem.work.passes, -2)
+    return [
+        f"The search for causes was ended after the runs had been simulated {passes:,.0f} times. "
+        "More causes may act. Diagnose again with --patient to search without this limit."
     ]
 
 

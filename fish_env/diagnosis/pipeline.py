@@ -38,7 +38,7 @@ from fish_env.identification.sensors import with_noise_shown, without_outliers
 from fish_env.identification.series import SeriesProblem, series_of
 from fish_env.identification.tail_drive import tail_drive
 from fish_env.identification.writing import identified_fish
-from fish_env.inference.effort import effort_of
+from fish_env.inference.effort import QUICK, Effort, effort_of
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.parallel import both
 from fish_env.inference.pipeline import investigate, refit_baseline, unnamed
@@ -65,6 +65,7 @@ def diagnose(
     progress: Report | None = None,
     measured_beats: bool = False,
     trust_effects: bool = False,
+    patient: bool = False,
 ) -> dict[str, Any]:
     """Diagnose a folder of measured runs.
 
@@ -78,6 +79,7 @@ def diagnose(
         progress: told the name of each step.
         measured_beats: take the tail's frequencies from the hull's swaying, not from the commands.
         trust_effects: run the effect files that the fish's file names, see ``load_fish``.
+        patient: search without a limit on how often the runs are simulated.
 
     Returns:
         The content of ``diagnosis.json``.
@@ -101,7 +103,7 @@ def diagnose(
         return diagnose_steady(dataset, chosen, seed=seed, quick=quick, progress=tell, out=where)
     if measured_beats:
         dataset = with_measured_beats(dataset, chosen)
-    diagnosis = diagnose_runs(dataset, chosen, seed, quick, tell)
+    diagnosis = diagnose_runs(dataset, chosen, seed, quick, tell, patient)
     answer = as_dict(diagnosis)
     if out is not None:
         tell("writing the report")
@@ -134,6 +136,7 @@ def diagnose_runs(
     seed: int = 0,
     quick: bool = False,
     progress: Report = silent,
+    patient: bool = False,
 ) -> Diagnosis:
     """Diagnose time series.
 
@@ -143,6 +146,7 @@ def diagnose_runs(
         seed: of the split and of the null distributions.
         quick: quick mode, which leaves out what :data:`~fish_env.inference.effort.QUICK` says.
         progress: told the name of each step.
+        patient: search without a limit on how often the runs are simulated.
 
     Raises:
         DatasetError: no diagnosis should be built on these runs.
@@ -150,14 +154,13 @@ def diagnose_runs(
     give_back_large_arrays()
     # The filter has its own threads; those of the linear algebra would wait for each other.
     with threadpool_limits(1, "blas"):
-        return _diagnose_runs(dataset, fish, seed, quick, progress)
+        return _diagnose_runs(dataset, fish, seed, effort_of(quick, patient), progress)
 
 
 def _diagnose_runs(
-    dataset: Dataset, fish: FishParams | None, seed: int, quick: bool, progress: Report
+    dataset: Dataset, fish: FishParams | None, seed: int, effort: Effort, progress: Report
 ) -> Diagnosis:
     begin = time.perf_counter()
-    effort = effort_of(quick)
     progress("checking the runs")
     check_runs(dataset)
     dataset, outliers = without_outliers(without_copies(dataset))
@@ -167,7 +170,7 @@ def _diagnose_runs(
     dataset = inputs.dataset
     fitted, final = fitted_and_final(dataset, seed)
     progress("comparing the beats of the runs")
-    every = SeriesProblem(dataset, fish, dt=effort.step_s)
+    every = SeriesProblem(dataset, fish, dt=effort.step_s, most_passes=effort.most_passes)
     every = every.with_drive(tail_drive(inputs.drive, inputs.drive_certain))
     if effort.retries:
         every, outliers = without_model_outliers(every, outliers)
@@ -202,7 +205,8 @@ def _diagnose_runs(
         consistency=agreed, problem=problem, attribution=found.attribution, adequacy=found.adequacy,
         preconditions=found.preconditions, verdict=found.verdict, localisation=place,
         misfit=misfit_of(problem, judged), gain=gain, residual=residual, next_experiment=proposal,
-        budget=found.budget, seed=seed, quick=quick, runtime_s=time.perf_counter() - begin,
+        budget=found.budget, cut_short=found.cut_short, seed=seed, quick=effort is QUICK,
+        runtime_s=time.perf_counter() - begin,
     )  # fmt: skip
 
 

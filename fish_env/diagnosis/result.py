@@ -15,6 +15,7 @@ from fish_env.identification.tables.problem import TableProblem
 from fish_env.inference.adequacy import Adequacy
 from fish_env.inference.attribution import Attribution
 from fish_env.inference.budget import Budget
+from fish_env.inference.effort import CUT_SHORT, effort_of
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.preconditions import Precondition
 from fish_env.inference.verdict import Verdict
@@ -75,6 +76,7 @@ class Diagnosis(Diagnosed):
         problem: the others.
         localisation: where in the regime the baseline's misfit sits.
         residual: what no known cause explains, as a sum of simple wrenches, if it can be so told.
+        cut_short: whether the search ended because so much had been simulated.
     """
 
     dataset: Dataset
@@ -86,6 +88,12 @@ class Diagnosis(Diagnosed):
     problem: SeriesProblem
     localisation: Localisation
     residual: ResidualModel | None
+    cut_short: bool = False
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """In words, what another diagnosis of the same runs would do beyond this one."""
+        return CUT_SHORT if self.cut_short else effort_of(self.quick).left_out
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

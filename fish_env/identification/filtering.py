@@ -18,7 +18,7 @@ from fish_env.identification.first_state import POSITIONS, told_at_start, undo_g
 from fish_env.identification.jitter import channel_rates
 from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.noise_scoring import Replayed
-from fish_env.identification.runs import FREQUENCY, RunData
+from fish_env.identification.runs import RunData
 from fish_env.identification.state_blocks import N_ERROR, N_MOVING
 from fish_env.identification.variation import (
     START,
@@ -29,6 +29,7 @@ from fish_env.identification.variation import (
     varied_records,
 )
 from fish_env.inference.hypotheses import EffectParameterId
+from fish_env.inference.work import Work
 from fish_env.model.history import history_rows
 from fish_env.model.state import BASE_STATES
 from fish_env.rigidbody.kinematics import turned
@@ -152,12 +153,17 @@ class RunFilter:
         model: fish and effects; built with ``user_effects=(APPLIED_WRENCH,)`` last.
         runs: prepared runs.
         channels: their channels.
+        work: counts what is simulated.
     """
 
     def __init__(
-        self, model: ExtendedModel, runs: Sequence[RunData], channels: Sequence[str]
+        self,
+        model: ExtendedModel,
+        runs: Sequence[RunData],
+        channels: Sequence[str],
+        work: Work | None = None,
     ) -> None:
-        self.model = model
+        self.model, self.work = model, work or Work()
         self.runs = tuple(runs)
         self.channels = tuple(channels)
         self.codes = codes_of(channels)
@@ -168,6 +174,11 @@ class RunFilter:
     def rates(self) -> list[FloatArray]:
         """Of each run, rates of change (T, C) of its measured channels (SI per s)."""
         return [channel_rates(run.clock, run.measured, self.channels) for run in self.runs]
+
+    @cached_property
+    def steps(self) -> int:
+        """Simulation steps of all runs."""
+        return sum(run.steps for run in self.runs)
 
     def _history_rows(self, records: FloatArray, data: RunData) -> int:
         """Room for tail commands that come late."""
@@ -186,7 +197,7 @@ class RunFilter:
         states = np.zeros((len(self.kernels.state_names), count))
         states[: len(BASE_STATES)] = data.state0[:, None]
         if data.as_measured:
-            states[TAIL_PHASE] += data.variation[START] + phase_begun(data, measurement.delay)
+            states[TAIL_PHASE] += data.variation[START] + data.phase_begun(measurement.delay)
             if more is not None:
                 states[TAIL_PHASE] += more[START]
         for i, name in enumerate(self.channels if data.as_measured else ()):
@@ -230,6 +241,7 @@ class RunFilter:
             keep_slopes: keep what :meth:`replay` needs.
         """
         entry = self.kernels.entry("ekf_run")
+        self.work.add((1 + N_ERROR) * self.steps)  # with its slopes
 
         def one(job: tuple[RunData, FloatArray]) -> Filtered:
             data, rates = job
@@ -316,6 +328,7 @@ class RunFilter:
         entry, lanes = self.kernels.entry("filter_lanes"), self.kernels.module.BLOCK
         own = [records] * len(self.runs) if isinstance(records, np.ndarray) else records
         count = own[0].shape[1]
+        self.work.add(count * self.steps)
         ends = np.cumsum([data.measured.size for data in self.runs]).tolist()
         out = np.empty((count, ends[-1]))
         column = np.zeros(count, np.int64) if pushes is None else pushes.column
@@ -348,21 +361,6 @@ class RunFilter:
 
         list(_threads().map(one, jobs))
         return out
-
-
-def phase_begun(run: RunData, delay: FloatArray) -> FloatArray:
-    """Phase (N,) that the tail of a run from rest has at the first sample (rad).
-
-    It begins to beat with the commands. Where their clock is ahead, it has begun before.
-
-    Args:
-        run: the run.
-        delay: (N,) age of the samples, on the commands' clock (s).
-    """
-    if run.swimming:
-        return np.zeros(len(delay))
-    frequency = run.driven[1][np.searchsorted(run.driven[0], 0.0, side="right") - 1, FREQUENCY]
-    return np.asarray(2.0 * np.pi * frequency * np.maximum(-delay, 0.0))
 
 
 def sensor_variance(noise: NoiseModel, run: RunData) -> FloatArray:

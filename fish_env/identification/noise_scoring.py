@@ -79,12 +79,13 @@ def climb(
     last: tuple[FloatArray, FloatArray] | None = None
     unseen = np.zeros((len(at), len(at)))
     for _ in range(MOST_STEPS):
+        # One difference each tells that; all that follows takes one for every parameter.
+        if any(_pushes_beyond(replay, at, here, upper, i) for i in range(watched)):
+            break
         with np.errstate(over="ignore", invalid="ignore"):
             system = _system(replay, at, here, upper)
         if not np.isfinite(system.average).all():
             break  # the simulation has all but diverged: no noise model makes up for that
-        if np.any((at >= upper)[:watched] & (system.score[:watched] > BEYOND)):
-            break
         low, high = np.maximum(lower - at, -LONGEST), np.minimum(upper - at, LONGEST)
         bold = minimise_in_box(system.expected, -system.score, low, high).step
         if system.gain(bold) < least_gain:
@@ -148,6 +149,20 @@ class System:
     def gain(self, step: FloatArray) -> float:
         """Log likelihood that a step gains by the expected information."""
         return float(self.score @ step - 0.5 * step @ self.expected @ step)
+
+
+def _pushes_beyond(
+    replay: Callable[[FloatArray], Replayed],
+    at: FloatArray,
+    here: Replayed,
+    upper: FloatArray,
+    i: int,
+) -> bool:
+    """Whether a parameter belongs beyond the bound that it is at."""
+    if at[i] < upper[i]:
+        return False
+    there = replay(np.where(np.arange(len(at)) == i, at - STEP, at))
+    return here.log_likelihood - there.log_likelihood > BEYOND * STEP
 
 
 def _system(

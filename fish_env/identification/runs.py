@@ -236,6 +236,25 @@ class RunData:
         """(devices,) the same by the run's present numbers, and all that makes devices late."""
         return np.asarray(self.ages(self.variation[:, None])[:, 0] + self.late)
 
+    @property
+    def steps(self) -> int:
+        """RK4 steps from its first sample to its last."""
+        return int(self.substeps.sum())
+
+    def phase_begun(self, delay: FloatArray) -> FloatArray:
+        """Phase (N,) that a tail which starts from rest has at the first sample (rad).
+
+        It begins to beat with the commands. Where their clock is ahead, it has begun before.
+
+        Args:
+            delay: (N,) age of the samples, on the commands' clock (s).
+        """
+        if self.swimming:
+            return np.zeros(len(delay))
+        times, commands = self.driven
+        frequency = commands[np.searchsorted(times, 0.0, side="right") - 1, FREQUENCY]
+        return np.asarray(2.0 * np.pi * frequency * np.maximum(-delay, 0.0))
+
     @cached_property
     def shortest_step(self) -> float:
         """The shortest of its RK4 steps (s)."""

@@ -47,6 +47,7 @@ from fish_env.inference.hypotheses import EffectParameterId, effect_names, effec
 from fish_env.inference.probes import phase_grid
 from fish_env.inference.problem import Point
 from fish_env.inference.vehicle import EffectFreedom, freedoms
+from fish_env.inference.work import Work
 from fish_env.model.effect import Effect
 from fish_env.params.io import load_fish
 from fish_env.params.schema import FishParams
@@ -64,6 +65,7 @@ class SeriesProblem(Stepped):
         user_effects: effects of the caller's own, among ``effects`` or not.
         dt: longest RK4 step (s), but for a moment after each switch of the commands and for
             effects that make the tail's rate jump, or are faster in the fish's file.
+        most_passes: how often all runs are simulated before no further search begins.
     """
 
     known: dict[str, Effect]
@@ -83,6 +85,7 @@ class SeriesProblem(Stepped):
         effects: Iterable[str] = (),
         user_effects: Iterable[Effect] = (),
         dt: float = 0.01,
+        most_passes: float = np.inf,
     ) -> None:
         self.dataset, self.fish = dataset, fish or load_fish(dataset.fish)
         self.known = {**catalogue(), **{e.name: e for e in user_effects}}
@@ -100,6 +103,7 @@ class SeriesProblem(Stepped):
         self.baseline = baseline_of(dataset, self.fish, paths)
         self.effects = tuple(effects)
         self.drive = TailDrive()
+        self.work = Work(sum(run.steps for run in self.runs), most_passes)
         self._filters: dict[frozenset[str], RunFilter] = {}
         if unknown := [name for name in self.effects if name not in self.known]:
             raise EffectError(f"unknown effects {unknown}; known: {', '.join(self.known)}")
@@ -116,7 +120,7 @@ class SeriesProblem(Stepped):
     def _filter_of(self, stages: frozenset[str]) -> RunFilter:
         if stages not in self._filters:
             model = with_stages(self.model, stages)
-            self._filters[stages] = RunFilter(model, self.runs, self.channels)
+            self._filters[stages] = RunFilter(model, self.runs, self.channels, self.work)
         return self._filters[stages]
 
     def until(self, end_s: float) -> SeriesProblem:

@@ -142,7 +142,8 @@ def extended(
     """
     search = Search(causes, rng, effort, report, relaxed_log_p)
     found, together = search.hidden(search.measured(begun)), effort.retries
-    while len(found.accepted.causes) < POLICY.most_causes:
+    work = begun.accepted.fit.problem.work
+    while len(found.accepted.causes) < POLICY.most_causes and work.allows_more():
         if found.accepted.causes and together:
             found, together = search.together(found), False
             continue
@@ -223,10 +224,7 @@ class Search:
         if accepted is None:
             return begun
         after = screen(accepted.fit, self.causes, self.rng)
-        return replace(
-            begun, accepted=accepted, shown=after,
-            gain=nothing.score - accepted.score,
-        )  # fmt: skip
+        return replace(begun, accepted=accepted, shown=after, gain=nothing.score - accepted.score)
 
     def hidden(self, begun: Attribution) -> Attribution:
         """With an effect that a swamping disturbance hides; the same without, or beside causes.
@@ -244,6 +242,8 @@ class Search:
 
     def together(self, found: Attribution) -> Attribution:
         """With further effects that are needed beside those found, and what the runs differ in."""
+        if not found.accepted.fit.problem.work.allows_more():
+            return found
         found = self.simplest_first(found)
         before = found.accepted
         current, after, replaced = pursue(

@@ -1,4 +1,4 @@
-"""How much a diagnosis computes: everything, or quick mode."""
+"""How much a diagnosis computes: all that is of use, quick mode, or without a limit."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ class Effort:
             runs where that may be chance and nothing is named; and what no cause explains
             described.
         pictured: most runs that the report shows, held-out ones first.
+        most_passes: how often all runs are simulated before no further search begins.
         left_out: in words, what a full diagnosis does beyond this one.
     """
 
@@ -32,6 +33,7 @@ class Effort:
     finalists: int
     retries: bool
     pictured: int
+    most_passes: float = float("inf")
     left_out: tuple[str, ...] = ()
 
     @property
@@ -50,7 +52,9 @@ FULL = Effort(
     finalists=POLICY.finalists,
     retries=True,
     pictured=6,
+    most_passes=POLICY.most_passes,
 )
+PATIENT = replace(FULL, most_passes=float("inf"))
 QUICK = Effort(
     runs=POLICY.quick_runs,
     seconds=POLICY.quick_run_s,
@@ -68,10 +72,14 @@ QUICK = Effort(
         PICTURES,
     ),
 )
+CUT_SHORT = ("further searches for causes",)
+"""What is left out where so much was simulated that no search began any more."""
 TABLE_LEFT_OUT = (QUICK.left_out[1], "restarts from the best cause, weaker causes", PICTURES)
 """What quick mode leaves out of a table of averages: it uses all conditions."""
 
 
-def effort_of(quick: bool) -> Effort:
-    """The effort of quick mode or of a full diagnosis."""
-    return QUICK if quick else FULL
+def effort_of(quick: bool, patient: bool = False) -> Effort:
+    """The effort of quick mode, of a patient diagnosis, or else of a full one."""
+    if quick:
+        return QUICK
+    return PATIENT if patient else FULL

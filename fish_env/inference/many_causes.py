@@ -89,7 +89,7 @@ class Pursuit:
         replaced: list[tuple[CauseId, CauseId]] = []
         hidden = True
         for _ in range(POLICY.most_single_searches):
-            if not disturbance_at_limit(current.fit):
+            if not disturbance_at_limit(current.fit) or not current.fit.problem.work.allows_more():
                 break
             more = tried_out(current, beside(current, shown), self.report) if hidden else None
             # Where none shows from the fit itself, none will beside one cause more.
@@ -116,6 +116,8 @@ class Pursuit:
             fewest: causes that have to show at first.
         """
         for _ in range(POLICY.pursuits):
+            if not current.fit.problem.work.allows_more():
+                break
             more = self._pursued(current, shown, fewest=fewest)
             if more is current:
                 break

@@ -31,7 +31,7 @@ from fish_env.inference.estimate.again import (
     under_noise,
 )
 from fish_env.inference.estimate.fit import FEWER_STEPS, Fit, fit
-from fish_env.inference.explanation import Explanation, reached
+from fish_env.inference.explanation import Explanation, in_steps_of, reached
 from fish_env.inference.gain import gap_closed
 from fish_env.inference.lookalikes import decided, still_alike, undecided
 from fish_env.inference.parallel import side_by_side
@@ -111,9 +111,9 @@ def investigate(
         held_out: the same model on runs kept for judging; None without such runs.
         describe: models what no known cause explains; without it nothing is said of that.
     """
-    problem = baseline.problem
+    problem, work = baseline.problem, baseline.problem.work
     attribution = attribute(baseline, causes, rng, effort, report)
-    if effort.retries and disturbance_at_limit(attribution.accepted.fit):
+    if effort.retries and disturbance_at_limit(attribution.accepted.fit) and work.allows_more():
         attribution = searched_afresh(attribution, causes, rng, report)
     shown = attribution.preconditions
     report("testing the residual")
@@ -121,7 +121,7 @@ def investigate(
     if effort.retries and left.slight and describe:
         left = cross_validated(attribution, left, describe, report)
     # A weaker cause may explain what is left, but no disturbance of implausible strength.
-    if effort.retries and not left.reached and not left.implausible:
+    if effort.retries and not left.reached and not left.implausible and work.allows_more():
         attribution, left = with_weaker_causes(attribution, left, causes, rng, report)
     if effort.retries and not left.reached:
         attribution, left = with_slow_causes(attribution, left, causes, rng, report)
@@ -144,7 +144,7 @@ def investigate(
         verdict = without_minor(verdict, budget.minor(slow=problem.out_of_step))
     if effort.retries:
         attribution, verdict = among_small_errors(attribution, verdict)
-    return Result(attribution, left, shown, verdict, gap, residual, budget)
+    return Result(attribution, left, shown, verdict, gap, residual, budget, work.cut_short)
 
 
 def among_small_errors(attribution: Attribution, verdict: Verdict) -> tuple[Attribution, Verdict]:
@@ -314,15 +314,15 @@ def with_weaker_causes(
         rng: for null distributions.
         report: told what is being done.
     """
+    before = attribution.accepted
+    begun = in_steps_of(to_search(before.fit.problem), before)
     # Some of the causes that the last screen was made beside may have been dropped since.
-    shown = screen(attribution.accepted.fit, causes, rng)
-    begun = replace(attribution, shown=shown)
-    more = extended(begun, causes, rng, FULL, report, POLICY.relaxed_log_p)
-    if more.accepted.causes == attribution.accepted.causes:
+    again = replace(attribution, accepted=begun, shown=screen(begun.fit, causes, rng))
+    more = extended(again, causes, rng, FULL, report, POLICY.relaxed_log_p)
+    if more.accepted.causes == before.causes:
         return attribution, left
     report("testing the residual")
     after = adequacy(more.accepted.fit, rng)
-    before = attribution.accepted
     more_explained = more.accepted.score < before.score - POLICY.evidence_doubt
     beside = bool(before.causes) and more_explained and not after.implausible
     return (more, after) if after.reached or beside else (attribution, left)
@@ -350,7 +350,7 @@ def with_slow_causes(
     before = attribution.accepted
     own = before.fit
     noise = own.problem.passing_noise(own.noise)
-    if noise is None:
+    if noise is None or not own.problem.work.allows_more():
         return attribution, left
     report("searching for slow causes")
     passing = reached(partial(under_noise, own.problem, own, noise))

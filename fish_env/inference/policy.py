@@ -43,6 +43,7 @@ class DecisionPolicy(Numbers):
         coarse_fit_behind: share of the leader's gain that a finalist may lack.
         coarse_fit_leeway: difference of coarse fits in -2 log likelihood that excludes no cause.
         out_of_reach: distance to the leader beyond which a fit is stopped.
+        most_passes: how often all runs are simulated before no further search begins.
         aic_penalty: expected gain of a coarse fit by a parameter without effect.
         largest_disturbance: strongest disturbance of the search, over the plausible limit.
         sure_sd: standard errors from neutral beyond which no fit without the cause is tried.
@@ -153,6 +154,9 @@ class DecisionPolicy(Numbers):
     coarse_fit_behind: float = number(0.25, 0.0, 1.0, EFFORT)
     coarse_fit_leeway: float = number(100.0, 0.0, 1e4, EFFORT)
     out_of_reach: float = number(1000.0, 0.0, 1e5, EFFORT)
+    most_passes: float = number(
+        12_000.0, 1.0, 1e12, "four times what eight runs of 30 s with one cause take"
+    )
     aic_penalty: float = number(2.0, 0.0, 10.0, AKAIKE)
     sure_sd: float = number(10.0, 5.0, 100.0, EFFORT)
     pursuits: int = number(2, 0, 10, EFFORT)

@@ -26,6 +26,7 @@ from fish_env.inference.vehicle import (
     finite_values,
     freedoms,
 )
+from fish_env.inference.work import Work
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +64,7 @@ class Problem(Protocol):
         common_effects: effects that do in all runs what such numbers do in single ones.
         drive: what was measured of a periodic drive.
         coefficient_step: change of a coefficient (in units of its prior) that slopes are taken by.
+        work: what has been simulated; without a limit where nothing is counted.
     """
 
     known: Mapping[str, Effect]
@@ -76,6 +78,7 @@ class Problem(Protocol):
     common_effects: tuple[CommonEffect, ...] = ()
     drive: Drive = Drive()
     coefficient_step: float = 0.05
+    work: Work = Work()
 
     @property
     def longest_step(self) -> float:

@@ -173,7 +173,8 @@ def _needed(
     if coarse is None:
         return current
     problem = to_search(current.fit.problem, coarse)
-    for fitted in _fitted(problem, current, coarse):
+    same = in_steps_of(problem, current)
+    for fitted in _fitted(problem, current, coarse, same.fit.objective):
         found = Explanation((*current.causes, *causes), fitted)
         # Beside so many others an effect of implausible size stands in for something else.
         wild: list[CauseId] = [name for name in causes if beyond_plausible(fitted, name)]
@@ -191,7 +192,6 @@ def _needed(
         # The linear model does not hold as far as the values at which they are off.
         report(f"fitting again with {listed(name for name in idle if name not in wild)}")
         found = whole.varied(beside_misfit=True, dropped=wild)
-    same = in_steps_of(problem, current)
     if found.score < same.score - POLICY.evidence_doubt and not implausible_estimates(found.fit):
         return found
     # Long steps may get more wrong than what is missing does.
@@ -203,13 +203,22 @@ def _confusable(current: Explanation, cause: CauseId) -> tuple[str, ...]:
     return () if isinstance(cause, Coefficient) else known[cause].confusable_with
 
 
-def _fitted(problem: Problem, current: Explanation, coarse: CoarseFit) -> Iterator[Fit]:
-    """Full fits from a coarse one, with the noise that they leave.
+def _fitted(
+    problem: Problem, current: Explanation, coarse: CoarseFit, enough: float
+) -> Iterator[Fit]:
+    """Full fits from a coarse one, with the noise that they leave, that explain enough.
 
     What a coarse fit on a few runs makes of the parameters that were known before may be worse on
     all of them than they were, and so may the further effects. Then they begin where they hardly
     act, which may lead nowhere: a lag that long steps do not follow stays off. The next fit begins
-    from the sizes of the coarse one all the same.
+    from the sizes of the coarse one all the same. One that explains less than there was without
+    these effects has lost its way.
+
+    Args:
+        problem: the runs, in the steps of the fits.
+        current: causes accepted so far.
+        coarse: with further effects.
+        enough: objective without these.
     """
     own = current.fit
     faint = Point(own.point.z, {**problem.beginning(coarse.effects), **own.point.effects})
@@ -221,8 +230,9 @@ def _fitted(problem: Problem, current: Explanation, coarse: CoarseFit) -> Iterat
     best, second, _ = sorted((coarse.point, as_known, faint), key=left)
     for begin in (best, second) if best is faint else (best,):
         start = (coarse.effects, begin, own.noise, coarse.released)
-        fitted = reached(partial(fit, problem, *start, rounds=2, iterations=FEWER_STEPS))
-        if fitted is not None:
+        more = partial(fit, problem, *start, iterations=FEWER_STEPS, give_up_above=enough)
+        fitted = reached(partial(more, rounds=2))
+        if fitted is not None and fitted.objective < enough:
             yield fitted
 
 

@@ -56,6 +56,7 @@ class Result:
         residual: model of what no known cause explains; None where nothing is left, or where the
             vehicle has no such model.
         budget: where the misfit of the nominal model goes; None where it has none.
+        cut_short: whether the search ended because so much had been simulated.
     """
 
     attribution: Attribution
@@ -65,6 +66,7 @@ class Result:
     gap: ClosedGap | None = None
     residual: ResidualModel | None = None
     budget: Budget | None = None
+    cut_short: bool = False
 
     @property
     def baseline(self) -> Fit:

@@ -70,6 +70,16 @@ def test_where_nothing_is_to_be_gained_it_ends_soon():
     assert len(asked) <= 5
 
 
+def test_a_disturbance_that_belongs_beyond_its_bound_is_known_at_once():
+    """Where all the other numbers would be the likeliest is then of no use."""
+    asked: list[NoiseModel] = []
+    most = disturbance_range(load_fish("msu-tail-fish"))
+    start = NoiseModel(np.array([0.001]), most.force[1], 1e-4, 1.0)
+    found = fit_noise(toy((1.0, 1e-4, 1.0), asked=asked), start, most, to_the_end=False)
+    assert found.force_sd == pytest.approx(start.force_sd)
+    assert len(asked) == 2
+
+
 def test_beside_a_simulation_that_diverges_the_noise_stays_as_it_is():
     """And nothing is printed about numbers that overflow."""
     start, plain = NoiseModel(np.array([0.001]), 3e-3, 1e-4, 1.0), toy((0.02, 3e-4, 0.4))

@@ -65,9 +65,9 @@ class Differing(Numbered):
         return [Evaluated(float(-0.5 * row @ row), row) for row in rows]
 
 
-def descended(problem, iterations=8, start=0.0):
+def descended(problem, iterations=8, start=0.0, give_up_above=np.inf):
     slopes = Slopes(Free(problem, (), ()), Spreading())
-    return descend_jointly(problem, slopes, np.array([start]), iterations, 0.01)
+    return descend_jointly(problem, slopes, np.array([start]), iterations, 0.01, give_up_above)
 
 
 def likelihood_of(problem, vector):
@@ -101,6 +101,14 @@ def test_own_numbers_are_the_best_predictions():
         y, left = problem.y[r], problem.data[r] - vector[0] * problem.x[r]
         exact = np.linalg.solve(y.T @ y + np.eye(2), y.T @ left)
         assert moved.own[r] == pytest.approx(exact, rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize(("beyond", "steps"), [(10.0, True), (-40.0, False)])
+def test_it_gives_up_where_the_value_with_the_numbers_integrated_out_stays_above(beyond, steps):
+    """That is the value it returns, dozens above the one at the likeliest numbers."""
+    _, best, least, _, _ = descended(Differing())
+    _, vector, _, _, _ = descended(Differing(), 1, give_up_above=least + beyond)
+    assert vector == pytest.approx(best if steps else 0.0, abs=1e-3)
 
 
 def test_turns_explain_the_one_by_the_other():

@@ -71,7 +71,8 @@ def descend_jointly(
         model = Model(slopes, at, near)
         predicted = at.value - model.foreseen(*model.step(0.0))
         # What promised more than it kept will do so again.
-        if at.value - left * kept * predicted > give_up_above:
+        least = at.marginal_value(model.own) if np.isfinite(give_up_above) else -np.inf
+        if least - left * kept * predicted > give_up_above:
             break
         better, used = None, first
         if predicted >= tolerance**2:

@@ -40,7 +40,7 @@ simulation's step, or a limit on something that jumps."""
 ALIKE = 0.1
 REFITS = 2
 NEAR = 0.2
-"""Coefficients that move by less, in prior standard deviations, stay on the tangent."""
+"""Coefficients that move by less, in prior standard deviations, stay on the tangent there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,13 +202,18 @@ def changes(fit: Fit, jobs: Jobs) -> FloatArray:
     start = np.repeat(fit.point.z[:, None], len(jobs), axis=1)
     seen = residual_changes(fit, jobs, start).T
     followed = projector.coefficients(seen.T)[: len(start)]
-    far = np.flatnonzero(np.abs(followed).max(axis=0) > NEAR).tolist()
-    for _ in range(REFITS if far else 0):
+    far = np.flatnonzero(np.abs(followed).max(axis=0) > NEAR)
+    for _ in range(REFITS):
+        if not far.size:
+            break
         there = np.array([own.bounds.clip(z) for z in (start[:, far] - followed[:, far]).T]).T
-        moved = residual_changes(fit, [jobs[i] for i in far], there).T
+        moved = residual_changes(fit, [jobs[i] for i in far.tolist()], there).T
         moved -= (projector.lin.slopes[:, : len(start)] @ (there - start[:, far])).T
         seen[far] = np.where(np.isfinite(moved), moved, seen[far])
-        followed[:, far] = projector.coefficients(seen[far].T)[: len(start)]
+        on = projector.coefficients(seen[far].T)[: len(start)]
+        further = np.abs(on - followed[:, far]).max(axis=0) > NEAR
+        followed[:, far] = on
+        far = far[further]
     return seen
 
 

@@ -155,7 +155,7 @@ class DecisionPolicy(Numbers):
     coarse_fit_leeway: float = number(100.0, 0.0, 1e4, EFFORT)
     out_of_reach: float = number(1000.0, 0.0, 1e5, EFFORT)
     most_passes: float = number(
-        12_000.0, 1.0, 1e12, "four times what eight runs of 30 s with one cause take"
+        10_000.0, 1.0, 1e12, "three times what eight runs of 30 s with one cause take"
     )
     aic_penalty: float = number(2.0, 0.0, 10.0, AKAIKE)
     sure_sd: float = number(10.0, 5.0, 100.0, EFFORT)

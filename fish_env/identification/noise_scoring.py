@@ -21,6 +21,7 @@ from functools import partial
 import numpy as np
 
 from fish_env.arrays import FloatArray
+from fish_env.identification.noise_information import products_of_changes
 from fish_env.inference.estimate.box_qp import minimise_in_box
 from fish_env.inference.parallel import side_by_side
 
@@ -169,25 +170,16 @@ def _system(
     replay: Callable[[FloatArray], Replayed], at: FloatArray, here: Replayed, upper: FloatArray
 ) -> System:
     """Score and information about parameters, by differences."""
-    factor = np.linalg.inv(here.whitening)
-    eye = np.eye(factor.shape[1])
-
-    def moved(i: int) -> tuple[float, FloatArray, FloatArray, FloatArray]:
-        """How likelihood, means and spreads of innovations change with one parameter."""
-        by = STEP if at[i] + STEP <= upper[i] else -STEP
-        there = replay(np.where(np.arange(len(at)) == i, at + by, at))
-        score = (there.log_likelihood - here.log_likelihood) / by
-        # Both seen in the whitened coordinates of the present noise model.
-        back = (eye - there.whitening @ factor) / by
-        spread = back + back.transpose(0, 2, 1)
-        seen = np.einsum("tij,tj->ti", spread, here.innovations)
-        shift = (there.innovations - here.innovations) / by
-        mean = shift + np.einsum("tij,tj->ti", back, there.innovations)
-        return score, mean.ravel(), spread.ravel(), seen.ravel()
-
-    found = side_by_side([partial(moved, i) for i in range(len(at))])
-    score = np.array([score for score, *_ in found])
-    means, spreads, seen = (np.array(rows) for rows in list(zip(*found, strict=True))[1:])
+    count = len(at)
+    by = np.where(at + STEP <= upper, STEP, -STEP)
+    moved = [np.where(np.arange(count) == i, at + by, at) for i in range(count)]
+    found = side_by_side([partial(replay, x) for x in moved])
+    score = np.array([there.log_likelihood - here.log_likelihood for there in found]) / by
     # A parameter that nothing depends on stays where it is.
-    shared = means @ means.T + 1e-6 * np.eye(len(at))
-    return System(score, 0.5 * spreads @ spreads.T + shared, 0.5 * seen @ seen.T + shared)
+    shared, spreads, seen = 1e-6 * np.eye(count), np.zeros((count, count)), np.zeros((count, count))
+    products_of_changes(
+        here.innovations, np.ascontiguousarray(here.whitening),
+        np.array([there.innovations for there in found]),
+        np.array([there.whitening for there in found]), by, shared, spreads, seen,
+    )  # fmt: skip
+    return System(score, 0.5 * spreads + shared, 0.5 * seen + shared)

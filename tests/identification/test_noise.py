@@ -15,6 +15,7 @@ from fish_env.identification.noise import (
     fitted_noise,
     white_noise_sd,
 )
+from fish_env.identification.noise_information import products_of_changes
 from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.noise_scoring import Replayed, System
 from fish_env.identification.series import SeriesProblem
@@ -203,3 +204,23 @@ def test_curvature_that_the_information_leaves_out_is_learnt():
     assert not system.believes(-np.eye(4)), "nothing rises towards a minimum"
     again = system.unseen(unseen, step, whole @ step)
     np.testing.assert_allclose(again, unseen, atol=1e-9, err_msg="nothing is left to learn")
+
+
+def test_products_of_changes_are_those_of_arrays():
+    """As arrays: changes in the whitened coordinates of the present noise model, then products."""
+    rng, samples, channels = np.random.default_rng(0), 40, 4
+    by = np.array([1e-3, -1e-3, 1e-3])
+    here = rng.standard_normal((samples, channels))
+    factors = np.eye(channels) + 0.2 * np.tril(rng.standard_normal((samples, channels, channels)))
+    there = here + 1e-3 * rng.standard_normal((3, *here.shape))
+    moved = factors + 1e-3 * np.tril(rng.standard_normal((3, *factors.shape)))
+    found = [np.zeros((3, 3)) for _ in range(3)]
+    products_of_changes(here, factors, there, moved, by, *found)
+
+    back = (np.eye(channels) - moved @ np.linalg.inv(factors)) / by[:, None, None, None]
+    mean = (there - here) / by[:, None, None] + np.einsum("mtij,mtj->mti", back, there)
+    spread = back + back.swapaxes(2, 3)
+    seen = np.einsum("mtij,tj->mti", spread, here)
+    for products, changes in zip(found, (mean, spread, seen), strict=True):
+        rows = changes.reshape(3, -1)
+        np.testing.assert_allclose(products, rows @ rows.T, rtol=1e-9)

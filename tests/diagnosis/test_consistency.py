@@ -80,7 +80,7 @@ def test_a_wrong_clock_is_not_a_wrong_metre():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("colour", [0.0, 1.0])
+@pytest.mark.parametrize("colour", [0.0, pytest.param(1.0, marks=pytest.mark.long)])
 def test_consistent_channels_agree_whatever_the_colour_of_the_noise(colour):
     """Of 40 sets some 8 may stand out at 20 %, hardly one at 1 %."""
     smallest = []

@@ -241,7 +241,7 @@ def test_what_was_put_right_is_noted_with_the_data():
     assert check_module.without(found.dataset, ["r"]).channels[-1] == "q"
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.long)])
 def test_noise_in_place_of_measurements_is_no_wrong_unit(seed):
     """Positions that are nothing but noise look fast, as centimetres for millimetres would."""
     rng = np.random.default_rng(seed)

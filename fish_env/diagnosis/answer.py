@@ -210,10 +210,10 @@ def _cut_short(diagnosis: Diagnosis) -> list[str]:
     """That the search did not come to an end of its own."""
     if not diagnosis.cut_short:
         return []
-    passes = round(diagnosis.problem.work.passes, -2)
     return [
-        f"The search for causes was ended after the runs had been simulated {passes:,.0f} times. "
-        "More causes may act. Diagnose again with --patient to search without this limit."
+        "No further search for causes began after all runs had been simulated "
+        f"{POLICY.most_passes:,.0f} times. More causes may act. Diagnose again with --patient to "
+        "search without this limit."
     ]
 
 

@@ -79,7 +79,8 @@ def diagnose(
         progress: told the name of each step.
         measured_beats: take the tail's frequencies from the hull's swaying, not from the commands.
         trust_effects: run the effect files that the fish's file names, see ``load_fish``.
-        patient: search without a limit on how often the runs are simulated.
+        patient: search without a limit on how often the runs are simulated; quick mode and tables
+            have none.
 
     Returns:
         The content of ``diagnosis.json``.
@@ -146,7 +147,8 @@ def diagnose_runs(
         seed: of the split and of the null distributions.
         quick: quick mode, which leaves out what :data:`~fish_env.inference.effort.QUICK` says.
         progress: told the name of each step.
-        patient: search without a limit on how often the runs are simulated.
+        patient: search without a limit on how often the runs are simulated; quick mode and tables
+            have none.
 
     Raises:
         DatasetError: no diagnosis should be built on these runs.

@@ -1,7 +1,7 @@
 """Products of what changes of a noise model change in innovations, compiled.
 
-A fit of the noise forms them some dozens of times from thousands of samples. As arrays they took
-longer than the replays that they come from.
+A fit of the noise forms them some dozens of times from thousands of samples, and hardly needs the
+changes themselves.
 """
 
 from __future__ import annotations

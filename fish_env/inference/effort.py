@@ -79,7 +79,7 @@ TABLE_LEFT_OUT = (QUICK.left_out[1], "restarts from the best cause, weaker cause
 
 
 def effort_of(quick: bool, patient: bool = False) -> Effort:
-    """The effort of quick mode, of a patient diagnosis, or else of a full one."""
+    """The effort of quick mode, which is never long, of a patient diagnosis, or of a full one."""
     if quick:
         return QUICK
     return PATIENT if patient else FULL

@@ -33,7 +33,7 @@ Quick = Annotated[
 ]
 Patient = Annotated[
     bool,
-    typer.Option("--patient", help="Search on where the search would end for its length."),
+    typer.Option("--patient", help="Search without a limit on the number of simulations."),
 ]
 Seed = Annotated[int, typer.Option(min=0, help="Seed of all random numbers.")]
 MeasuredBeats = Annotated[

@@ -159,8 +159,8 @@ def _seen(problem: SeriesProblem, differ: bool) -> OwnBeats:
     if not (differ or _differ(gains.values())):
         return OwnBeats(drive, gains=gains, left=least)
     if drive.effects and not drive.certain:
-        # What runs differ by may look like a law of their beats.
-        return _seen(problem.with_drive(TailDrive()), differ=True)
+        # What runs differ by may look like a law of their beats, and a wrong law makes runs differ.
+        return _seen(problem.with_drive(TailDrive()), differ)
     return replace(
         _sagging(free.with_drive(replace(drive, uneven=True)), found), gains=gains, left=least
     )

@@ -175,6 +175,15 @@ def test_a_doubtful_law_of_the_beat_is_left_to_the_runs(dataset, certain):
     assert ("beat_load" in beats.drive.effects) == certain
 
 
+def test_runs_do_not_differ_because_a_doubtful_law_of_the_beat_is_wrong(dataset):
+    """By the law each run beats otherwise than commanded; without it all beat as they are told."""
+    law = {SCALE: 1.012, EffectParameterId("beat_load", "load"): 0.01}
+    found = own_beats(SeriesProblem(dataset).with_drive(tail_drive(law, certain=False)))
+    assert found.own == {}
+    assert found.drive.effects == frozenset()
+    assert found.drive.scale == pytest.approx(1.0, abs=1e-3)
+
+
 def test_beginnings_that_mislead_do_not_decide(dataset):
     """A comb about their frequency would end before that of most of the time."""
     runs = []

@@ -207,7 +207,7 @@ def _diagnose_runs(
         consistency=agreed, problem=problem, attribution=found.attribution, adequacy=found.adequacy,
         preconditions=found.preconditions, verdict=found.verdict, localisation=place,
         misfit=misfit_of(problem, judged), gain=gain, residual=residual, next_experiment=proposal,
-        budget=found.budget, cut_short=found.cut_short, seed=seed, quick=effort is QUICK,
+        budget=found.budget, seed=seed, quick=effort is QUICK,
         runtime_s=time.perf_counter() - begin,
     )  # fmt: skip
 

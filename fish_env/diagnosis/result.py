@@ -76,7 +76,6 @@ class Diagnosis(Diagnosed):
         problem: the others.
         localisation: where in the regime the baseline's misfit sits.
         residual: what no known cause explains, as a sum of simple wrenches, if it can be so told.
-        cut_short: whether the search ended because so much had been simulated.
     """
 
     dataset: Dataset
@@ -88,7 +87,11 @@ class Diagnosis(Diagnosed):
     problem: SeriesProblem
     localisation: Localisation
     residual: ResidualModel | None
-    cut_short: bool = False
+
+    @property
+    def cut_short(self) -> bool:
+        """Whether the search ended because so much had been simulated."""
+        return self.problem.work.cut_short
 
     @property
     def left_out(self) -> tuple[str, ...]:

@@ -80,11 +80,10 @@ def climb(
     last: tuple[FloatArray, FloatArray] | None = None
     unseen = np.zeros((len(at), len(at)))
     for _ in range(MOST_STEPS):
-        # One difference each tells that; all that follows takes one for every parameter.
-        if any(_pushes_beyond(replay, at, here, upper, i) for i in range(watched)):
-            break
         with np.errstate(over="ignore", invalid="ignore"):
-            system = _system(replay, at, here, upper)
+            system = _system(replay, at, here, upper, watched)
+        if system is None:
+            break
         if not np.isfinite(system.average).all():
             break  # the simulation has all but diverged: no noise model makes up for that
         low, high = np.maximum(lower - at, -LONGEST), np.minimum(upper - at, LONGEST)
@@ -152,34 +151,35 @@ class System:
         return float(self.score @ step - 0.5 * step @ self.expected @ step)
 
 
-def _pushes_beyond(
+def _system(
     replay: Callable[[FloatArray], Replayed],
     at: FloatArray,
     here: Replayed,
     upper: FloatArray,
-    i: int,
-) -> bool:
-    """Whether a parameter belongs beyond the bound that it is at."""
-    if at[i] < upper[i]:
-        return False
-    there = replay(np.where(np.arange(len(at)) == i, at - STEP, at))
-    return here.log_likelihood - there.log_likelihood > BEYOND * STEP
+    watched: int,
+) -> System | None:
+    """Score and information about parameters, by differences.
 
-
-def _system(
-    replay: Callable[[FloatArray], Replayed], at: FloatArray, here: Replayed, upper: FloatArray
-) -> System:
-    """Score and information about parameters, by differences."""
+    None where one of the watched parameters belongs beyond its bound: one difference tells that,
+    and all the others are then of no use.
+    """
     count = len(at)
     by = np.where(at + STEP <= upper, STEP, -STEP)
-    moved = [np.where(np.arange(count) == i, at + by, at) for i in range(count)]
-    found = side_by_side([partial(replay, x) for x in moved])
-    score = np.array([there.log_likelihood - here.log_likelihood for there in found]) / by
+    moved = [partial(replay, np.where(np.arange(count) == i, at + by, at)) for i in range(count)]
+    found: dict[int, Replayed] = {}
+    for i in np.flatnonzero((at >= upper)[:watched]).tolist():
+        found[i] = moved[i]()
+        if here.log_likelihood - found[i].log_likelihood > BEYOND * STEP:
+            return None
+    rest = [i for i in range(count) if i not in found]
+    found |= zip(rest, side_by_side([moved[i] for i in rest]), strict=True)
+    there = [found[i] for i in range(count)]
+    score = np.array([one.log_likelihood - here.log_likelihood for one in there]) / by
     # A parameter that nothing depends on stays where it is.
     shared, spreads, seen = 1e-6 * np.eye(count), np.zeros((count, count)), np.zeros((count, count))
     products_of_changes(
         here.innovations, np.ascontiguousarray(here.whitening),
-        np.array([there.innovations for there in found]),
-        np.array([there.whitening for there in found]), by, shared, spreads, seen,
+        np.array([one.innovations for one in there]),
+        np.array([one.whitening for one in there]), by, shared, spreads, seen,
     )  # fmt: skip
     return System(score, 0.5 * spreads + shared, 0.5 * seen + shared)

@@ -73,7 +73,7 @@ QUICK = Effort(
     ),
 )
 CUT_SHORT = ("further searches for causes",)
-"""What is left out where so much was simulated that no search began any more."""
+"""What a diagnosis leaves out whose search was cut short."""
 TABLE_LEFT_OUT = (QUICK.left_out[1], "restarts from the best cause, weaker causes", PICTURES)
 """What quick mode leaves out of a table of averages: it uses all conditions."""
 

@@ -144,7 +144,7 @@ def investigate(
         verdict = without_minor(verdict, budget.minor(slow=problem.out_of_step))
     if effort.retries:
         attribution, verdict = among_small_errors(attribution, verdict)
-    return Result(attribution, left, shown, verdict, gap, residual, budget, work.cut_short)
+    return Result(attribution, left, shown, verdict, gap, residual, budget)
 
 
 def among_small_errors(attribution: Attribution, verdict: Verdict) -> tuple[Attribution, Verdict]:

@@ -230,8 +230,9 @@ def _fitted(
     best, second, _ = sorted((coarse.point, as_known, faint), key=left)
     for begin in (best, second) if best is faint else (best,):
         start = (coarse.effects, begin, own.noise, coarse.released)
-        more = partial(fit, problem, *start, iterations=FEWER_STEPS, give_up_above=enough)
-        fitted = reached(partial(more, rounds=2))
+        fitted = reached(
+            partial(fit, problem, *start, rounds=2, iterations=FEWER_STEPS, give_up_above=enough)
+        )
         if fitted is not None and fitted.objective < enough:
             yield fitted
 

@@ -56,7 +56,6 @@ class Result:
         residual: model of what no known cause explains; None where nothing is left, or where the
             vehicle has no such model.
         budget: where the misfit of the nominal model goes; None where it has none.
-        cut_short: whether the search ended because so much had been simulated.
     """
 
     attribution: Attribution
@@ -66,7 +65,6 @@ class Result:
     gap: ClosedGap | None = None
     residual: ResidualModel | None = None
     budget: Budget | None = None
-    cut_short: bool = False
 
     @property
     def baseline(self) -> Fit:
@@ -77,6 +75,11 @@ class Result:
     def accepted(self) -> Fit:
         """The accepted fit: with causes, or the refitted baseline."""
         return self.attribution.accepted.fit
+
+    @property
+    def cut_short(self) -> bool:
+        """Whether the search ended because so much had been simulated."""
+        return self.baseline.problem.work.cut_short
 
     def estimates(self) -> dict[ParameterId, Estimate]:
         """Parameters of the verdict's causes."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from fish_env.identification.filter_algebra import BASE, PHASE
 from fish_env.identification.state_blocks import PHASE_COLUMN
+from fish_env.identification.vectors import lanes_at_once
 
 # --- completed by compose ---
 from fish_env.model.composed import (
@@ -44,7 +45,7 @@ from fish_env.model.history import HEARD, RECORD
 # --- end ---
 
 BLOCK = 24  # lanes: a fish's coefficients, an effect or two; 20 states; whole vector registers
-VECTOR = 4  # lanes that processors compute at once: part of a vector takes as long as all of it
+VECTOR = lanes_at_once()  # more lanes are computed in whole vectors
 WRENCH = PAR + N_PARAMETERS - 6
 MOST_SWING = 1.2  # swing of a soft tail over the told one, below its resonance
 TOLD_PHASE = 1 + HEARD.index("phase")  # its row in a slot of a history

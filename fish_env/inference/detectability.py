@@ -130,8 +130,8 @@ def simulated(fit: Fit, screen: Screen, settings: Sequence[Setting]) -> FloatArr
         corrected = np.where(moving, np.maximum(at * np.exp(steps), lowest), at)
         moving &= np.abs(np.log(corrected / at)) > TOLERANCE
         at = corrected
-    energy = _energies(fit, screen, settings, probe, endless)
-    twice = _energies(fit, screen, settings, 2.0 * probe, endless)
+    both = np.concatenate([probe, 2.0 * probe])
+    energy, twice = np.split(_energies(fit, screen, [*settings] * 2, both, np.tile(endless, 2)), 2)
     fades = _power(probe, energy, 2.0 * probe, twice) >= FADING
     from_probe = np.where(fades, np.sqrt(target / energy), 1.0)
     return np.where(endless, np.maximum(np.where(least > 0.0, 0.0, from_probe), least), at)

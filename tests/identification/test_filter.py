@@ -12,7 +12,6 @@ from fish_env.identification import SeriesProblem
 from fish_env.identification.jitter import channel_rates
 from fish_env.identification.open_loop import errors
 from fish_env.identification.phases import settle_phases
-from fish_env.inference.estimate import products
 from fish_env.inference.estimate.free import Free, linearise
 from fish_env.inference.hypotheses import EffectParameterId, effects_of
 from fish_env.inference.problem import Point
@@ -192,14 +191,6 @@ def test_effects_that_are_off_change_no_bit():
     beside = problem.innovations(z, lanes, setup.noise, alone)
     np.testing.assert_array_equal(beside[0], plain[0])
     assert np.all(np.any(beside[1:] != plain[1:], axis=1))
-
-
-def test_products_of_tall_matrices_do_not_depend_on_how_many_blocks_are_held():
-    rng = np.random.default_rng(0)
-    a, b = rng.standard_normal((1000, 7)), rng.standard_normal((1000, 5))
-    whole = products.inner(a, b)
-    np.testing.assert_array_equal(products.inner(a, b, at_once=100), whole)
-    np.testing.assert_allclose(whole, a.T @ b, rtol=1e-12, atol=1e-12)
 
 
 def test_a_replayed_noise_model_has_the_filters_likelihood():

@@ -76,8 +76,12 @@ def block_index(
 
 
 def sums_over(index: IntArray, scores: FloatArray) -> FloatArray:
-    """Scores (D, m) summed over the blocks of an index (D,), shape (blocks, m)."""
-    return np.column_stack([np.bincount(index, weights=column) for column in scores.T])
+    """Scores (D, m) summed over the blocks of an index (D,), as many as there are, (blocks, m)."""
+    if np.any(index[1:] < index[:-1]):
+        order = np.argsort(index, kind="stable")
+        index, scores = index[order], scores[order]
+    firsts = np.flatnonzero(np.diff(index, prepend=-1))
+    return np.asarray(np.add.reduceat(scores, firsts, axis=0))
 
 
 def eliminated(hessian: FloatArray, own: IntArray) -> tuple[IntArray, FloatArray, FloatArray]:

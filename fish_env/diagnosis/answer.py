@@ -67,6 +67,8 @@ def as_dict(diagnosis: Diagnosis) -> Plain:
             *_cut_short(diagnosis),
         ],
     }
+    if diagnosis.inputs.silent:  # what a fit to noise needs says nothing of the fish
+        return {**answer, "unexplained": [], "implausible": [], "doubts": []}
     return {**answer, "doubts": doubts(answer)}
 
 

@@ -69,6 +69,8 @@ def _verdict(answer: Answer) -> str:
     if answer["verdict"] == "inputs":
         faults = [fault for fault in answer.get("inputs", ()) if fault["decisive"]]
         told = " ".join(fault["words"].partition(" Write ")[0] for fault in faults)
+        if faults and not any(fault["fix"] for fault in faults):
+            return told
         rest = _verdict({**answer, "verdict": answer.get("verdict_once_corrected", "no_misfit")})
         return f"{told or 'The data or their description are wrong.'} Once corrected: {rest}"
     named = _named(answer["causes"])
@@ -174,7 +176,9 @@ def _next_step(answer: Answer) -> str:
         written = "; ".join(f"`{fix}`" for fix in fixes)
         if len(written) > LONGEST_FIX:
             written = "`fix` under `inputs` in diagnosis.json"
-        return f"write {written or 'the correct values'} into dataset.yaml and diagnose again."
+        if not written:
+            return "check the sensors and the columns of the log, and measure again."
+        return f"write {written} into dataset.yaml and diagnose again."
     if answer.get("quick") and verdict in ("outside_library", "partial"):
         return "diagnose again without --quick."
     if verdict == "ambiguous":

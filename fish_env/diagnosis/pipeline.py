@@ -174,7 +174,7 @@ def _diagnose_runs(
     progress("comparing the beats of the runs")
     every = SeriesProblem(dataset, fish, dt=effort.step_s, most_passes=effort.most_passes)
     every = every.with_drive(tail_drive(inputs.drive, inputs.drive_certain))
-    if effort.retries:
+    if effort.retries and not inputs.silent:
         every, outliers = without_model_outliers(every, outliers)
         every = with_own_beats(every, own_beats(every, inputs.beats_corrected))
     chosen = _named(every, fitted)
@@ -185,8 +185,9 @@ def _diagnose_runs(
     compare = partial(_compared, dataset, seed)
     baseline, (floors, agreed) = both(partial(_refitted, problem), compare)
     problem = series_of(baseline)  # with the tail phases settled
+    causes = [] if inputs.silent else causes_of(problem)
     found = investigate(
-        baseline, causes_of(problem), np.random.default_rng(seed), effort, progress, judging,
+        baseline, causes, np.random.default_rng(seed), effort, progress, judging,
         residual_model,
     )  # fmt: skip
     gain, baseline = None, found.attribution.baseline.fit

@@ -16,12 +16,13 @@ class InputFault:
 
     Attributes:
         kind: "sign", "unit", "swap", "frame", "offset", "clock", "clock_skew", "clock_offset",
-            "beat" or "derived".
+            "beat", "derived" or "silence".
         target: columns, or the clock, that it is about.
         value: sign, factor, scale or offset that puts it right; None where there is no number.
         unit: of the value.
         interval: 95 % interval of the value; None where it is exact.
-        p: bound on the probability of as much evidence by chance, over all tests that were made.
+        p: bound on the probability of as much evidence by chance, over all tests that were made; of
+            silence, that noise alone shows as strong a sign of motion.
         log_evidence: log likelihood that putting it right gains; None where p is from a test.
         fix: the line of the description to write; empty where the vehicle itself does so.
         words: what is wrong, a clause.

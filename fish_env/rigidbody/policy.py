@@ -26,6 +26,8 @@ class RecordingPolicy(Numbers):
         fewest_noise_samples: samples that a channel needs for any statement on its noise.
         declared_too_large: estimated over declared noise below which the declared cannot be right.
         declared_too_small: estimated over declared noise above which the declared cannot be right.
+        white_lags: numbers of samples, from 1 on, over which a channel is compared with itself.
+        silent_level: probability by white noise alone from which on no channel shows a motion.
         fewest_derived_samples: samples from which a channel can be recognised as derived.
         own_noise: share of its noise that an independent channel keeps, whatever filter of others
             is taken off it.
@@ -53,6 +55,8 @@ class RecordingPolicy(Numbers):
     fewest_noise_samples: int = number(12, 5, 1000, BY_HAND)
     declared_too_large: float = number(0.85, 0.1, 1.0, BY_HAND)
     declared_too_small: float = number(1.3, 1.0, 10.0, BY_HAND)
+    white_lags: int = number(32, 2, 1000, f"a beat or more; {BY_HAND}")
+    silent_level: float = number(0.01, 1e-6, 0.5, "share of noise that is searched")
     fewest_derived_samples: int = number(200, 20, 10_000, BY_HAND)
     own_noise: float = number(0.25, 0.0, 1.0, BY_HAND)
     fewest_interpolated_samples: int = number(60, 20, 1000, "ten for each weight and more")

@@ -9,6 +9,7 @@ import pytest
 import yaml
 
 from fish_env.data import Dataset, load_dataset, write_dataset
+from fish_env.diagnosis.answer import as_dict
 from fish_env.diagnosis.headline import headline
 from fish_env.diagnosis.inputs import check as check_module
 from fish_env.diagnosis.inputs.changes import Change
@@ -16,6 +17,7 @@ from fish_env.diagnosis.inputs.check import check_inputs, refuse_wrong_inputs
 from fish_env.diagnosis.inputs.lines import Lines
 from fish_env.diagnosis.inputs.search import Found, search
 from fish_env.diagnosis.inputs.weighing import Scales
+from fish_env.diagnosis.pipeline import diagnose_runs
 from fish_env.diagnosis.report.measurements import input_checks
 from fish_env.errors import DatasetError
 from fish_env.params import load_fish
@@ -241,13 +243,44 @@ def test_what_was_put_right_is_noted_with_the_data():
     assert check_module.without(found.dataset, ["r"]).channels[-1] == "q"
 
 
+def noise_in_place_of(dataset, seed):
+    """The same runs and commands; channels hold white noise."""
+    rng = np.random.default_rng(seed)
+    runs = tuple(
+        replace(run, channels={n: rng.normal(0.0, 0.3, a.shape) for n, a in run.channels.items()})
+        for run in dataset.runs
+    )
+    return replace(dataset, runs=runs)
+
+
 @pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.long)])
 def test_noise_in_place_of_measurements_is_no_wrong_unit(seed):
     """Positions that are nothing but noise look fast, as centimetres for millimetres would."""
-    rng = np.random.default_rng(seed)
-    data = simulate(Setup(runs=8, duration=30.0))
-    runs = [
-        replace(run, channels={n: rng.normal(0.0, 0.3, v.shape) for n, v in run.channels.items()})
-        for run in data.runs
-    ]
-    assert check_inputs(replace(data, runs=tuple(runs))).faults == ()
+    noise = noise_in_place_of(simulate(Setup(runs=8, duration=30.0)), seed)
+    found, _ = search(noise, Scales(load_fish(noise.fish)))
+    assert found == []
+
+
+def test_runs_of_noise_only_are_no_matter_of_the_model():
+    moving = simulate(Setup())
+    assert not check_inputs(moving).silent
+    found = check_inputs(noise_in_place_of(moving, 5))
+    assert found.silent
+    assert found.binding
+    assert "No channel shows a motion" in found.faults[0].said
+    with pytest.raises(DatasetError, match="sensors were on"):
+        refuse_wrong_inputs(noise_in_place_of(moving, 5))
+
+
+def test_no_cause_is_searched_for_in_noise():
+    dataset = noise_in_place_of(simulate(Setup()), 5)
+    answer = as_dict(diagnose_runs(dataset, quick=True))
+    assert answer["verdict"] == "inputs"
+    assert not answer["causes"]
+    assert not answer["ranking"]
+    assert not answer["unexplained"]
+    assert not answer["doubts"]
+    said = headline(answer)
+    assert said.verdict.startswith("No channel shows a motion")
+    assert "Once corrected" not in said.verdict
+    assert "measure again" in said.next_step

@@ -30,7 +30,10 @@ from fish_env.params.io import load_fish
 from fish_env.params.schema import FishParams
 from fish_env.rigidbody.derived import Derived, derived_channels
 from fish_env.rigidbody.noise_floor import noise_floors
+from fish_env.rigidbody.policy import RECORDINGS
+from fish_env.rigidbody.silence import sign_of_motion
 
+SILENCE = "silence"
 TIMES = ("clock", "clock_skew", "beat")
 PACES = ("frequency_scale", "clock_scale", "clock_skew")
 """Effects by which a fish makes another frequency of the commanded one."""
@@ -61,6 +64,11 @@ class Inputs:
         return any(fault.binds for fault in self.faults)
 
     @property
+    def silent(self) -> bool:
+        """Whether no channel shows any motion: then there is nothing to explain."""
+        return any(fault.kind == SILENCE for fault in self.faults)
+
+    @property
     def beats_corrected(self) -> bool:
         """Whether commands were put right by beats that the swaying of the hull shows."""
         return any(f.kind == "beat" and f.decisive and f.corrected for f in self.faults)
@@ -73,12 +81,17 @@ class Inputs:
 def check_inputs(dataset: Dataset, fish: FishParams | None = None, seed: int = 0) -> Inputs:
     """Look for wrong signs, units, columns, frames, clocks and beats, and for derived channels.
 
+    Of runs that hold nothing but white noise, nothing else is asked.
+
     Args:
         dataset: measured runs.
         fish: the nominal fish; default: the dataset's own.
         seed: of the resampling.
     """
     logged = dataset
+    by_noise = sign_of_motion(recorded(dataset))
+    if by_noise > RECORDINGS.silent_level:
+        return Inputs((_silence(dataset, by_noise),), dataset, logged)
     floors = noise_floors(recorded(dataset))
     derived = derived_channels(recorded(dataset), floors)
     faults = [_derived_fault(one) for one in derived]
@@ -189,6 +202,18 @@ def without(dataset: Dataset, channels: Sequence[str]) -> Dataset:
 def _noted(dataset: Dataset, faults: Sequence[InputFault]) -> Dataset:
     said = tuple(f"inputs: {fault.words}" for fault in faults if fault.corrected)
     return replace(dataset, notes=(*dataset.notes, *said)) if said else dataset
+
+
+def _silence(dataset: Dataset, p: float) -> InputFault:
+    words = (
+        "no channel shows a motion: all hold white noise only, in which chance makes as strong a "
+        f"sign of one with p = {p:.2g}. So no cause was searched for. Check that the sensors were "
+        "on, and which columns dataset.yaml names"
+    )
+    return InputFault(
+        SILENCE, ", ".join(dataset.channels), None, "", None, p, None, "", words, "", None, None,
+        corrected=False,
+    )  # fmt: skip
 
 
 def _derived_fault(one: Derived) -> InputFault:

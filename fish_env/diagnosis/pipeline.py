@@ -185,11 +185,11 @@ def _diagnose_runs(
     compare = partial(_compared, dataset, seed)
     baseline, (floors, agreed) = both(partial(_refitted, problem), compare)
     problem = series_of(baseline)  # with the tail phases settled
-    causes = [] if inputs.silent else causes_of(problem)
+    # In runs of noise only there is nothing to name, and nothing to model.
+    causes, describe = ([], None) if inputs.silent else (causes_of(problem), residual_model)
     found = investigate(
-        baseline, causes, np.random.default_rng(seed), effort, progress, judging,
-        residual_model,
-    )  # fmt: skip
+        baseline, causes, np.random.default_rng(seed), effort, progress, judging, describe
+    )
     gain, baseline = None, found.attribution.baseline.fit
     if found.gap is not None and judging is not None:
         gain = measure_gain(judging, baseline, found.accepted, found.gap)

@@ -32,7 +32,8 @@ def read_arrays(content: bytes, most: int) -> dict[str, npt.NDArray[Any]]:
             archive says of its sizes.
 
     Raises:
-        ValueError, KeyError, BadZipFile: no such archive, damaged, or larger.
+        ValueError, KeyError, BadZipFile: no such archive, damaged, larger, or with two arrays of
+            one name.
     """
     arrays = dict[str, npt.NDArray[Any]]()
     with zipfile.ZipFile(io.BytesIO(content)) as archive:
@@ -45,9 +46,12 @@ def read_arrays(content: bytes, most: int) -> dict[str, npt.NDArray[Any]]:
                 raise ValueError(f"more than {most / 1e6:g} MB unpacked")
             if not member.filename.endswith(".npy"):
                 raise ValueError(f"{member.filename!r} is no array")
+            name = member.filename.removesuffix(".npy")
+            if name in arrays:  # another reader might take the other one
+                raise ValueError(f"two arrays {name!r}")
             _check_size(packed, most)
             array = np.lib.format.read_array(io.BytesIO(packed), allow_pickle=False)
-            arrays[member.filename.removesuffix(".npy")] = array
+            arrays[name] = array
     return arrays
 
 

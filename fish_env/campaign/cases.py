@@ -32,6 +32,7 @@ class Options:
         quick: a first look only.
         measured_beats: tail frequencies from the hull's swaying.
         trust_effects: run the effect files that the fish's file names.
+        patient: search without a limit.
     """
 
     fish: str | None = None
@@ -39,6 +40,7 @@ class Options:
     quick: bool = False
     measured_beats: bool = False
     trust_effects: bool = False
+    patient: bool = False
 
 
 @dataclasses.dataclass(frozen=True)
@@ -159,7 +161,9 @@ def prepare(case: Case, options: Options, folder: Path, *others: Path) -> Payloa
 
 
 def _digest(files: Iterable[Path], options: Options) -> str:
-    asked = (options.seed, options.quick, options.measured_beats)
+    asked: tuple[object, ...] = (options.seed, options.quick, options.measured_beats)
+    if options.patient:  # else as before, so that campaigns of earlier versions go on
+        asked = (*asked, "patient")
     total = hashlib.sha256(repr(asked).encode())
     for file in files:
         content = file.read_bytes() if file.is_file() else b""
@@ -179,6 +183,7 @@ def diagnosed(payload: Payload) -> Diagnosed:
         answer = diagnose(
             payload.dataset, folder, options.seed, options.quick, payload.fish,
             measured_beats=options.measured_beats, trust_effects=options.trust_effects,
+            patient=options.patient,
         )  # fmt: skip
         written = sorted(file for file in folder.rglob("*") if file.is_file())
         files = {file.relative_to(folder).as_posix(): file.read_bytes() for file in written}

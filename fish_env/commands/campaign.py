@@ -17,6 +17,7 @@ from fish_env.commands.options import (
     Json,
     MeasuredBeats,
     OtherFish,
+    Patient,
     Quick,
     Seed,
     Temp,
@@ -48,6 +49,7 @@ def campaign(
     temp: Temp = None,
     trust_effects: TrustEffects = False,
     json: Json = None,
+    patient: Patient = False,
 ) -> None:
     """Diagnose many data sets on all cores, or on the machines of a Ray cluster.
 
@@ -62,7 +64,7 @@ def campaign(
     from fish_env.cluster import ClusterSettings
     from fish_env.commands.numbers import console_for, write_json
 
-    options = Options(fish, seed, quick, measured_beats, trust_effects)
+    options = Options(fish, seed, quick, measured_beats, trust_effects, patient)
     console = console_for(json)
     if json is not None:
         _check_json(json, data, out)

@@ -62,16 +62,17 @@ def test_what_is_finished_is_read_back_without_a_cluster(data, tmp_path):
     assert [(row.name, row.state) for row in rows] == [("pool", FINISHED), ("sea", FINISHED)]
 
 
-def test_results_of_other_options_or_data_stay_and_are_a_refusal(data, tmp_path):
+@pytest.mark.parametrize("other", [Options(quick=True), Options(patient=True), Options(seed=1)])
+def test_results_of_other_options_or_data_stay_and_are_a_refusal(data, tmp_path, other):
     (case,), out = find_cases([str(data / "b/sea")]), tmp_path / "out"
-    finish(case, out, Options(quick=True))
+    finish(case, out, other)
     mark = (out / "sea" / MARK).read_bytes()
     with pytest.raises(OutputError, match="other data, another fish or with other options"):
         run_campaign([case], out, Options(), ClusterSettings())
     with (data / "b/sea/dataset.yaml").open("a") as stream:
         stream.write("# changed\n")
     with pytest.raises(OutputError, match="other data"):
-        run_campaign([case], out, Options(quick=True), ClusterSettings())
+        run_campaign([case], out, other, ClusterSettings())
     assert (out / "sea" / MARK).read_bytes() == mark
 
 

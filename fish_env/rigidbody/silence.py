@@ -16,32 +16,33 @@ from fish_env.rigidbody.policy import RECORDINGS
 from fish_env.rigidbody.recording import Recording
 
 
-def sign_of_motion(recording: Recording) -> float:
+def sign_of_motion(recording: Recording) -> float | None:
     """Probability that white noise alone has as strong a sign of motion in any channel.
 
-    One where no channel has enough samples to tell.
+    None where a channel has too few samples to tell, or only one value.
     """
-    p_values = [p for channel in recording.channels if (p := _whiteness(recording, channel)) >= 0.0]
-    return min(1.0, len(p_values) * min(p_values)) if p_values else 1.0
+    p_values = [_whiteness(recording, channel) for channel in recording.channels]
+    told = [p for p in p_values if p is not None]
+    return min(1.0, len(told) * min(told)) if told and len(told) == len(p_values) else None
 
 
-def _whiteness(recording: Recording, channel: str) -> float:
-    """P-value of a channel's correlations with itself over all runs; -1 with too few samples."""
-    lags = np.arange(1, RECORDINGS.white_lags + 1)
-    sums, pairs, square, count = np.zeros(len(lags)), np.zeros(len(lags)), 0.0, 0
+def _whiteness(recording: Recording, channel: str) -> float | None:
+    """P-value of a channel's correlations with itself over all runs; None where it tells none."""
+    lags = RECORDINGS.white_lags
+    sums, pairs, square, count = np.zeros(lags), np.zeros(lags), 0.0, 0
     for run in recording.runs:
         values = run.channels[channel]
         present = np.isfinite(values)
         if present.sum() <= RECORDINGS.fewest_noise_samples:
             continue
         left = np.where(present, values - values[present].mean(), 0.0)
-        sums += _products(left, len(lags))
-        pairs += _products(present.astype(float), len(lags))
+        sums += _products(left, lags)
+        pairs += _products(present.astype(float), lags)
         square += float(left @ left)
         count += int(present.sum())
     told = pairs > RECORDINGS.fewest_noise_samples
     if not told.any() or square == 0.0:
-        return -1.0
+        return None
     correlations = sums[told] / pairs[told] * (count / square)
     return float(chdtrc(told.sum(), (pairs[told] * correlations**2).sum()))
 

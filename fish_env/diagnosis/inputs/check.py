@@ -90,7 +90,7 @@ def check_inputs(dataset: Dataset, fish: FishParams | None = None, seed: int = 0
     """
     logged = dataset
     by_noise = sign_of_motion(recorded(dataset))
-    if by_noise > RECORDINGS.silent_level:
+    if by_noise is not None and by_noise > RECORDINGS.silent_level:
         return Inputs((_silence(dataset, by_noise),), dataset, logged)
     floors = noise_floors(recorded(dataset))
     derived = derived_channels(recorded(dataset), floors)

@@ -16,6 +16,13 @@ from fish_env.rigidbody.policy import RECORDINGS
 from fish_env.rigidbody.recording import Recording
 
 
+def is_driven(recording: Recording) -> bool:
+    """Whether something drives the vehicle for most of a run: at rest, noise is all there is."""
+    return any(
+        np.ptp(run.still_s, axis=1).sum() < 0.5 * np.ptp(run.time_s) for run in recording.runs
+    )
+
+
 def sign_of_motion(recording: Recording) -> float | None:
     """Probability that white noise alone has as strong a sign of motion in any channel.
 

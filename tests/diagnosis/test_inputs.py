@@ -272,6 +272,17 @@ def test_runs_of_noise_only_are_no_matter_of_the_model():
         refuse_wrong_inputs(noise_in_place_of(moving, 5))
 
 
+def test_a_fish_that_rests_may_hold_noise_only():
+    noise = noise_in_place_of(simulate(Setup()), 5)
+    at_rest = [replace(run, commands=resting(run.commands)) for run in noise.runs]
+    assert not check_inputs(replace(noise, runs=tuple(at_rest))).silent
+
+
+def resting(commands):
+    """The commands with a tail that does not beat, and nothing else that moves."""
+    return replace(commands, values=np.zeros_like(commands.values))
+
+
 def test_no_cause_is_searched_for_in_noise():
     dataset = noise_in_place_of(simulate(Setup()), 5)
     answer = as_dict(diagnose_runs(dataset, quick=True))

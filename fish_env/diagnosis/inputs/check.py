@@ -31,7 +31,7 @@ from fish_env.params.schema import FishParams
 from fish_env.rigidbody.derived import Derived, derived_channels
 from fish_env.rigidbody.noise_floor import noise_floors
 from fish_env.rigidbody.policy import RECORDINGS
-from fish_env.rigidbody.silence import sign_of_motion
+from fish_env.rigidbody.silence import is_driven, sign_of_motion
 
 SILENCE = "silence"
 TIMES = ("clock", "clock_skew", "beat")
@@ -81,7 +81,7 @@ class Inputs:
 def check_inputs(dataset: Dataset, fish: FishParams | None = None, seed: int = 0) -> Inputs:
     """Look for wrong signs, units, columns, frames, clocks and beats, and for derived channels.
 
-    Of runs that hold nothing but white noise, nothing else is asked.
+    Of driven runs that hold nothing but white noise, nothing else is asked.
 
     Args:
         dataset: measured runs.
@@ -89,11 +89,11 @@ def check_inputs(dataset: Dataset, fish: FishParams | None = None, seed: int = 0
         seed: of the resampling.
     """
     logged = dataset
-    by_noise = sign_of_motion(recorded(dataset))
+    recording = recorded(dataset)
+    by_noise = sign_of_motion(recording) if is_driven(recording) else None
     if by_noise is not None and by_noise > RECORDINGS.silent_level:
         return Inputs((_silence(dataset, by_noise),), dataset, logged)
-    floors = noise_floors(recorded(dataset))
-    derived = derived_channels(recorded(dataset), floors)
+    derived = derived_channels(recording, noise_floors(recording))
     faults = [_derived_fault(one) for one in derived]
     dataset = without(dataset, [one.channel for one in derived])
     nominal, told = as_told(dataset, fish or load_fish(dataset.fish))

@@ -68,7 +68,7 @@ def as_dict(diagnosis: Diagnosis) -> Plain:
         ],
     }
     if diagnosis.inputs.silent:  # what a fit to noise needs says nothing of the fish
-        return {**answer, "unexplained": [], "implausible": [], "doubts": []}
+        return {**answer, "budget": None, "unexplained": [], "implausible": [], "doubts": []}
     return {**answer, "doubts": doubts(answer)}
 
 

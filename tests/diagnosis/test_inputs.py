@@ -291,6 +291,7 @@ def test_no_cause_is_searched_for_in_noise():
     assert not answer["ranking"]
     assert not answer["unexplained"]
     assert not answer["doubts"]
+    assert answer["budget"] is None
     said = headline(answer)
     assert said.verdict.startswith("No channel shows a motion")
     assert "Once corrected" not in said.verdict

@@ -257,6 +257,7 @@ def noise_in_place_of(dataset, seed):
 def test_noise_in_place_of_measurements_is_no_wrong_unit(seed):
     """Positions that are nothing but noise look fast, as centimetres for millimetres would."""
     noise = noise_in_place_of(simulate(Setup(runs=8, duration=30.0)), seed)
+    assert [fault.kind for fault in check_inputs(noise).faults] == [check_module.SILENCE]
     found, _ = search(noise, Scales(load_fish(noise.fish)))
     assert found == []
 

@@ -16,6 +16,12 @@ def test_a_gram_of_parts_is_that_of_the_whole(rows):
     np.testing.assert_array_equal(found, gram([whole]))  # however it is parted
 
 
+def test_products_in_blocks_are_those_of_whole_matrices():
+    rng = np.random.default_rng(0)
+    a, b = rng.standard_normal((1000, 7)), rng.standard_normal((1000, 5))
+    np.testing.assert_allclose(inner(a, b), a.T @ b, rtol=1e-12, atol=1e-12)
+
+
 def test_single_numbers_are_summed_in_64_bits_from_block_to_block():
     rows = 4000 * BLOCK
     ones = np.full((rows, 1), 0.1, np.float32)

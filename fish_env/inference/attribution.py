@@ -13,6 +13,7 @@ from fish_env.inference.drive import beside_drive, drifting, measured, under_rel
 from fish_env.inference.effort import FULL, Effort
 from fish_env.inference.elimination import (
     backward_elimination,
+    departs,
     without_idle,
     without_insignificant,
 )
@@ -31,7 +32,7 @@ from fish_env.inference.progress import Report, silent
 from fish_env.inference.projection import Signal
 from fish_env.inference.publication import published
 from fish_env.inference.ranking import Ranked, ranking_of
-from fish_env.inference.rivals import agreed, explained_away, rivals_of, tied
+from fish_env.inference.rivals import explained_away, rivals_of, tied
 from fish_env.inference.screening import Screen, screen
 from fish_env.inference.search import refits, restart_from_winner
 from fish_env.inference.shortlist import (
@@ -341,18 +342,17 @@ class Search:
             chosen = [signal for signal in chosen if not signal.cause.is_effect]
         chosen = [signal for signal in chosen if signal.cause.id not in found.failed]
         tried, base = self._tried(current, chosen, shown, effort)
-        in_step = None
-        if not current.causes:
-            in_step = self.in_step(found, tried[0] if tried else current)
+        leading = tried[0] if tried else current
+        in_step = None if current.causes else self.in_step(found, leading)
         if in_step is not None or base is None:
             return in_step
         ranking = found.ranking or ranking_of(tried, base)
         if current.causes and not implausible_estimates(current.fit):
             tried = [e for e in tried if not implausible_estimates(e.fit)]
         gain = base.score - tried[0].score if tried else 0.0
-        # What else is missing pulls at a coefficient too, but not in all runs alike.
-        alone = not current.causes or not tried or not isinstance(tried[0].causes[-1], Coefficient)
-        doubtful = not alone and not agreed(tried[0], base)
+        last = tried[0].causes[-1] if current.causes and tried else None
+        enough = threshold_of_coefficients(shown, len(current.fit.released), self.relaxed_log_p)
+        doubtful = isinstance(last, Coefficient) and not departs(tried[0], last, enough)
         if doubtful or gain < POLICY.evidence_doubt:
             failed = found.failed | {signal.cause.id for signal in chosen}
             return replace(found, ranking=ranking, failed=failed)

@@ -155,6 +155,21 @@ def log_p_of_departure(fit: Fit, cause: Coefficient) -> float:
     return float(chi2_log_tail(off**2 / variance, 1))
 
 
+def departs(found: Explanation, cause: Coefficient, threshold: float) -> bool:
+    """Whether a coefficient is surely off, were all effects that are not known to act to act a bit.
+
+    What else is missing pulls at it, seldom in all runs alike: the spread of its estimate counts
+    both. Runs left out do not tell. They measure a coefficient so well that its prior hardly holds
+    it, and so foretell the same with its prior and without.
+
+    Args:
+        found: with the coefficient, its prior lifted.
+        cause: the coefficient.
+        threshold: log p-value to pass.
+    """
+    return log_p_of_departure(found.small_errors.widened(), cause) < threshold
+
+
 def allowed_loss(fit: Fit, cause: CauseId, level: float = POLICY.interval_error) -> float:
     """Growth of -2 log likelihood without a cause, at most, if its region holds neutral values.
 

@@ -107,6 +107,11 @@ class Problem(Protocol):
         return block_index(*self.groups())
 
     @property
+    def noise_is_of_runs(self) -> bool:
+        """Whether the noise is how far a run as a whole is off by chance; else runs err besides."""
+        return False
+
+    @property
     def measured(self) -> BoolArray:
         """(D,) whether a residual belongs to a value that was measured; others are zero."""
         return np.ones(len(self.groups()[0]), bool)

@@ -149,10 +149,12 @@ def agreed(best: Explanation, other: Explanation) -> bool:
 
     They do if each of them by itself is strong evidence for it, else by Student's t of the
     differences of their log scores: one run in which the other explanation fails by far makes t
-    small. Fewer runs than make an interval always agree. Source: Vehtari, Gelman and Gabry (2017),
-    Statistics and Computing 27, section 5.1, with runs in the place of samples.
+    small. Fewer runs than make an interval always agree, and those that err by their noise alone:
+    the evidence has counted that. Source: Vehtari, Gelman and Gabry (2017), Statistics and
+    Computing 27, section 5.1, with runs in the place of samples.
     """
-    if best.fit.problem.run_count < POLICY.fewest_runs_for_interval:
+    problem = best.fit.problem
+    if problem.run_count < POLICY.fewest_runs_for_interval or problem.noise_is_of_runs:
         return True
     gains = left_out_scores(best) - left_out_scores(other)
     if gains.min() > 0.5 * POLICY.evidence_doubt:

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from fish_env.inference.elimination import departs
+from fish_env.inference.estimate.fit import fit
 from fish_env.inference.estimate.free import Linearised
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import Coefficient
@@ -18,6 +20,7 @@ LINEAR = LinearProblem(signals=2)
 RANGE = 40.0
 """Of the effect's plausible values: its prior spread is that over the square root of twelve."""
 RUNS = 6
+LEVEL = float(np.log(0.01))
 RUN_OF = np.repeat(np.arange(RUNS), LINEAR.size // RUNS)
 KNOWN = {name: effect(name, 0.5 * RANGE) for name in ("first", "second")}
 COLUMNS = dict(zip(KNOWN, LINEAR.columns, strict=True))
@@ -171,6 +174,50 @@ def test_explanations_are_alike_where_one_run_speaks_for_one_and_the_others_do_n
     assert gap > 30.0
     assert alike(best, other)
     assert agreed(*pair(everywhere, OF_RUNS)[:2])
+
+
+class OfConditions(Stated):
+    """Each run is one condition, averaged: what a run may be off by is its noise."""
+
+    noise_is_of_runs = True
+
+
+@pytest.mark.parametrize(("kind", "told"), [(Stated, False), (OfConditions, True)])
+def test_one_condition_of_a_table_may_tell_and_one_run_of_a_series_may_not(kind, told):
+    """As the steepest dive may tell a buoyancy from a drag. Runs have errors of their own."""
+    before, shown = dict(COLUMNS), (RUN_OF == 2)[:, None]
+    COLUMNS.update({name: column * shown for name, column in before.items()})
+    problem = kind(OF_RUNS.residuals, KNOWN.values(), PATHS)
+    try:
+        best, other, gap = pair(data(strength=15.0), problem)
+    finally:
+        COLUMNS.update(before)
+    assert gap > 30.0
+    assert agreed(best, other) == told
+
+
+def released(moved):
+    """A real fit whose first coefficient lies so far off in each run, its prior lifted."""
+    rng = np.random.default_rng(1)
+    noise = rng.standard_normal((RUNS, LINEAR.size // RUNS))
+    slopes = LINEAR.slopes.reshape(RUNS, -1, COEFFICIENTS)
+    y = noise - slopes[:, :, 0] * np.broadcast_to(moved, RUNS)[:, None]
+    problem = Stated(lambda z, effects: y + slopes @ z, paths=PATHS)
+    first = Coefficient(PATHS[0])
+    return Explanation((first,), fit(problem, released=(first,))), first
+
+
+@pytest.mark.parametrize(("moved", "surely"), [(4.0, True), (1.5, False)])
+def test_a_coefficient_departs_if_it_is_far_beyond_what_was_known(moved, surely):
+    """Though runs left out say nothing of it: data hold it, with its prior or without."""
+    found, coefficient = released(moved)
+    assert departs(found, coefficient, LEVEL) == surely
+
+
+def test_a_coefficient_that_runs_pull_apart_does_not_depart():
+    found, coefficient = released([4.0, 20.0, -12.0, 16.0, -8.0, 4.0])
+    assert departs(*released(found.fit.point.z[0]), LEVEL)  # were it as far off in all runs alike
+    assert not departs(found, coefficient, LEVEL)
 
 
 def test_runs_that_tell_nothing_agree_as_seldom_as_the_policy_says():

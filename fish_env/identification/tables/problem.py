@@ -134,6 +134,11 @@ class TableProblem(Problem):
         """Number of conditions."""
         return len(self.table.conditions)
 
+    @property
+    def noise_is_of_runs(self) -> bool:
+        """Yes: scatter is how far the average of a whole condition is off."""
+        return True
+
     def groups(self) -> tuple[IntArray, FloatArray]:
         """(D,) condition of each measured average, and no time."""
         condition = self.table.lines[2]

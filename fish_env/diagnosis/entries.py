@@ -124,8 +124,8 @@ def gain_entry(gain: Gain | None, units: Mapping[str, str] | None = None) -> Pla
     if gain is None:
         return None
     share = None
-    if gain.share is not None and gain.share_ci95 is not None:
-        share = {"estimate": gain.share, "ci95": list(gain.share_ci95)}
+    if gain.share is not None:
+        share = {"estimate": gain.share, "ci95": gain.share_ci95 and list(gain.share_ci95)}
     named = {name: {"unit": unit} for name, unit in (units or {}).items()}
     return {
         "final_runs": list(gain.runs),

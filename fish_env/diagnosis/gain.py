@@ -46,7 +46,7 @@ class Gain:
         misfit: channel -> root mean square of whitened one-step errors; 1 is the floor.
         share: share of the gap between baseline and floor that the extension closed; None where
             the baseline leaves no gap.
-        share_ci95: its interval over runs and windows.
+        share_ci95: its interval over runs; None with fewer than three, or where one decides.
     """
 
     runs: tuple[str, ...]

@@ -60,6 +60,19 @@ def enough_runs(count: int) -> bool:
     return count >= POLICY.fewest_runs_for_interval
 
 
+def interval_of(share: Mapping[str, Any], runs: int) -> str:
+    """The interval of a share in brackets; nothing without one.
+
+    Args:
+        share: entry with its ends; older answers have ends of fewer than enough runs too.
+        runs: over how many.
+    """
+    if not share["ci95"] or not enough_runs(runs):
+        return ""
+    low, high = (100.0 * end for end in share["ci95"])
+    return f" (95 % interval: {low:.0f} to {high:.0f} %)"
+
+
 def many_fitted(answer: Answer) -> bool:
     """Whether enough runs were fitted for intervals over them; older answers do not say."""
     return enough_runs(int(answer.get("fitted_runs", POLICY.fewest_runs_for_interval)))
@@ -139,11 +152,9 @@ def _closed(answer: Answer) -> str:
         return "The refitted simulation leaves no gap to the noise that could be closed."
     percent = 100.0 * min(max(share["estimate"], 0.0), 1.0)
     count, noun = len(gain["final_runs"]), _noun(answer)
-    low, high = (100.0 * end for end in share["ci95"])
-    interval = f" (95 % interval: {low:.0f} to {high:.0f} %)" if enough_runs(count) else ""
     return (
         f"The extended model closes {percent:.0f} % of the gap between the refitted simulation and "
-        f"the noise{interval}, on {count} held-out {noun}{'s' * (count != 1)}."
+        f"the noise{interval_of(share, count)}, on {count} held-out {noun}{'s' * (count != 1)}."
     )
 
 

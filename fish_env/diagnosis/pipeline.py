@@ -194,7 +194,7 @@ def _diagnose_runs(
     if found.gap is not None and judging is not None:
         gain = measure_gain(judging, baseline, found.accepted, found.gap)
         if gain.is_useless:
-            found, gain = unnamed(found, judging, np.random.default_rng([seed, 4])), None
+            found, gain = unnamed(found, judging), None
             dataset = replace(dataset, notes=(*dataset.notes, USELESS))
     progress("locating the misfit")
     problem = problem.in_usual_steps()  # what was published, where comparisons do with less

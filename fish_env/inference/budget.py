@@ -25,6 +25,7 @@ from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.free import spread_of
 from fish_env.inference.estimate.settle import evaluated, usual_runs
 from fish_env.inference.hypotheses import CauseId, EffectParameterId, name_of
+from fish_env.inference.over_runs import Interval, over_runs
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Problem
 
@@ -111,7 +112,6 @@ def error_budget(
     runs: Sequence[str],
     held_out: bool,
     adequate: bool,
-    rng: np.random.Generator,
 ) -> Budget | None:
     """Share the misfit of the nominal model among what an explanation changes.
 
@@ -122,7 +122,6 @@ def error_budget(
         runs: ids of the runs, in the problem's order.
         held_out: whether these runs chose nothing.
         adequate: whether the explanation leaves nothing but noise.
-        rng: for intervals over runs.
 
     Returns:
         The budget; None where the nominal model leaves nothing beyond noise, or diverges.
@@ -145,7 +144,7 @@ def error_budget(
     misfit = (energy.total[0] - energy.noise.sum()) / energy.noise.sum()
     if not np.isfinite(energy.total).all() or misfit < POLICY.visible_misfit:
         return None
-    return _shared(energy, components, names, runs, held_out, float(misfit), rng)
+    return _shared(energy, components, names, runs, held_out, float(misfit))
 
 
 def _residuals(
@@ -225,7 +224,7 @@ class _Energy:
         return np.asarray(self.table.sum(axis=1))
 
     def of_runs(self, runs: IntArray) -> tuple[FloatArray, float]:
-        """(sets,) over some runs, counted as often as they are named, and their noise."""
+        """(sets,) over some runs, and their noise."""
         return self.table.sum(axis=2)[:, runs].sum(axis=1), float(self.noise[runs].sum())
 
 
@@ -253,7 +252,6 @@ def _shared(
     runs: Sequence[str],
     held_out: bool,
     misfit: float,
-    rng: np.random.Generator,
 ) -> Budget:
     count = len(components)
     nominal = energy.total[0] - energy.noise.sum()
@@ -263,7 +261,7 @@ def _shared(
         energy.by_channel()[0] - floors, POLICY.visible_misfit * np.maximum(floors, 1.0)
     )
     channels = [shares_of(column, count)[0] for column in energy.by_channel().T]
-    intervals, left_interval = _intervals(energy, count, rng)
+    intervals, left_interval = _intervals(energy, count)
     found = [
         Share(
             component,
@@ -280,19 +278,15 @@ def _shared(
     return Budget(tuple(runs), held_out, misfit, tuple(found), left, left_interval)
 
 
-def _intervals(
-    energy: _Energy, count: int, rng: np.random.Generator
-) -> tuple[list[tuple[float, float]], tuple[float, float] | None]:
+def _intervals(energy: _Energy, count: int) -> tuple[list[Interval], Interval | None]:
     """Intervals of the shares and of what is left, over runs; none with fewer than three."""
-    runs = energy.table.shape[1]
-    if runs < POLICY.fewest_runs_for_interval:
-        return [], None
-    draws = []
-    for _ in range(POLICY.bootstrap_draws):
-        own, noise = energy.of_runs(np.asarray(rng.integers(0, runs, runs)))
-        if own[0] > noise:
-            draws.append(shares_of(own, count)[0] / (own[0] - noise))
-    low, high = np.quantile(np.array(draws), POLICY.interval_ends, axis=0)
-    ends = np.quantile(1.0 - np.array(draws).sum(axis=1), POLICY.interval_ends)
-    pairs = [(float(a), float(b)) for a, b in zip(low, high, strict=True)]
-    return pairs, (float(ends[0]), float(ends[1]))
+
+    def parts(runs: IntArray) -> FloatArray:
+        own, noise = energy.of_runs(runs)
+        if not own[0] > noise:
+            return np.full(count + 1, np.nan)
+        shares = shares_of(own, count)[0] / (own[0] - noise)
+        return np.append(shares, 1.0 - shares.sum())
+
+    found = over_runs(parts, energy.table.shape[1])
+    return (found[:-1], found[-1]) if found else ([], None)

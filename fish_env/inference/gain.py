@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fish_env.arrays import FloatArray
+from fish_env.arrays import FloatArray, IntArray
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.estimate.settle import evaluated
+from fish_env.inference.over_runs import Interval, over_runs
 from fish_env.inference.policy import POLICY
 from fish_env.inference.problem import Point, Problem
 
@@ -24,28 +25,25 @@ class ClosedGap:
 
     Attributes:
         share: 1 closes the whole gap; None where the baseline leaves no gap.
-        interval: 95 % interval over runs and windows.
+        interval: 95 % interval over runs; None with too few of them.
     """
 
     share: float | None
     interval: tuple[float, float] | None
 
 
-def gap_closed(
-    held_out: Problem, baseline: Fit, accepted: Fit, rng: np.random.Generator
-) -> ClosedGap:
+def gap_closed(held_out: Problem, baseline: Fit, accepted: Fit) -> ClosedGap:
     """Compare two fits on runs that neither was fitted to.
 
     Args:
         held_out: these runs.
         baseline: refitted baseline.
         accepted: fit with causes, to the same runs as the baseline.
-        rng: for the interval.
     """
     noise = held_out.noise_of(accepted)  # fits can be compared only under one noise model
     squares = [squared_errors(held_out, fit.point, noise) for fit in (accepted, baseline)]
     after, before = (by_window(held_out, values, np.nanmean) for values in squares)
-    return ClosedGap(*reachable_share(before, after, rng))
+    return ClosedGap(*reachable_share(before, after))
 
 
 def squared_errors(problem: Problem, point: Point, noise: object) -> FloatArray:
@@ -84,26 +82,22 @@ def by_window(
 
 
 def reachable_share(
-    baseline: Sequence[FloatArray], extended: Sequence[FloatArray], rng: np.random.Generator
-) -> tuple[float | None, tuple[float, float] | None]:
-    """Share of the gap to the floor of 1 that was closed, with an interval.
+    baseline: Sequence[FloatArray], extended: Sequence[FloatArray]
+) -> tuple[float | None, Interval | None]:
+    """Share of the gap to the floor of 1 that was closed, with an interval over runs.
 
     Args:
         baseline: mean squared whitened errors of each run's windows.
         extended: the same of the extended model.
-        rng: draws runs, and windows within them.
     """
-    gap = float(np.mean(np.concatenate(baseline))) - 1.0
-    if gap <= POLICY.smallest_gap:
+    sizes = np.array([len(own) for own in baseline], float)
+    before, after = (np.array([own.sum() for own in errors]) for errors in (baseline, extended))
+    if before.sum() / sizes.sum() - 1.0 <= POLICY.smallest_gap:
         return None, None
-    share = float(np.mean(np.concatenate(baseline)) - np.mean(np.concatenate(extended))) / gap
-    draws = []
-    for _ in range(POLICY.bootstrap_draws):
-        left = right = 0.0
-        for i in rng.integers(0, len(baseline), len(baseline)):
-            chosen = rng.integers(0, len(baseline[i]), len(baseline[i]))
-            left += float(baseline[i][chosen].mean() - extended[i][chosen].mean())
-            right += float(baseline[i][chosen].mean() - 1.0)
-        draws.append(left / right if right > 0 else np.nan)
-    low, high = np.nanquantile(draws, POLICY.interval_ends)
-    return share, (float(low), float(high))
+
+    def share(runs: IntArray) -> FloatArray:
+        gap = float((before - sizes)[runs].sum())
+        return np.array([(before - after)[runs].sum() / gap if gap > 0.0 else np.nan])
+
+    interval = over_runs(share, len(sizes))
+    return float(share(np.arange(len(sizes)))[0]), interval[0] if interval else None

@@ -60,7 +60,7 @@ def infer(
     Args:
         problem: the runs to fit, and the model.
         held_out: the same model on runs kept for judging; None without such runs.
-        seed: of the null distributions and intervals.
+        seed: of the null distributions.
         effort: how much to spend.
         report: told the name of each step.
         describe: models what no known cause explains; without it nothing is said of that.
@@ -105,7 +105,7 @@ def investigate(
     Args:
         baseline: refitted baseline, with the runs it was fitted to.
         causes: causes to consider.
-        rng: for null distributions and intervals.
+        rng: for null distributions.
         effort: how much to spend.
         report: told the name of each step.
         held_out: the same model on runs kept for judging; None without such runs.
@@ -129,17 +129,17 @@ def investigate(
     partly_known = verdict.name == "outside_library" and bool(attribution.accepted.causes)
     if effort.retries and partly_known:
         report("testing each cause beside generic forces")
-        attribution, verdict = partly(attribution, left, verdict, rng, report)
+        attribution, verdict = partly(attribution, left, verdict, report)
     gap = None
     if verdict.name in EXTENDING and held_out is not None:
         report("measuring the gain on final runs")
-        gap = gap_closed(held_out, attribution.baseline.fit, attribution.accepted.fit, rng)
+        gap = gap_closed(held_out, attribution.baseline.fit, attribution.accepted.fit)
     residual = None
     if effort.retries and not left.reached and describe:
         report("modelling the residual")
         residual = described(attribution, left, describe, held_out)
     report("computing the error budget")
-    budget = budget_of(attribution, verdict, left, held_out, rng)
+    budget = budget_of(attribution, verdict, left, held_out)
     if budget is not None:
         verdict = without_minor(verdict, budget.minor(slow=problem.out_of_step))
     if effort.retries:
@@ -158,7 +158,7 @@ def among_small_errors(attribution: Attribution, verdict: Verdict) -> tuple[Attr
     return replace(attribution, accepted=wide), without_minor(verdict, faint=faint)
 
 
-def unnamed(found: Result, held_out: Problem | None, rng: np.random.Generator) -> Result:
+def unnamed(found: Result, held_out: Problem | None) -> Result:
     """The result without the names of its causes.
 
     For a vehicle that knows that the model is of no use with them either.
@@ -166,12 +166,11 @@ def unnamed(found: Result, held_out: Problem | None, rng: np.random.Generator) -
     Args:
         found: result that names causes.
         held_out: runs that chose nothing; None without such runs.
-        rng: for intervals over runs.
     """
     begun = found.attribution
     nothing = replace(begun, accepted=begun.baseline, rivals=())
     verdict = Verdict("outside_library")
-    budget = budget_of(nothing, verdict, found.adequacy, held_out, rng)
+    budget = budget_of(nothing, verdict, found.adequacy, held_out)
     return replace(found, attribution=nothing, verdict=verdict, gap=None, budget=budget)
 
 
@@ -179,7 +178,6 @@ def partly(
     attribution: Attribution,
     left: Adequacy,
     verdict: Verdict,
-    rng: np.random.Generator,
     report: Report,
 ) -> tuple[Attribution, Verdict]:
     """The verdict ``partial`` where known causes act beside something unknown.
@@ -191,11 +189,10 @@ def partly(
         attribution: what was found.
         left: adequacy of the accepted explanation, which is not adequate.
         verdict: the verdict without such causes.
-        rng: for intervals of shares.
         report: told what is being done.
     """
     found = confirmed(attribution.accepted, left.threshold, report)
-    found = sustained(found, rng, report) if found else None
+    found = sustained(found, report) if found else None
     found = beyond_small_errors(found, left.threshold, report) if found else None
     found = needed(found, report) if found else None
     if found is None:
@@ -224,7 +221,6 @@ def budget_of(
     verdict: Verdict,
     left: Adequacy,
     held_out: Problem | None,
-    rng: np.random.Generator,
 ) -> Budget | None:
     """Where the misfit of the nominal model goes, on held-out runs where there are some.
 
@@ -233,14 +229,13 @@ def budget_of(
         verdict: only causes that it names have a share of their own.
         left: adequacy of the accepted explanation.
         held_out: runs that chose nothing; None without such runs.
-        rng: for intervals over runs.
     """
     named = verdict.name in EXTENDING
     fit = attribution.accepted.fit if named else attribution.baseline.fit
     problem = fit.problem if held_out is None else held_out
     causes = attribution.accepted.causes if named else ()
     held = held_out is not None
-    return error_budget(problem, fit, causes, problem.run_ids, held, left.reached, rng)
+    return error_budget(problem, fit, causes, problem.run_ids, held, left.reached)
 
 
 def described(

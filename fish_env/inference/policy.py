@@ -109,7 +109,6 @@ class DecisionPolicy(Numbers):
         fewest_runs_for_spread: smallest number of runs for a spread over runs.
         fewest_runs_for_interval: smallest number of runs for an interval over runs.
         interval_error: share of intervals and regions that do not hold the truth.
-        bootstrap_draws: number of draws of an interval over runs.
         run_errors_level: share of parameters whose interval runs widen by chance.
         beyond_usual: spread over runs, over the usual one, from which it is a finding.
         surprising_runs_level: p-value of what ordinary runs differ in, below which it does not take
@@ -226,9 +225,6 @@ class DecisionPolicy(Numbers):
     fewest_runs_for_spread: int = number(3, 2, 10, "two degrees of freedom")
     fewest_runs_for_interval: int = number(3, 2, 10, "two degrees of freedom")
     interval_error: float = number(0.05, 1e-4, 0.5, FISHER)
-    bootstrap_draws: int = number(
-        2000, 200, 100_000, "the 2.5 % quantile of 2000 draws is known to 0.35 points"
-    )
     run_errors_level: float = number(0.05, 1e-4, 0.5, FISHER)
     beyond_usual: float = number(3.0, 1.0, 10.0, BY_HAND)
     surprising_runs_level: float = number(

@@ -14,10 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fish_env.arrays import FloatArray
+from fish_env.arrays import FloatArray, IntArray
 from fish_env.inference.estimate.settle import evaluated
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.hypotheses import CauseId
+from fish_env.inference.over_runs import over_runs
 from fish_env.inference.partial import rejected_in_turn
 from fish_env.inference.policy import POLICY
 from fish_env.inference.progress import Report, silent
@@ -30,8 +31,8 @@ class SimulatedSize:
 
     Attributes:
         size: 1 where simulation asks for the estimate, 0 where it asks for no such cause.
-        low: lower end of the 95 % interval over runs.
-        high: upper end.
+        low: above this is the size, with 95 % confidence over runs.
+        high: below this.
     """
 
     size: float
@@ -50,18 +51,15 @@ class SimulatedSize:
         return f"{self.size:.2g} times its estimate ({self.low:.2g} to {self.high:.2g})"
 
 
-def sustained(
-    found: Explanation, rng: np.random.Generator, report: Report = silent
-) -> Explanation | None:
+def sustained(found: Explanation, report: Report = silent) -> Explanation | None:
     """The explanation with those of its causes whose size simulation confirms.
 
-    The interval of the size that simulation asks for is positive, and contains sizes near the
-    estimate. A drive that was measured to be out of step may take longer to show than such a
-    simulation lasts.
+    The size that simulation asks for is surely positive, and not surely another one than the
+    estimate: two tests of one side each, at 5 %. A drive that was measured to be out of step may
+    take longer to show than such a simulation lasts.
 
     Args:
         found: causes that act beside something unknown.
-        rng: for intervals over runs.
         report: told what is dropped and why.
 
     Returns:
@@ -69,7 +67,7 @@ def sustained(
     """
 
     def rejected(found: Explanation, others: Sequence[CauseId]) -> tuple[CauseId, str] | None:
-        sizes = simulated_sizes(found, others, rng)
+        sizes = simulated_sizes(found, others)
         if sizes is None:
             return None
         worst = max(others, key=lambda name: sizes[name].contradiction)
@@ -81,7 +79,7 @@ def sustained(
 
 
 def simulated_sizes(
-    found: Explanation, names: Sequence[CauseId], rng: np.random.Generator
+    found: Explanation, names: Sequence[CauseId]
 ) -> dict[CauseId, SimulatedSize] | None:
     """What size of each cause simulation asks for; None where a simulation with all diverges.
 
@@ -92,25 +90,24 @@ def simulated_sizes(
     Args:
         found: the causes with their fit.
         names: those asked for.
-        rng: for intervals over runs.
     """
     left, changed = _regressed(found, names)
     if not (np.isfinite(left).all() and np.isfinite(changed).all()):
         return None
-    return {name: _size(a, b, rng) for name, a, b in zip(names, left, changed, strict=True)}
+    return {name: _size(a, b) for name, a, b in zip(names, left, changed, strict=True)}
 
 
-def _size(left: FloatArray, changed: FloatArray, rng: np.random.Generator) -> SimulatedSize:
+def _size(left: FloatArray, changed: FloatArray) -> SimulatedSize:
     """A ratio of sums over runs, from its terms (R,); of fewer than three runs without interval."""
     if not changed.sum() > 0.0:
         return SimulatedSize(0.0, 0.0, 0.0)
-    size, runs = float(left.sum() / changed.sum()), len(left)
-    if runs < POLICY.fewest_runs_for_interval:
-        return SimulatedSize(size, size, size)
-    drawn = rng.integers(0, runs, (POLICY.bootstrap_draws, runs))
-    sums = np.maximum(changed[drawn].sum(axis=1), np.finfo(float).tiny)
-    low, high = np.quantile(left[drawn].sum(axis=1) / sums, POLICY.interval_ends)
-    return SimulatedSize(size, float(low), float(high))
+
+    def size(runs: IntArray) -> FloatArray:
+        return np.array([left[runs].sum() / max(changed[runs].sum(), np.finfo(float).tiny)])
+
+    own = float(size(np.arange(len(left)))[0])
+    interval = over_runs(size, len(left), 1.0 - 2.0 * POLICY.interval_error)
+    return SimulatedSize(own, *(interval[0] if interval else (own, own)))
 
 
 def _regressed(found: Explanation, names: Sequence[CauseId]) -> tuple[FloatArray, FloatArray]:

@@ -202,8 +202,7 @@ def budget_beside_own_beats(dataset):
     problem = with_own_beats(problem, OwnBeats(TailDrive(), ratios))
     noise = problem.default_noise()
     accepted = fit(problem, (), problem.start, noise, refit_noise=False, iterations=3)
-    rng = np.random.default_rng(0)
-    budget = error_budget(problem, accepted, (), problem.run_ids, True, True, rng)
+    budget = error_budget(problem, accepted, (), problem.run_ids, True, True)
     return budget.misfit, {share.name: share.share for share in budget.shares}
 
 

@@ -214,7 +214,7 @@ def test_a_cause_that_improves_no_simulation_is_dropped(seed):
     rng = np.random.default_rng(seed)
     boat = BoatProblem(sail(rng, FITTED, {NORTH: 0.15, EAST: -0.2}, foreign=wind))
     both = Explanation(("current", "rudder_bias"), fit(boat, ("current", "rudder_bias")))
-    found = sustained(both, rng)
+    found = sustained(both)
     assert found is not None
     assert found.causes == ("current",)
 
@@ -224,7 +224,7 @@ def test_a_cause_that_improves_every_simulation_stays(seed):
     rng = np.random.default_rng(seed)
     boat = BoatProblem(sail(rng, FITTED, {BIAS: 0.06}, foreign=wind))
     right = Explanation(("rudder_bias",), fit(boat, ("rudder_bias",)))
-    assert sustained(right, rng) is right
+    assert sustained(right) is right
 
 
 @pytest.mark.parametrize("certain", [True, False])
@@ -233,7 +233,7 @@ def test_what_was_measured_of_a_drive_needs_no_simulation(certain):
     boat = BoatProblem(sail(rng, FITTED, {NORTH: 0.15, EAST: -0.2}, foreign=wind))
     boat.drive = Drive({BIAS: 0.0}, known=True, certain=certain)
     both = Explanation(("current", "rudder_bias"), fit(boat, ("current", "rudder_bias")))
-    found = sustained(both, rng)
+    found = sustained(both)
     assert ("rudder_bias" in found.causes) == certain
     assert "current" in found.causes
     alone = Explanation(("rudder_bias",), fit(boat, ("rudder_bias",)))

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fish_env.diagnosis.headline import EXPERIMENT_FILE, enough_runs, facts, headline, many_fitted
+from fish_env.diagnosis.headline import EXPERIMENT_FILE, facts, headline, interval_of, many_fitted
 from fish_env.diagnosis.report import figures as draw
 from fish_env.diagnosis.report.figures import Album
 from fish_env.diagnosis.report.html import (
@@ -197,9 +197,7 @@ def _gain_words(found: Answer, noun: str) -> str:
             "refitted baseline."
         )
     if share:
-        low, high = share["ci95"]
-        many = enough_runs(len(found.get("final_runs", ())))
-        interval = f" (95 %: {100 * low:.0f} to {100 * high:.0f} %)" if many else ""
+        interval = interval_of(share, len(found.get("final_runs", ())))
         said.append(
             f"It closes {100 * share['estimate']:.0f} % of the gap between the refitted baseline "
             f"and the noise{interval}."

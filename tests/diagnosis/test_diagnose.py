@@ -163,6 +163,19 @@ def ambiguous(causes, *alternatives):
     return {"verdict": "ambiguous", "causes": causes, "alternatives": list(alternatives)}
 
 
+@pytest.mark.parametrize(
+    ("runs", "ci95", "shown"),
+    [(["a", "b", "c"], [0.8, 1.0], True), (["a", "b", "c"], None, False), (["a"], None, False)],
+)
+def test_the_interval_of_the_gain_is_shown_where_there_is_one(runs, ci95, shown):
+    gain = {"final_runs": runs, "share_of_reachable": {"estimate": 0.9, "ci95": ci95}}
+    answer = {"verdict": "cause", "causes": [CAUSE], "alternatives": [], "gain": gain}
+    said = headline(answer)
+    assert "closes 90 %" in said.closed
+    assert ("(95 % interval: 80 to 100 %)" in said.closed) == shown
+    assert ("no interval over runs" in said.caveats) == (len(runs) < 3)
+
+
 def test_an_answer_that_closes_hardly_any_gap_says_so_first():
     answer = {"verdict": "cause", "causes": [CAUSE], "alternatives": []}
     for share, doubtful in ((0.05, True), (0.5, False)):

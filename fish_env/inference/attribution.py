@@ -13,7 +13,7 @@ from fish_env.inference.drive import beside_drive, drifting, measured, under_rel
 from fish_env.inference.effort import FULL, Effort
 from fish_env.inference.elimination import (
     backward_elimination,
-    departs,
+    last_departs,
     without_idle,
     without_insignificant,
 )
@@ -21,7 +21,7 @@ from fish_env.inference.estimate.again import arrived, finished, quietened
 from fish_env.inference.estimate.fit import Fit
 from fish_env.inference.explanation import Explanation
 from fish_env.inference.first_screen import first_screen, with_differences
-from fish_env.inference.hypotheses import CauseId, Coefficient, listed
+from fish_env.inference.hypotheses import CauseId, listed
 from fish_env.inference.in_common import with_common_errors
 from fish_env.inference.many_causes import challenged, pursue
 from fish_env.inference.parallel import both, side_by_side
@@ -335,9 +335,8 @@ class Search:
             effort = effort.reduced
             if disturbance_at_limit(current.fit):
                 return None
-        chosen = shortlisted(
-            problem, shown, effort.shortlist, self.relaxed_log_p, len(current.fit.released)
-        )
+        lifted = len(current.fit.released)
+        chosen = shortlisted(problem, shown, effort.shortlist, self.relaxed_log_p, lifted)
         if current.causes and self.effort.retries:
             chosen = [signal for signal in chosen if not signal.cause.is_effect]
         chosen = [signal for signal in chosen if signal.cause.id not in found.failed]
@@ -350,10 +349,9 @@ class Search:
         if current.causes and not implausible_estimates(current.fit):
             tried = [e for e in tried if not implausible_estimates(e.fit)]
         gain = base.score - tried[0].score if tried else 0.0
-        last = tried[0].causes[-1] if current.causes and tried else None
-        enough = threshold_of_coefficients(shown, len(current.fit.released), self.relaxed_log_p)
-        doubtful = isinstance(last, Coefficient) and not departs(tried[0], last, enough)
-        if doubtful or gain < POLICY.evidence_doubt:
+        enough = threshold_of_coefficients(shown, lifted, self.relaxed_log_p)
+        weak = gain < POLICY.evidence_doubt
+        if weak or (current.causes and not last_departs(tried[0], enough)):
             failed = found.failed | {signal.cause.id for signal in chosen}
             return replace(found, ranking=ranking, failed=failed)
         best, others, after = self._questioned(current, tried, chosen, shown)

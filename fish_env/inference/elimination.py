@@ -155,19 +155,22 @@ def log_p_of_departure(fit: Fit, cause: Coefficient) -> float:
     return float(chi2_log_tail(off**2 / variance, 1))
 
 
-def departs(found: Explanation, cause: Coefficient, threshold: float) -> bool:
-    """Whether a coefficient is surely off, were all effects that are not known to act to act a bit.
+def last_departs(found: Explanation, threshold: float) -> bool:
+    """Whether the last cause is surely off if it is a coefficient; any effect is.
 
-    What else is missing pulls at it, seldom in all runs alike: the spread of its estimate counts
-    both. Runs left out do not tell. They measure a coefficient so well that its prior hardly holds
-    it, and so foretell the same with its prior and without.
+    What else is missing pulls at a coefficient, seldom in all runs alike: its spread counts errors
+    of runs, and small errors of all effects that are not known to act. Runs left out do not tell.
+    They measure a coefficient so well that its prior hardly holds it, and so foretell the same with
+    its prior and without.
 
     Args:
-        found: with the coefficient, its prior lifted.
-        cause: the coefficient.
-        threshold: log p-value to pass.
+        found: with the cause, the prior of a coefficient lifted.
+        threshold: log p-value for a coefficient to pass.
     """
-    return log_p_of_departure(found.small_errors.widened(), cause) < threshold
+    last = found.causes[-1]
+    if not isinstance(last, Coefficient):
+        return True
+    return log_p_of_departure(found.small_errors.widened(), last) < threshold
 
 
 def allowed_loss(fit: Fit, cause: CauseId, level: float = POLICY.interval_error) -> float:

@@ -29,7 +29,7 @@ class ClosedGap:
     """
 
     share: float | None
-    interval: tuple[float, float] | None
+    interval: Interval | None
 
 
 def gap_closed(held_out: Problem, baseline: Fit, accepted: Fit) -> ClosedGap:

@@ -61,7 +61,7 @@ def enough_runs(count: int) -> bool:
 
 
 def interval_of(share: Mapping[str, Any], runs: int) -> str:
-    """The interval of a share in brackets; nothing without one.
+    """The interval of a share in per cent, in words; nothing without one.
 
     Args:
         share: entry with its ends; older answers have ends of fewer than enough runs too.
@@ -70,7 +70,7 @@ def interval_of(share: Mapping[str, Any], runs: int) -> str:
     if not share["ci95"] or not enough_runs(runs):
         return ""
     low, high = (100.0 * end for end in share["ci95"])
-    return f" (95 % interval: {low:.0f} to {high:.0f} %)"
+    return f"{low:.0f} to {high:.0f} %"
 
 
 def many_fitted(answer: Answer) -> bool:
@@ -152,9 +152,11 @@ def _closed(answer: Answer) -> str:
         return "The refitted simulation leaves no gap to the noise that could be closed."
     percent = 100.0 * min(max(share["estimate"], 0.0), 1.0)
     count, noun = len(gain["final_runs"]), _noun(answer)
+    ends = interval_of(share, count)
+    interval = f" (95 % interval: {ends})" if ends else ""
     return (
         f"The extended model closes {percent:.0f} % of the gap between the refitted simulation and "
-        f"the noise{interval_of(share, count)}, on {count} held-out {noun}{'s' * (count != 1)}."
+        f"the noise{interval}, on {count} held-out {noun}{'s' * (count != 1)}."
     )
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from fish_env.inference.effort import QUICK
 from fish_env.inference.estimate.fit import fit
+from fish_env.inference.gain import gap_closed
 from fish_env.inference.pipeline import infer, refit_baseline
 from fish_env.inference.probes import causes_of
 from fish_env.inference.result import Result
@@ -26,9 +27,9 @@ def wind(state):
     return np.stack([-3.0 * np.cos(heading), 3.0 * np.sin(heading), 0.8 * np.sin(heading)], axis=1)
 
 
-def problems(seed, effects=None, **settings):
+def problems(seed, effects=None, kept=2, **settings):
     """Runs to fit and runs kept for judging."""
-    runs = sail(np.random.default_rng(seed), FITTED + 2, effects or {}, **settings)
+    runs = sail(np.random.default_rng(seed), FITTED + kept, effects or {}, **settings)
     fitted, final = split(runs, FITTED)
     return BoatProblem(fitted), BoatProblem(final)
 
@@ -56,8 +57,20 @@ def test_each_hidden_effect_is_found_with_the_truth_in_its_interval(case):
 def test_held_out_runs_are_predicted_down_to_the_noise(case):
     result = found(case)
     assert result.gap.share == pytest.approx(1.0, abs=0.1)
-    low, high = result.gap.interval
-    assert low < result.gap.share < high
+    assert result.gap.interval is None  # two runs make none
+
+
+@pytest.mark.parametrize("case", range(len(HIDDEN)))
+def test_the_gain_on_three_held_out_runs_has_an_interval(case):
+    effects, seed = HIDDEN[case]
+    fitted, final = problems(seed, effects, kept=3)
+    baseline, accepted = (
+        fit(fitted, names, rounds=2) for names in ((), (next(iter(effects)).effect,))
+    )
+    gap = gap_closed(final, baseline, accepted)
+    assert gap.share == pytest.approx(1.0, abs=0.1)
+    low, high = gap.interval
+    assert low < gap.share < high
 
 
 @pytest.mark.parametrize("case", range(len(HIDDEN)))

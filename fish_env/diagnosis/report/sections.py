@@ -197,7 +197,8 @@ def _gain_words(found: Answer, noun: str) -> str:
             "refitted baseline."
         )
     if share:
-        interval = interval_of(share, len(found.get("final_runs", ())))
+        ends = interval_of(share, len(found.get("final_runs", ())))
+        interval = f" (95 %: {ends})" if ends else ""
         said.append(
             f"It closes {100 * share['estimate']:.0f} % of the gap between the refitted baseline "
             f"and the noise{interval}."

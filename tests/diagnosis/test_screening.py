@@ -51,6 +51,18 @@ def test_a_signal_keeps_what_the_coefficients_cannot_follow():
     assert 0.2 < signal.absorbed_share < 0.5
 
 
+def test_settings_that_do_the_same_have_a_threshold_whatever_rounding_makes_of_them():
+    """Their products in 32 bits need not be those of any signals."""
+    two = LinearProblem(settings=2)
+    tested = signals(two.fit(np.random.default_rng(0)), two)
+    products = np.kron(np.eye(len(tested)), np.full((2, 2), 1.0 + 1e-7) - 1e-7 * np.eye(2))
+    assert np.linalg.eigvalsh(products)[0] < 0.0
+    found = null_threshold(tested, np.random.default_rng(1), 0.05, products=products)
+    one = null_threshold(signals(PROBLEM.fit(np.random.default_rng(0))), np.random.default_rng(1),
+                         0.05, products=np.eye(len(tested)))  # fmt: skip
+    assert one < found < 0.5 * one  # one degree of freedom, judged as two
+
+
 def test_a_signal_that_the_coefficients_can_follow_is_absorbed():
     fit = PROBLEM.fit(np.random.default_rng(0))
     own = Projector(fit).signal(PROBLEM.causes[0], 0, PROBLEM.slopes[:, [1]])

@@ -125,7 +125,7 @@ def gain_entry(gain: Gain | None, units: Mapping[str, str] | None = None) -> Pla
         return None
     share = None
     if gain.share is not None:
-        share = {"estimate": gain.share, "ci95": gain.share_ci95 and list(gain.share_ci95)}
+        share = {"estimate": gain.share, "ci95": _ends(gain.share_ci95)}
     named = {name: {"unit": unit} for name, unit in (units or {}).items()}
     return {
         "final_runs": list(gain.runs),
@@ -136,6 +136,10 @@ def gain_entry(gain: Gain | None, units: Mapping[str, str] | None = None) -> Pla
     }
 
 
+def _ends(interval: tuple[float, float] | None) -> list[float] | None:
+    return None if interval is None else list(interval)
+
+
 def budget_entry(budget: Budget | None) -> Plain | None:
     """The error budget: shares of the nominal simulation's misfit."""
     if budget is None:
@@ -144,7 +148,7 @@ def budget_entry(budget: Budget | None) -> Plain | None:
         {
             "name": share.name,
             "share": share.share,
-            "ci95": None if share.ci95 is None else list(share.ci95),
+            "ci95": _ends(share.ci95),
             "alone": share.alone,
             "last": share.last,
             "channels": share.channels,
@@ -157,7 +161,7 @@ def budget_entry(budget: Budget | None) -> Plain | None:
         "misfit": budget.misfit,
         "shares": shares,
         "left": budget.left,
-        "left_ci95": None if budget.left_ci95 is None else list(budget.left_ci95),
+        "left_ci95": _ends(budget.left_ci95),
     }
 
 

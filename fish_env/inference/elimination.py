@@ -160,7 +160,7 @@ def last_departs(found: Explanation, threshold: float) -> bool:
 
     What else is missing pulls at a coefficient, seldom in all runs alike: its spread counts errors
     of runs, and small errors of all effects that are not known to act. Runs left out do not tell.
-    They measure a coefficient so well that its prior hardly holds it, and so foretell the same with
+    They measure a coefficient so well that its prior hardly holds it, and so predict the same with
     its prior and without.
 
     Args:

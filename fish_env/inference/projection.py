@@ -115,9 +115,18 @@ class Signal(Projected):
     @cached_property
     def to_orthonormal(self) -> FloatArray:
         """(m, k) weights that make orthonormal columns of ``left``, of its k independent ones."""
-        values, vectors = np.linalg.eigh(inner(self.left, self.left))
-        kept = values > SINGLE_PRECISION * values[-1]
-        return np.asarray(vectors[:, kept] / np.sqrt(values[kept]))
+        return orthonormal(inner(self.left, self.left))
+
+
+def orthonormal(products: FloatArray) -> FloatArray:
+    """Weights (m, k) that make orthonormal columns of some, of their k independent ones.
+
+    Args:
+        products: (m, m) of these columns, which are in 32 bits.
+    """
+    values, vectors = np.linalg.eigh(products)
+    kept = values > SINGLE_PRECISION * values[-1]
+    return np.asarray(vectors[:, kept] / np.sqrt(values[kept]))
 
 
 class Projector:

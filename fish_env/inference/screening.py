@@ -23,7 +23,7 @@ from fish_env.inference.probes import (
     of_visible,
 )
 from fish_env.inference.problem import Problem
-from fish_env.inference.projection import SINGLE_PRECISION, Projector, Signal, in_parts
+from fish_env.inference.projection import Projector, Signal, in_parts, orthonormal
 from fish_env.inference.tails import chi2_log_tail, noncentrality
 
 CLOSER = (0.25, 0.12, 0.06)
@@ -252,10 +252,7 @@ def null_threshold(
         at = 0
         for s in effects:
             part = slice(at, at + s.freedom)
-            # Settings that do nearly the same are told apart no better than signals are kept.
-            spread, along = np.linalg.eigh(correlation[part, part])
-            kept = spread > SINGLE_PRECISION * spread[-1]
-            white = (along[:, kept] / np.sqrt(spread[kept])).T @ draws[part]
+            white = orthonormal(correlation[part, part]).T @ draws[part]
             statistic = np.einsum("ij,ij->j", white, white)
             largest[s.freedom] = np.maximum(largest.get(s.freedom, 0.0), statistic)
             at += s.freedom

@@ -188,8 +188,10 @@ def _moved(run: RunData, seen: RunData, filtered: Filtered, channels: Sequence[s
         channels: names of its channels.
     """
     slopes = known_slopes(seen, filtered, channels)
-    change = _in_samples(slopes, run.sensor_errors - seen.sensor_errors)
-    return replace(run, distortion=change if seen.distortion is None else seen.distortion + change)
+    found = _in_samples(slopes, run.sensor_errors - seen.sensor_errors)
+    if seen.distortion is not None:
+        found += seen.distortion
+    return replace(run, distortion=seen.moved_on(found, run.moved))
 
 
 def _in_samples(slopes: FloatArray, errors: FloatArray) -> FloatArray:

@@ -158,7 +158,23 @@ class RunData:
         rows = np.clip(rows, 0, self.most_rows)
         if np.array_equal(rows, self.moved):
             return self
-        return replace(self, measured=self._in_rows(rows), moved=rows)
+        own = None if self.distortion is None else self.moved_on(self.distortion, rows)
+        return replace(self, measured=self._in_rows(rows), distortion=own, moved=rows)
+
+    def moved_on(self, of_samples: FloatArray, rows: IntArray) -> FloatArray:
+        """What belongs to samples (T, C), where these are moved to other rows.
+
+        Args:
+            of_samples: in the rows where the samples are now.
+            rows: (devices,) rows by which the samples of each device are moved then.
+        """
+        if np.array_equal(rows, self.moved):
+            return of_samples
+        assert self.devices is not None
+        places, own = np.arange(len(self.clock)), np.empty_like(of_samples)
+        for i, further in enumerate((rows - self.moved)[self.devices].tolist()):
+            own[:, i] = of_samples[np.clip(places + further, 0, len(places) - 1), i]
+        return own
 
     def movable(self, channels: Sequence[str]) -> RunData:
         """The same run with rows that may be moved, where its samples are evenly spaced.

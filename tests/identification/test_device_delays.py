@@ -114,6 +114,24 @@ def test_rows_of_the_beginning_of_a_run_may_be_moved_too(problem, end_s):
     np.testing.assert_array_equal(early.measured[:kept], whole.measured[:kept])
 
 
+def test_what_a_sensor_does_to_a_sample_goes_with_it(problem):
+    """By a step from 1 ms below a whole row to one above it, as a descent takes it."""
+    noise, at = problem.default_noise(), Point(np.zeros(len(PATHS)), {})
+    below, above = (
+        numbers_of(problem, inertial_delay=STEP_S + off, inertial_smoothing=1.0)
+        for off in (-1e-3, 1e-3)
+    )
+    late = problem.with_variation(below, at, noise)
+    later = late.with_variation(above, at, noise, late.filtered(at, noise, keep_slopes=True))
+    (before,), (after,) = late.runs, later.runs
+    inertial = [i for i, d in enumerate(devices_of(problem.channels)) if d == Device.INERTIAL]
+    assert (before.moved[Device.INERTIAL], after.moved[Device.INERTIAL]) == (0, 1)
+    assert np.std(before.distortion[:, inertial]) > 0.0
+    np.testing.assert_allclose(
+        after.distortion[:-1, inertial], before.distortion[1:, inertial], atol=1e-12
+    )
+
+
 def test_the_likelihood_hardly_leaps_where_a_row_is_moved(problem):
     noise, at = problem.default_noise(), Point(np.zeros(len(PATHS)), {})
 

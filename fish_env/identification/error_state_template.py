@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from fish_env.identification.filter_algebra import BASE, PHASE
-from fish_env.identification.state_blocks import PHASE_COLUMN
+from fish_env.identification.state_blocks import N_ERROR, PHASE_COLUMN
 from fish_env.identification.vectors import lanes_at_once
 
 # --- completed by compose ---
@@ -24,10 +24,12 @@ from fish_env.model.composed import (
     NEXT,
     PAR,
     SWITCH,
+    TAIL_CORNERS,
     TAIL_MEMORIES,
     TAIL_RATES,
     TAIL_ROWS,
     TIME,
+    TURN,
     U_RATE,
     X0,
     U,
@@ -158,33 +160,52 @@ def turn_memories(work, width, error):
 
 
 @kernel
-def turn_tail(work, width, error, late, history):
+def secants_of_phase(work, width, per_phase):
+    """What the tail states of lane 0 change with its phase (F,); zero of those with corners.
+
+    By the lanes that began with another phase, in what they were last time and since: so it is what
+    they change with all of the phase's past. Their rate in time does not tell it once a command has
+    jumped.
+    """
+    for j in range(TAIL_ROWS.shape[0]):
+        row = (X0 + TAIL_ROWS[j]) * width
+        apart = work[row + PHASE_COLUMN + 1] - work[row + N_ERROR + 1]
+        per_phase[j] = 0.0 if TAIL_CORNERS[j] else apart * (0.5 / TURN)
+
+
+@kernel
+def turn_tail(work, width, error, per_phase, late, history):
     """Apply the error of the phase, to the phase and to what follows it.
 
-    A tail that is late, bends or lags has been out of phase all along, so its states are where they
-    would be that much later in the beat. Else the phase would seem to act only once they have
-    followed, and would be corrected twice. They move no further with the phase than a beat of the
-    told amplitude does: after a jump of the command they move fast, and not with the phase.
+    A tail that is late, bends or lags has been out of phase all along, so its states change with
+    it, as far as that is known (F,). Else they are where they would be that much later in the beat,
+    and move no further with the phase than a beat of the told amplitude does. Were they left where
+    they are, the phase would seem to act only once they have followed, and be corrected twice.
     """
     if late:
         turn_told(width, error, history)
     for j in range(TAIL_ROWS.shape[0]):
         row = TAIL_ROWS[j]
+        known = per_phase[j] if per_phase.shape[0] > 0 else 0.0
         for k in range(width):
             turning = work[(DX + PHASE) * width + k]
-            if (turning > 0.0) & (error[PHASE_COLUMN, k] != 0.0):
-                most = MOST_SWING * work[(U + 1) * width + k]
-                most *= turning if TAIL_RATES[j] else 1.0
-                per_phase = min(max(work[(DX + row) * width + k] / turning, -most), most)
-                work[(X0 + row) * width + k] += per_phase * error[PHASE_COLUMN, k]
+            most = MOST_SWING * work[(U + 1) * width + k]
+            most *= turning if TAIL_RATES[j] else 1.0
+            gone = work[(DX + row) * width + k] / (turning if turning > 0.0 else 1.0)
+            own = min(max(gone, -most), most) if turning > 0.0 else 0.0
+            moved = (known if known != 0.0 else own) * error[PHASE_COLUMN, k]
+            work[(X0 + row) * width + k] += moved
     turn_memories(work, width, error)
     for k in range(width):
         work[(X0 + PHASE) * width + k] += error[PHASE_COLUMN, k]
 
 
 @kernel
-def move(work, width, error, late, history):
-    """Apply error states (19, width) to all lanes, and to what late tails (see history) heard."""
+def move(work, width, error, per_phase, late, history):
+    """Apply error states (19, width) to all lanes, and to what late tails (see history) heard.
+
+    ``per_phase`` (F,) is what the tail's states change with its phase, zero where that is unknown.
+    """
     for j in range(3):
         for k in range(width):
             work[(X0 + j) * width + k] += error[j, k]
@@ -207,7 +228,7 @@ def move(work, width, error, late, history):
         for k in range(width):
             work[(X0 + 7 + j) * width + k] += error[6 + j, k]
             work[(WRENCH + j) * width + k] += error[12 + j, k]
-    turn_tail(work, width, error, late, history)
+    turn_tail(work, width, error, per_phase, late, history)
 
 
 @kernel

@@ -13,6 +13,7 @@ import math
 import numpy as np
 
 from fish_env.identification.filter_algebra import (
+    PHASE,
     predict_covariance,
     room,
     share_taken,
@@ -29,6 +30,7 @@ from fish_env.model.composed import (
     LATE_TAIL,
     N_STATES,
     PERTURB,
+    TAIL_ROWS,
     TURN,
     WORK_ROWS,
     WRENCH,
@@ -43,6 +45,7 @@ from fish_env.model.composed import (
     move,
     observation_rows,
     room_for_path,
+    secants_of_phase,
     set_commands,
     share_told,
     start_effects,
@@ -56,11 +59,13 @@ from fish_env.model.composed import (
 @kernel
 def slopes_of_interval(
     work, width, steps, h, begin, times, values, at, pace, skew, delay, late, history, tables,
-    error, gap, path, f,
+    error, per_phase, gap, path, f,
 ):  # fmt: skip
     """Advance the estimate by one sample interval; f (12, 19) becomes its slopes.
 
-    Those of the phase are secants to both sides. Where a limit or play makes the tail's rate jump,
+    And ``per_phase`` (F,) what the tail's states change with its phase, all along.
+
+    Slopes by the phase are secants to both sides. Where a limit or play makes the tail's rate jump,
     a tangent jumps whenever a corner passes a sample, and gains and likelihood jump with it.
     Source: Norgaard, Poulsen and Ravn (2000), Automatica 36, 1627.
     """
@@ -78,13 +83,14 @@ def slopes_of_interval(
             error[j, k] = PERTURB if k == j + 1 else 0.0
     error[PHASE_COLUMN, PHASE_COLUMN + 1] = TURN
     error[PHASE_COLUMN, N_ERROR + 1] = -TURN
-    move(work, width, error, late, history)
+    move(work, width, error, per_phase, late, history)
     for i in range(steps):
         start = begin + i * h
         set_commands(work, width, times, values, at, start, h, pace, skew, delay, True)
         begin_step(work, width, 1, path, i)
         step_lanes_once(work, start, h, pace, late, history, tables)
         keep_step(work, width, 1, pace, path, i)
+    secants_of_phase(work, width, per_phase)
     difference(work, width, gap)
     for j in range(N_MOVING):
         for k in range(N_ERROR):
@@ -107,7 +113,7 @@ def ekf_run(
     state0, swimming, par, pace_one, skew_one, delay_one, gain, bias, ages_one, lens_one, clock,
     substeps, times, values, measured, codes, noise_variance, smear, covariance0, wrench_variance,
     wrench_decay_s, phase_walk, reach, history_rows, known, tables, k_out, w_out, e_out, share_out,
-    x_out, d_out, f_out, h_out, raw_out,
+    turn_out, x_out, d_out, f_out, h_out, raw_out,
 ):  # fmt: skip
     """Extended Kalman filter over one run, relinearised at every sample.
 
@@ -142,6 +148,7 @@ def ekf_run(
         w_out: (T, C, C) whitening.
         e_out: (T, C) whitened innovations.
         share_out: (T,) share of the correction that was made.
+        turn_out: (T, F) change of the tail's states with its phase.
         x_out: (T, states) filtered states.
         d_out: (T, 6) filtered wrench.
         f_out: (T, 12, 19) slopes of the moving part over the interval before, or no rows.
@@ -164,9 +171,13 @@ def ekf_run(
     at = np.zeros(width, np.int64)
     for k in range(width):
         load_lane(work, width, k, state0, par, 0, values[0])
+    work[(X0 + PHASE) * width + PHASE_COLUMN + 1] += TURN
+    work[(X0 + PHASE) * width + N_ERROR + 1] -= TURN
     late = LATE_TAIL & (history_rows > 0)
     history = np.zeros((history_rows, width))
     start_effects(work, N_ERROR + 2, width, clock[0], swimming, pace, late, history, tables)
+    per_phase = np.zeros(TAIL_ROWS.shape[0])
+    secants_of_phase(work, width, per_phase)
     channels = codes.shape[0]
     p = widened(covariance0)
     scratch, turned, s, w, seen, k_gain = room(channels)
@@ -190,7 +201,7 @@ def ekf_run(
             carry(work, width, known, sample - 1, 1.0, 1)
             slopes_of_interval(
                 work, width, steps, h, begin, times, values, at,
-                pace, skew, delay, late, history, tables, error, gap, path, f,
+                pace, skew, delay, late, history, tables, error, per_phase, gap, path, f,
             )  # fmt: skip
             carry(work, width, known, sample - 1, -1.0, 1)
             keep = math.exp(-span / wrench_decay_s)
@@ -221,8 +232,9 @@ def ekf_run(
                 total += k_gain[j, i] * e[j, 0]
                 k_out[sample, i, j] = k_gain[j, i]
             error[i, 0] = total
-        move(work, width, error, late, history)
+        move(work, width, error, per_phase, late, history)
         w_out[sample] = w
+        turn_out[sample] = per_phase
         for j in range(N_STATES):
             x_out[sample, j] = work[(X0 + j) * width]
         for j in range(6):
@@ -245,8 +257,8 @@ def push(work, width, basis, sample, column, size, sign, first, count):
 
 @kernel
 def take_sample(
-    work, width, lanes, measured, codes, gain, bias, ages, h, steps, path, lens, k_in, w_in, e,
-    error, white, late, history,
+    work, width, lanes, measured, codes, gain, bias, ages, h, steps, path, lens, k_in, w_in,
+    turn_in, e, error, white, late, history,
 ):  # fmt: skip
     """Innovations of all lanes at one sample, whitened into white (C, width); states corrected."""
     channels = codes.shape[0]
@@ -265,14 +277,14 @@ def take_sample(
             factor = k_in[i, j]
             for k in range(lanes):
                 error[i, k] += factor * e[j, k]
-    move(work, width, error, late, history)
+    move(work, width, error, turn_in, late, history)
 
 
 @kernel
 def filter_block(
     states0, swimming, par, pace_all, skew_all, delay_all, gain_all, bias_all, ages_all, lens_all,
-    clock, substeps, times, values, measured, codes, k_in, w_in, wrench_decay_s, history_rows,
-    known, push_basis, push_column, push_size, tables, out, place, first, count,
+    clock, substeps, times, values, measured, codes, k_in, w_in, turn_in, wrench_decay_s,
+    history_rows, known, push_basis, push_column, push_size, tables, out, place, first, count,
 ):  # fmt: skip
     """Lanes first..first+count through a run with given gains (see :func:`filter_lanes`)."""
     width = BLOCK
@@ -328,7 +340,7 @@ def filter_block(
                 work[n] *= keep
         take_sample(
             work, width, lanes, measured[sample], codes, gain, bias, ages, h, steps, path, lens,
-            k_in[sample], w_in[sample], e, error, white, late, history,
+            k_in[sample], w_in[sample], turn_in[sample], e, error, white, late, history,
         )  # fmt: skip
         for k in range(count):
             for i in range(channels):
@@ -338,7 +350,7 @@ def filter_block(
 @entry_point
 def filter_lanes(
     states0, swimming, par, pace, skew, delay, gain, bias, ages, lens, clock, substeps, times,
-    values, measured, codes, k_in, w_in, wrench_decay_s, history_rows, known, push_basis,
+    values, measured, codes, k_in, w_in, turn_in, wrench_decay_s, history_rows, known, push_basis,
     push_column, push_size, tables, out, place, first, last,
 ):  # fmt: skip
     """Whitened innovations of many parameter sets on one run, with the gains of one of them.
@@ -362,6 +374,7 @@ def filter_lanes(
         codes: (C, 4) kind, index, column and device of each channel.
         k_in: (T, 19, C) gains.
         w_in: (T, C, C) whitening.
+        turn_in: (T, F) change of the tail's states with its phase; zero, or no columns, for none.
         wrench_decay_s: correlation time of the wrench.
         history_rows: room for late tail commands, 0 for none.
         known: (T, 6) known force and moment from each sample to the next, or no rows.
@@ -378,8 +391,8 @@ def filter_lanes(
     for block in range(first, last, BLOCK):
         filter_block(
             states0, swimming, par, pace, skew, delay, gain, bias, ages, lens, clock, substeps,
-            times, values, measured, codes, k_in, w_in, wrench_decay_s, history_rows, known,
-            push_basis, push_column, push_size, tables, out, place, block,
+            times, values, measured, codes, k_in, w_in, turn_in, wrench_decay_s, history_rows,
+            known, push_basis, push_column, push_size, tables, out, place, block,
             min(BLOCK, last - block),
         )  # fmt: skip
     return 0

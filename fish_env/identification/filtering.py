@@ -49,6 +49,7 @@ class Filtered:
         whitening: (T, C, C) inverse Cholesky factors of the innovations' covariances.
         innovations: (T, C) whitened.
         shares: (T,) share of its correction that each sample was allowed.
+        turns: (T, F) change of the tail's states with its phase; F may be 0.
         states: (T, states) filtered states.
         wrench: (T, 6) filtered disturbance, body frame (N, N m).
         log_likelihood: without its constant.
@@ -59,6 +60,7 @@ class Filtered:
     whitening: FloatArray
     innovations: FloatArray
     shares: FloatArray
+    turns: FloatArray
     states: FloatArray
     wrench: FloatArray
     log_likelihood: float
@@ -250,6 +252,7 @@ class RunFilter:
             k = np.zeros((samples, N_ERROR, channels))
             w = np.zeros((samples, channels, channels))
             e, share = np.zeros((samples, channels)), np.zeros(samples)
+            turns = np.zeros((samples, len(self.kernels.module.TAIL_ROWS)))
             x = np.zeros((samples, len(self.kernels.state_names)))
             d = np.zeros((samples, 6))
             rows = samples if keep_slopes else 0
@@ -264,10 +267,11 @@ class RunFilter:
                 data.corrected, self.codes, sensor_variance(noise, data), noise.jitter_sd * rates,
                 data.covariance0, noise.wrench_variance, noise.correlation_s, noise.phase_sd**2,
                 noise.phase_reach, self._history_rows(record, data), data.known_wrench,
-                self.model.tables, k, w, e, share, x, d, slopes.motion, slopes.channels, slopes.raw,
+                self.model.tables, k, w, e, share, turns, x, d,
+                slopes.motion, slopes.channels, slopes.raw,
             )  # fmt: skip
             kept = slopes if keep_slopes else None
-            return Filtered(k, w, e, share, x, d, float(value), kept)
+            return Filtered(k, w, e, share, turns, x, d, float(value), kept)
 
         return list(_threads().map(one, zip(self.runs, self.rates, strict=True)))
 
@@ -353,8 +357,8 @@ class RunFilter:
             entry(
                 state0, data.swimming, record, sensors.pace, sensors.skew, sensors.delay,
                 sensors.gain, sensors.bias, sensors.device_ages, sensors.lens, data.clock,
-                data.substeps, *data.driven,
-                data.corrected, self.codes, gains.gains, gains.whitening,
+                data.substeps, *data.driven, data.corrected, self.codes,
+                gains.gains, gains.whitening, gains.turns,
                 noise.correlation_s, self._history_rows(record, data), data.known_wrench, basis,
                 column, size, self.model.tables, out, place, first, last,
             )  # fmt: skip

@@ -51,6 +51,7 @@ def without_feedback(
         np.tile(units, (samples, 1, 1)),
         np.zeros((samples, channels)),
         np.ones(samples),
+        np.zeros((samples, 0)),
         np.zeros((samples, states)),
         np.zeros((samples, 6)),
         0.0,

@@ -67,6 +67,11 @@ class Composition:
         return [self.state_names.index(name) for name in names]
 
     @property
+    def tail_corners(self) -> list[bool]:
+        """Whether those rows are of effects that make the tail's rate jump."""
+        return [e.nonsmooth for e in self.effects for _ in e.states.get("tail", ())]
+
+    @property
     def tail_rates(self) -> list[bool]:
         """Whether those rows are rates of the tail (rad/s), as their names end, or angles (rad)."""
         return [self.state_names[row].endswith("rate") for row in self.tail_rows]

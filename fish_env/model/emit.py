@@ -43,6 +43,7 @@ class Emitter(LaneReader):
             f"N_TERMS = {len(self.composition.term_names)}\n"
             f"LATE_TAIL = {bool(self.composition.delays)}\n"
             f"TAIL_ROWS = np.array({self.composition.tail_rows}, np.int64)\n"
+            f"TAIL_CORNERS = np.array({self.composition.tail_corners}, np.bool_)\n"
             f"TAIL_RATES = np.array({self.composition.tail_rates}, np.bool_)\n"
             f"TAIL_MEMORIES = np.array({self.composition.tail_memories}, np.int64)\n"
             f"OWN_STEPS = {self.composition.own_steps}\n"

@@ -5,6 +5,7 @@ of the same day; what `--finished` sums up is written beside it:
 
     python scripts/benchmark_diagnosis.py --tiers rich,null --limit 20
     python scripts/benchmark_diagnosis.py --suite realistic
+    python scripts/benchmark_diagnosis.py --after results/diagnosis-2026-12-01.json
     python scripts/benchmark_diagnosis.py --suite realistic --ray --address auto
 
 With `--ray` the cases are tasks of a Ray cluster, and only this process writes.
@@ -13,11 +14,13 @@ With `--ray` the cases are tasks of a Ray cluster, and only this process writes.
 from __future__ import annotations
 
 import argparse
+import json
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +33,7 @@ os.environ.update(ONE_THREAD)
 from rich.progress import track  # noqa: E402
 
 from fish_env.cluster import ClusterSettings, Failed, Task, connected, run_tasks  # noqa: E402
-from scripts.results import RESULTS, commit, today, write_dated  # noqa: E402
+from scripts.results import RESULTS, commit, kept, today, write_dated  # noqa: E402
 from tests.hidden.suite import PIPELINE, SUITES, Job, do, jobs, keep, make  # noqa: E402
 
 
@@ -45,6 +48,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if options.fresh:
         for job in todo:
             job.file.unlink(missing_ok=True)
+    if options.after:
+        take_over(options.after, todo)
     if options.finished:
         todo = [job for job in todo if job.file.exists()]
     lost: list[str] = []
@@ -56,6 +61,22 @@ def main(arguments: Sequence[str] | None = None) -> None:
     write(rows, options)
 
 
+def take_over(result: Path, todo: list[Job]) -> None:
+    """Keep the cases of an earlier part of this run as finished ones.
+
+    Args:
+        result: what that part was summed up in.
+        todo: all cases of the run.
+    """
+    part = json.loads(result.read_text(encoding="utf-8"))
+    if part["commit"] != commit():
+        sys.exit(f"{result}: made at {part['commit']}, and this is {commit()}; check that out")
+    rows = {(row["tier"], row["seed"]): row for row in part["rows"]}
+    for job in todo:
+        if row := rows.get((job.tier, job.seed)):
+            kept(job.file, partial(dict, row=row))
+
+
 def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     add = parser.add_argument
@@ -65,6 +86,7 @@ def parse(arguments: Sequence[str] | None) -> argparse.Namespace:
     add("--seed0", type=int, default=0, help="number of the first case of each tier")
     add("--quick", action="store_true", help="let the diagnosis take its quick way")
     add("--finished", action="store_true", help="only sum up the cases finished so far")
+    add("--after", type=Path, help="result of an earlier part of this run, which goes on after it")
     add("--fresh", action="store_true", help="do finished cases again")
     add("--processes", type=int, default=2)
     add("--ray", action="store_true", help="run the cases as Ray tasks, see docs/cluster.md")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import importlib.util
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -373,22 +372,3 @@ def test_a_full_suite_holds_what_it_must():
         plans = [plan_of(tier, job.seed) for job in todo if job.tier == tier]
         for plan in DESIGNS.values():
             assert replace(plan, choices=PLANS[tier].choices) in plans
-
-
-def test_the_benchmark_goes_on_where_it_stopped(tmp_path, capsys):
-    spec = importlib.util.spec_from_file_location(
-        "benchmark_diagnosis", ROOT / "scripts" / "benchmark_diagnosis.py"
-    )
-    script = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(script)
-    options = ["--tiers", "poor,null", "--limit", "2", "--processes", "1"]
-    options += ["--work", str(tmp_path / "work"), "--out", str(tmp_path / "results")]
-    script.main([*options, "--diagnose", "tests.hidden.stubs:all_knowing"])
-    finished = {file: file.stat().st_mtime_ns for file in (tmp_path / "work/full").iterdir()}
-    script.main([*options, "--diagnose", "tests.hidden.stubs:not_there"])
-    assert {file: file.stat().st_mtime_ns for file in finished} == finished
-    (result,) = (tmp_path / "results").glob("diagnosis-*.json")
-    assert json.loads(result.read_text())["overall"]["name_right"]["count"] == 2
-    assert "100 %" in capsys.readouterr().out
-    script.main([*options, "--fresh", "--diagnose", "tests.hidden.stubs:not_there"])
-    assert json.loads(result.read_text())["overall"]["failed"]["count"] == 2

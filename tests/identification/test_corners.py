@@ -84,3 +84,22 @@ def test_it_does_not_matter_on_which_side_of_a_sample_a_command_jumps(follower):
     before, at, after = (value(offset) for offset in (-3e-5, 0.0, 3e-5))
     assert abs(before - at) < 0.2
     assert abs(after - at) < 0.2
+
+
+@pytest.mark.parametrize("follower", FOLLOWERS, ids=lambda follower: follower.effect)
+def test_lanes_of_a_tail_that_follows_repeat_its_filter(follower):
+    """Also just after jumps, where each lane's own rates would tell another story."""
+    values = {follower: FOLLOWERS[follower]}
+    problem = SeriesProblem(swum(follower, values[follower]), paths=PATHS)
+    noise = replace(Setup().noise, phase_sd=0.1)
+    point = Point(problem.start.z, {**problem.beginning([follower.effect]), **values})
+    (filtered,) = problem.filtered(point, noise)
+    lanes = {id: np.full(2, value) for id, value in point.effects.items()}
+    untold = replace(filtered, turns=filtered.turns[:, :0])
+    rows, astray = (
+        problem.innovations(np.zeros((len(PATHS), 2)), lanes, noise, [gains])
+        for gains in (filtered, untold)
+    )
+    for row in rows:
+        np.testing.assert_allclose(row, filtered.residuals, atol=1e-6)
+    assert np.abs(astray[0] - filtered.residuals).max() > 0.1

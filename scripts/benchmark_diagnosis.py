@@ -5,7 +5,7 @@ of the same day; what `--finished` sums up is written beside it:
 
     python scripts/benchmark_diagnosis.py --tiers rich,null --limit 20
     python scripts/benchmark_diagnosis.py --suite realistic
-    python scripts/benchmark_diagnosis.py --seed0 20000 --after results/parts/diagnosis-2026-12-01.json
+    python scripts/benchmark_diagnosis.py --seed0 20000 --after results/parts/FILE
     python scripts/benchmark_diagnosis.py --suite realistic --ray --address auto
 
 With `--ray` the cases are tasks of a Ray cluster, and only this process writes.

@@ -44,3 +44,15 @@ def in_earlier_rows(
         seen[:kept, own] = recorded[first : first + kept, own]
         seen[kept:, own] = np.nan
     return np.ascontiguousarray(seen)
+
+
+def moved_further(of_samples: FloatArray, devices: IntArray, further: IntArray) -> FloatArray:
+    """What belongs to samples (T, C), where these are moved again; the ends are repeated.
+
+    Args:
+        of_samples: in the rows where the samples are.
+        devices: (C,) device of each channel.
+        further: (devices,) by how many more rows the samples of each are moved to earlier ones.
+    """
+    rows = np.arange(len(of_samples))[:, None] + further[devices]
+    return np.take_along_axis(of_samples, np.clip(rows, 0, len(of_samples) - 1), axis=0)

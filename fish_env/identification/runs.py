@@ -10,7 +10,7 @@ import numpy as np
 
 from fish_env.arrays import BoolArray, FloatArray, IntArray
 from fish_env.identification.command_jumps import soon_after
-from fish_env.identification.late_rows import in_earlier_rows, rows_to_spare
+from fish_env.identification.late_rows import in_earlier_rows, moved_further, rows_to_spare
 from fish_env.identification.policy import IDENTIFICATION
 from fish_env.identification.state_blocks import PHASE_COLUMN
 from fish_env.identification.variation import (
@@ -171,10 +171,7 @@ class RunData:
         if np.array_equal(rows, self.moved):
             return of_samples
         assert self.devices is not None
-        places, own = np.arange(len(self.clock)), np.empty_like(of_samples)
-        for i, further in enumerate((rows - self.moved)[self.devices].tolist()):
-            own[:, i] = of_samples[np.clip(places + further, 0, len(places) - 1), i]
-        return own
+        return moved_further(of_samples, self.devices, rows - self.moved)
 
     def movable(self, channels: Sequence[str]) -> RunData:
         """The same run with rows that may be moved, where its samples are evenly spaced.

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from fish_env.data import CommandSteps, Dataset, Run
+from fish_env.identification.noise_model import NoiseModel
 from fish_env.identification.series import SeriesProblem
 from fish_env.identification.variation import VARIATIONS
 from fish_env.inference.hypotheses import EffectParameterId
@@ -63,6 +64,14 @@ def test_the_likelihood_follows_the_beat_smoothly(limit):
     assert np.std(values - cubic) < 0.01 * np.ptp(values)
 
 
+def following(follower: EffectParameterId) -> tuple[SeriesProblem, Point, NoiseModel]:
+    """A run of a tail that follows its command, at the truth, and noise that leaves its phase."""
+    values = {follower: FOLLOWERS[follower]}
+    problem = SeriesProblem(swum(follower, values[follower]), paths=PATHS)
+    point = Point(problem.start.z, {**problem.beginning([follower.effect]), **values})
+    return problem, point, replace(Setup().noise, phase_sd=0.1)
+
+
 @pytest.mark.parametrize("follower", FOLLOWERS, ids=lambda follower: follower.effect)
 def test_it_does_not_matter_on_which_side_of_a_sample_a_command_jumps(follower):
     """What follows the tail's phase follows that which it had before the jump, and not the jump.
@@ -70,10 +79,7 @@ def test_it_does_not_matter_on_which_side_of_a_sample_a_command_jumps(follower):
     Taken from its rate in time, which a jump makes fast, the likelihood leapt by thousands where
     clocks differ by nothing.
     """
-    effects = {follower: FOLLOWERS[follower]}
-    problem = SeriesProblem(swum(follower, effects[follower]), paths=PATHS)
-    noise = replace(Setup().noise, phase_sd=0.1)
-    point = Point(problem.start.z, {**problem.beginning([follower.effect]), **effects})
+    problem, point, noise = following(follower)
 
     def value(offset: float) -> float:
         numbers = np.zeros_like(problem.variation)
@@ -89,10 +95,7 @@ def test_it_does_not_matter_on_which_side_of_a_sample_a_command_jumps(follower):
 @pytest.mark.parametrize("follower", FOLLOWERS, ids=lambda follower: follower.effect)
 def test_lanes_of_a_tail_that_follows_repeat_its_filter(follower):
     """Also just after jumps, where each lane's own rates would tell another story."""
-    values = {follower: FOLLOWERS[follower]}
-    problem = SeriesProblem(swum(follower, values[follower]), paths=PATHS)
-    noise = replace(Setup().noise, phase_sd=0.1)
-    point = Point(problem.start.z, {**problem.beginning([follower.effect]), **values})
+    problem, point, noise = following(follower)
     (filtered,) = problem.filtered(point, noise)
     lanes = {id: np.full(2, value) for id, value in point.effects.items()}
     untold = replace(filtered, turns=filtered.turns[:, :0])

@@ -126,9 +126,9 @@ def without_insignificant(
         weakest = max(weak, key=lambda cause: over[cause])
         report(f"fitting without {name_of(weakest)}, which is not significant any more")
         foreseen = allowed_loss(own, weakest, float(np.exp(enough[weakest])))
-        smaller = without(current, (weakest,))
-        most = current.score + POLICY.evidence_doubt + foreseen
-        if smaller is None or smaller.score > most:
+        least = POLICY.evidence_doubt + foreseen
+        smaller = without(current, (weakest,), least)
+        if smaller is None or smaller.score > current.score + least:
             needed.add(weakest)
         else:
             current = smaller

@@ -197,7 +197,7 @@ def _told_apart(current: Explanation, first: Sequence[CauseId], shown: Screen) -
     """
     close = {s.cause for s in substitutes(current, shown) if s.cost < POLICY.evidence_doubt}
     doubtful = close - {*first}
-    smaller = without(current, doubtful) if doubtful else None
+    smaller = without(current, doubtful, POLICY.out_of_reach) if doubtful else None
     if smaller is None or smaller.score > current.score + POLICY.out_of_reach:
         return current
     return smaller

@@ -88,7 +88,9 @@ def refits(
         return [], None
     tried, noise = _best_first(found, None if settled else found[0])
     # A baseline that diverges under the smaller disturbance keeps the one that suits it.
-    return tried, Explanation(current.causes, at_noise(base.problem, base, noise, 2) or base)
+    beyond = tried[0].fit.objective + POLICY.out_of_reach
+    again = at_noise(base.problem, base, noise, 2, beyond) or base
+    return tried, Explanation(current.causes, again)
 
 
 def _all(tasks: Iterable[Callable[[], list[NamedCoarseFit]]]) -> list[NamedCoarseFit]:

@@ -97,6 +97,35 @@ def test_it_stops_where_the_steps_left_do_not_promise_enough(give_up_above, iter
     assert problem.count == counted
 
 
+@pytest.mark.parametrize(("gain", "counted"), [(1.0, 2), (24.0, 5)])
+def test_what_promised_more_than_it_kept_is_given_up(gain, counted):
+    """A step promises 25 each time. Four more lead below 60 only if they keep that."""
+    values = iter(125.0 - gain * np.arange(9.0))
+
+    def linearise(x, known):
+        return np.eye(1), np.array([-5.0])
+
+    def evaluate(x):
+        asked.append(x)
+        return next(values), None
+
+    asked = []
+    descend(np.zeros(1), evaluate, linearise, box([-99.0], [99.0]), 4, 0.1, 60.0)
+    assert len(asked) == counted
+
+
+def test_two_points_of_a_line_tell_where_slopes_miss_part_of_the_minimum():
+    """No damped step is tried there: what slopes promise leads nowhere."""
+    problem = Counted(lambda x: x, lambda x: np.eye(1))
+
+    def linearise(x, known):
+        return np.eye(1), np.array([-3.0])
+
+    found, _, _ = descend(np.zeros(1), problem.evaluate, linearise, box([-9.0], [9.0]), 5, 0.1)
+    assert found[0] == 0.0
+    assert problem.count == 3
+
+
 def test_a_start_without_an_objective_is_an_error():
     bounds = box([-1.0], [1.0])
     with pytest.raises(np.linalg.LinAlgError, match="diverges"):

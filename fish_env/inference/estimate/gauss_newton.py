@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from itertools import islice
 from typing import TypeVar
 
@@ -16,6 +16,8 @@ Quadratic = tuple[FloatArray, FloatArray]
 """Half a Hessian (n, n), positive definite, and half a gradient (n,)."""
 Linearise = Callable[[FloatArray, T], Quadratic]
 SHARES = (1.0, 0.5, 0.2)
+ON_A_LINE = 2
+"""Points beside its begin that tell what a line gains."""
 DAMPINGS = (0.1, 10.0)
 NEAR, SLIGHT = 1.0, 0.1
 """If the decrease predicted is below the first (in -2 log likelihood), a shortened step that gains
@@ -23,6 +25,9 @@ less than the second follows the objective's roughness."""
 AS_PROMISED = 0.75
 """Share of the predicted decrease that a step gains where the model is good (Nocedal and Wright,
 "Numerical Optimization", 2006, algorithm 4.1)."""
+LEAST_KEPT = 0.1
+"""Share of what the linear model foresees below which it is of no use: where there is a sharp
+corner, most of what is foreseen lies beyond it."""
 
 
 def descend(
@@ -47,7 +52,8 @@ def descend(
         tolerance: stop when no combination of parameters would move by more of its standard
             deviation, the objective being -2 log likelihood.
         give_up_above: stop when the objective would stay above this if every step that is left
-            gained the decrease predicted for the next one.
+            gained the decrease predicted for the next one, or the share of it that the last one
+            has kept.
         quickly: roughly the same as ``linearise``. Steps after one that gained what was predicted
             follow it; it ends no descent that the other would go on with.
 
@@ -61,15 +67,16 @@ def descend(
     value, known = evaluate(vector)
     if not np.isfinite(value):
         raise np.linalg.LinAlgError("the simulation diverges at the start of the fit")
-    left, exact = iterations, True
+    left, exact, share = iterations, True, 1.0
     while left:
         found = linearise if exact or quickly is None else quickly
         hessian, gradient = found(vector, known)
         whole = bounds.step(hessian, gradient, vector)
         predicted = predicted_decrease(hessian, gradient, whole)
-        if value - left * predicted > give_up_above:
+        if value - left * share * predicted > give_up_above:
             break
         before, tried = value, 0
+        lost: list[tuple[float, float]] = []
         most = 0 if predicted < tolerance**2 else _most_trials(exact, predicted)
         for trial in islice(_trials(hessian, gradient, vector, whole, bounds), most):
             tried += 1
@@ -77,7 +84,12 @@ def descend(
             if trial_value < value:
                 vector, value, known = trial, trial_value, trial_known
                 break
+            if tried <= ON_A_LINE:
+                lost.append((SHARES[tried - 1], trial_value - value))
+            if tried == ON_A_LINE and most_gained(lost) < SLIGHT:
+                break  # it is the minimum, but for what slopes leave out: how weights change
         gained = before - value
+        share = kept_of(gained, predicted)
         rough = tried > 1 and predicted < NEAR and gained < SLIGHT
         if exact and (rough or not gained):
             break
@@ -95,6 +107,32 @@ def predicted_decrease(hessian: FloatArray, gradient: FloatArray, step: FloatArr
     nothing.
     """
     return float(-2.0 * gradient @ step - step @ hessian @ step)
+
+
+def kept_of(gained: float, predicted: float) -> float:
+    """Share of a predicted decrease that a step has kept: what promised too much will do so again.
+
+    Args:
+        gained: decrease of the objective.
+        predicted: by the quadratic model.
+    """
+    return min(max(gained / predicted, LEAST_KEPT), 1.0) if predicted > 0.0 else 1.0
+
+
+def most_gained(lost: Sequence[tuple[float, float]]) -> float:
+    """The most that a line gains, by the parabola through its begin and two points.
+
+    Args:
+        lost: share of the way along it, and what the objective rises by, of each point.
+    """
+    if len(lost) < ON_A_LINE or not np.isfinite(lost).all():
+        return np.inf
+    (far, more), (near, less) = lost
+    curvature = (more / far - less / near) / (far - near)
+    slope = more / far - curvature * far
+    if curvature <= 0.0:
+        return np.inf
+    return slope**2 / (4.0 * curvature) if slope < 0.0 else 0.0
 
 
 def _most_trials(exact: bool, predicted: float) -> int | None:

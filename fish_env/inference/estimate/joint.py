@@ -18,7 +18,12 @@ import numpy as np
 
 from fish_env.arrays import FloatArray
 from fish_env.inference.estimate.free import Free
-from fish_env.inference.estimate.gauss_newton import AS_PROMISED
+from fish_env.inference.estimate.gauss_newton import (
+    AS_PROMISED,
+    LEAST_KEPT,
+    kept_of,
+    most_gained,
+)
 from fish_env.inference.estimate.joint_model import Joint, Model, evaluated
 from fish_env.inference.estimate.own_steps import ENOUGH, with_own_steps
 from fish_env.inference.estimate.run_variation import Marginal
@@ -30,9 +35,6 @@ TRIALS = ((0.0, 1.0), (0.0, 0.4), (0.03, 1.0), (0.3, 1.0), (3.0, 1.0), (30.0, 1.
 """Damping and share of the way: the whole step, then part of it, then damped ones (Marquardt, 1963,
 J. SIAM 11, 431)."""
 UNDAMPED = sum(damping == 0.0 for damping, _ in TRIALS)
-FORESEEN = 0.1
-"""Share of what the linear model foresees below which it is of no use: where one run has a sharp
-corner, most of what is foreseen lies beyond it."""
 
 
 def descend_jointly(
@@ -80,10 +82,9 @@ def descend_jointly(
         gained = 0.0 if better is None else at.value - better.value
         at = better or at
         del better  # an evaluation takes much memory
-        if exact and gained < max(ENOUGH, FORESEEN * predicted):
+        if exact and gained < max(ENOUGH, LEAST_KEPT * predicted):
             break
-        if predicted > 0.0:
-            kept = min(max(gained / predicted, FORESEEN), 1.0)
+        kept = kept_of(gained, predicted)
         nearly_linear = gained > 0.0 and gained >= AS_PROMISED * predicted
         left -= int(exact or nearly_linear)
         first = max(used - 1, 0)
@@ -182,24 +183,8 @@ def _better(model: Model, noise: Any, at: Joint, first: int) -> tuple[Joint | No
         elif best is not at:
             break
         lost.append((TRIALS[number][1], tried.value - at.value))
-        if best is at and number + 1 == UNDAMPED and _most_gained(lost) < ENOUGH:
+        if best is at and number + 1 == UNDAMPED and most_gained(lost) < ENOUGH:
             break  # it is the minimum, but for what slopes leave out: how gains change
-        if best is not at and not (model.exact and at.value - best.value < FORESEEN * foreseen):
+        if best is not at and not (model.exact and at.value - best.value < LEAST_KEPT * foreseen):
             break
     return (None if best is at else best), used
-
-
-def _most_gained(lost: Sequence[tuple[float, float]]) -> float:
-    """The most that a line gains, by the parabola through its begin and two points.
-
-    Args:
-        lost: share of the way along it, and what the objective rises by, of each point.
-    """
-    if len(lost) < 2 or not np.isfinite(lost).all():
-        return np.inf
-    (far, more), (near, less) = lost
-    curvature = (more / far - less / near) / (far - near)
-    slope = more / far - curvature * far
-    if curvature <= 0.0:
-        return np.inf
-    return slope**2 / (4.0 * curvature) if slope < 0.0 else 0.0

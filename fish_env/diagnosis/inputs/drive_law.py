@@ -111,9 +111,10 @@ def drive_law(dataset: Dataset) -> DriveLaw:
     rows, run_of = [], []
     for number, stroke in enumerate(strokes.values()):
         windows = windows_of(stroke, whole.value)
-        for window, peak in zip(windows, peaks_of(windows, whole.value)[1], strict=True):
+        every = [terms for own in windows for terms in own.terms]
+        for terms, peak in zip(every, peaks_of(windows, whole.value)[1], strict=True):
             if np.isfinite(peak[0]):
-                rows.append([*peak, *window.terms])
+                rows.append([*peak, *terms])
                 run_of.append(number)
     if len(rows) < 2 * (len(TERMS) + 1):
         return DriveLaw(whole.value)

@@ -8,6 +8,7 @@ nor how fast the hull answers matters.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
@@ -97,54 +98,54 @@ def stroke_of(run: GridRun, steps: CommandSteps) -> Stroke | None:
 
 
 @dataclass(frozen=True, eq=False)
-class Window:
-    """Samples of a stretch, what is slow in them taken off.
+class Windows:
+    """Stretches of a run whose samples lie alike, what is slow in them taken off.
 
     Attributes:
-        phase: (n,) commanded phase about its middle, rad.
-        amplitude: (n,) commanded amplitude over its mean.
+        phase: (w, n) commanded phase about its middle, rad.
+        amplitude: (w, n) commanded amplitude over its mean.
         slow: (n, k) orthonormal basis of what is slow.
-        sway: (n,) what is left of the channel.
-        rate: commanded frequency at its quickest, cycles a sample.
-        terms: (4,) mean of the stroke's.
+        sway: (w, n) what is left of the channel.
+        rate: (w,) commanded frequency at its quickest, cycles a sample.
+        terms: (w, 4) mean of the stroke's.
     """
 
     phase: FloatArray
     amplitude: FloatArray
     slow: FloatArray
     sway: FloatArray
-    rate: float
+    rate: FloatArray
     terms: FloatArray
 
 
-def windows_of(stroke: Stroke, multiple: float) -> list[Window]:
+def windows_of(stroke: Stroke, multiple: float) -> list[Windows]:
     """Windows of a run that suit sways at about a multiple of the commanded frequency."""
     beating = stroke.amplitude > 0.0
     if beating.sum() < 10:
         return []
     mean = float(stroke.phase[-1] - stroke.phase[0]) / (2.0 * np.pi * beating.sum())
     length = int(min(np.ceil(CYCLES / max(mean * multiple, 1e-6)), len(stroke.sway)))
-    made = []
+    usable = np.isfinite(stroke.sway) & beating
+    alike: dict[bytes, list[IntArray]] = {}
     for first in range(0, len(stroke.sway) - length + 1, length):
-        own = slice(first, first + length)
-        used = np.isfinite(stroke.sway[own]) & beating[own]
-        if used.sum() < max(12, 0.7 * length):
+        used = np.flatnonzero(usable[first : first + length])
+        if len(used) < max(12, 0.7 * length):
             continue
-        made.append(_window(stroke, np.arange(first, first + length)[used]))
-    return made
+        alike.setdefault((used - used[0]).tobytes(), []).append(first + used)
+    return [_windows(stroke, places, np.array(at)) for places, at in alike.items()]
 
 
-def _window(stroke: Stroke, at: IntArray) -> Window:
-    slow = _slow((at - at[0]).tobytes())
+def _windows(stroke: Stroke, places: bytes, at: IntArray) -> Windows:
+    """Windows at samples (w, n) of a run, which lie at the same places in each."""
+    slow = _slow(places)
     phase, amplitude, sway = stroke.phase[at], stroke.amplitude[at], stroke.sway[at]
-    rate = float(np.max(np.diff(phase) / np.diff(at))) / (2.0 * np.pi)
-    return Window(
-        phase - phase.mean(),
-        amplitude / amplitude.mean(),
+    return Windows(
+        phase - phase.mean(axis=1, keepdims=True),
+        amplitude / amplitude.mean(axis=1, keepdims=True),
         slow,
-        sway - slow @ (slow.T @ sway),
-        rate,
-        stroke.terms[at].mean(axis=0),
+        sway - (sway @ slow) @ slow.T,
+        np.max(np.diff(phase) / np.diff(at), axis=1) / (2.0 * np.pi),
+        stroke.terms[at].mean(axis=1),
     )
 
 
@@ -158,18 +159,23 @@ def _slow(places: bytes) -> FloatArray:
     return basis
 
 
-def explained(window: Window, multiples: FloatArray) -> FloatArray:
-    """Share of a window's sway at each multiple of the commanded frequency, (m,)."""
-    angle = multiples[:, None] * window.phase
-    share = np.zeros(len(multiples))
-    pair = [window.amplitude * f(angle) for f in (np.cos, np.sin)]
-    c, s = (a - (a @ window.slow) @ window.slow.T for a in pair)
-    cc, ss, cs = (np.einsum("mn,mn->m", *ab) for ab in ((c, c), (s, s), (c, s)))
-    c1, s1 = c @ window.sway, s @ window.sway
+def explained(windows: Iterable[Windows], multiples: FloatArray) -> FloatArray:
+    """Share of the sway at each multiple of the commanded frequency, (N, m), a row each window."""
+    none = np.zeros((0, len(multiples)))
+    return np.concatenate([none, *(_explained(own, multiples) for own in windows)])
+
+
+def _explained(own: Windows, multiples: FloatArray) -> FloatArray:
+    angle = multiples[:, None] * own.phase[:, None]
+    pair = [own.amplitude[:, None] * f(angle) for f in (np.cos, np.sin)]
+    c, s = (a - (a @ own.slow) @ own.slow.T for a in pair)
+    cc, ss, cs = (np.einsum("wmn,wmn->wm", *ab) for ab in ((c, c), (s, s), (c, s)))
+    c1, s1 = (np.einsum("wmn,wn->wm", a, own.sway) for a in (c, s))
     determinant = np.maximum(cc * ss - cs**2, 1e-12 * (cc * ss + 1e-300))
     gain = (ss * c1**2 - 2.0 * cs * c1 * s1 + cc * s1**2) / determinant
-    share = gain / max(float(window.sway @ window.sway), 1e-300)
-    seen = multiples * window.rate < NYQUIST
+    whole = np.einsum("wn,wn->w", own.sway, own.sway)
+    share = gain / np.maximum(whole, 1e-300)[:, None]
+    seen = multiples * own.rate[:, None] < NYQUIST
     result: FloatArray = np.where(seen, np.clip(share, 0.0, 1.0), 0.0)
     return result
 

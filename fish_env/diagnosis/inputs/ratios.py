@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fish_env.arrays import FloatArray
-from fish_env.diagnosis.inputs.orders import Stroke, Window, bands, explained, windows_of
+from fish_env.diagnosis.inputs.orders import Stroke, Windows, bands, explained, windows_of
 from fish_env.diagnosis.inputs.weighing import Weighed
 from fish_env.diagnosis.policy import CHECKS
 
@@ -41,7 +41,7 @@ def beat_ratio(strokes: Sequence[Stroke]) -> Ratio | None:
         windows = [w for stroke in strokes for w in windows_of(stroke, float(multiples[0]))]
         if not windows:
             continue
-        mean = np.mean([explained(w, multiples) for w in windows], axis=0)
+        mean = explained(windows, multiples).mean(axis=0)
         if mean.max() > share:
             best, share = float(multiples[np.argmax(mean)]), float(mean.max())
     if share < CHECKS.clear_sway:
@@ -56,7 +56,7 @@ def ratio_near(strokes: Sequence[Stroke], near: float = 1.0) -> Ratio | None:
     return found if found is not None and found.clear >= CHECKS.clear_sway else None
 
 
-def _refined(windows: Sequence[Window], near: float) -> Ratio:
+def _refined(windows: Sequence[Windows], near: float) -> Ratio:
     """Mean over windows of where each explains most, weighted by how clearly it does."""
     shares, found = peaks_of(windows, near)
     total = shares.mean(axis=0)
@@ -73,11 +73,11 @@ def _refined(windows: Sequence[Window], near: float) -> Ratio:
     return Ratio(mean, max(sd, 1e-4), float(total[centre]))
 
 
-def peaks_of(windows: Sequence[Window], near: float) -> tuple[FloatArray, FloatArray]:
+def peaks_of(windows: Sequence[Windows], near: float) -> tuple[FloatArray, FloatArray]:
     """Where each window explains most, close to a multiple of the commanded frequency.
 
     Args:
-        windows: N of them.
+        windows: N windows in all.
         near: the multiple.
 
     Returns:
@@ -85,8 +85,8 @@ def peaks_of(windows: Sequence[Window], near: float) -> tuple[FloatArray, FloatA
         share and its weight, NaN where no share is clear.
     """
     multiples = _around(near)
-    shares = np.array([explained(w, multiples) for w in windows]).reshape(-1, len(multiples))
-    found = np.full((len(windows), 2), np.nan)
+    shares = explained(windows, multiples)
+    found = np.full((len(shares), 2), np.nan)
     for share, peak in zip(shares, found, strict=True):
         at = int(np.argmax(share))
         if 0 < at < len(multiples) - 1 and share[at] > CHECKS.clear_sway:

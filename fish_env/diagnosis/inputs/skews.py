@@ -62,16 +62,14 @@ class Aligner:
 
     def left(self, pair: Pair, multiple: float = 1.0) -> float:
         """Mean log of what a multiple of the commanded beat leaves of the sway; 0 for nothing."""
-        left = [
-            1.01 - float(explained(window, np.array([multiple]))[0])
-            for stroke in self.strokes(pair)
-            for window in windows_of(stroke, multiple)
-        ]
-        return float(np.mean(np.log(left))) if left else 0.0
+        windows = [w for stroke in self.strokes(pair) for w in windows_of(stroke, multiple)]
+        left = 1.01 - explained(windows, np.array([multiple]))
+        return float(np.mean(np.log(left))) if len(left) else 0.0
 
     def windows(self, multiple: float = 1.0) -> int:
         """How many windows show the beat."""
-        return sum(len(windows_of(stroke, multiple)) for stroke in self.strokes((1.0, 0.0)))
+        windows = [w for s in self.strokes((1.0, 0.0)) for w in windows_of(s, multiple)]
+        return sum(len(own.sway) for own in windows)
 
 
 def near_skew(aligner: Aligner) -> Pair | None:

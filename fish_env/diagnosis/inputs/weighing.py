@@ -111,4 +111,5 @@ def left_by(stroke: Stroke | None) -> list[float]:
     """Share of the sway in each window that the commanded stroke leaves unexplained."""
     if stroke is None:
         return []
-    return [1.0 - float(explained(w, np.ones(1))[0]) for w in windows_of(stroke, 1.0)]
+    left: list[float] = (1.0 - explained(windows_of(stroke, 1.0), np.ones(1))[:, 0]).tolist()
+    return left

@@ -87,10 +87,17 @@ def refits(
     if not found:
         return [], None
     tried, noise = _best_first(found, None if settled else found[0])
-    # A baseline that diverges under the smaller disturbance keeps the one that suits it.
-    beyond = tried[0].fit.objective + POLICY.out_of_reach
-    again = at_noise(base.problem, base, noise, 2, beyond) or base
-    return tried, Explanation(current.causes, again)
+    return tried, _under(current, noise, tried[0].fit.objective)
+
+
+def _under(current: Explanation, noise: Any, best: float) -> Explanation:
+    """The present explanation under the noise that the best one leaves, as far as it comes near.
+
+    Where it diverges under the smaller disturbance, it keeps the one that suits it.
+    """
+    own = current.fit
+    again = at_noise(own.problem, own, noise, 2, best + POLICY.out_of_reach)
+    return Explanation(current.causes, again or own)
 
 
 def _all(tasks: Iterable[Callable[[], list[NamedCoarseFit]]]) -> list[NamedCoarseFit]:

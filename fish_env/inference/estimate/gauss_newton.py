@@ -75,19 +75,10 @@ def descend(
         predicted = predicted_decrease(hessian, gradient, whole)
         if value - left * share * predicted > give_up_above:
             break
-        before, tried = value, 0
-        lost: list[tuple[float, float]] = []
+        before = value
         most = 0 if predicted < tolerance**2 else _most_trials(exact, predicted)
-        for trial in islice(_trials(hessian, gradient, vector, whole, bounds), most):
-            tried += 1
-            trial_value, trial_known = evaluate(trial)
-            if trial_value < value:
-                vector, value, known = trial, trial_value, trial_known
-                break
-            if tried <= ON_A_LINE:
-                lost.append((SHARES[tried - 1], trial_value - value))
-            if tried == ON_A_LINE and most_gained(lost) < SLIGHT:
-                break  # it is the minimum, but for what slopes leave out: how weights change
+        trials = islice(_trials(hessian, gradient, vector, whole, bounds), most)
+        (vector, value, known), tried = _first_lower(trials, evaluate, (vector, value, known))
         gained = before - value
         share = kept_of(gained, predicted)
         rough = tried > 1 and predicted < NEAR and gained < SLIGHT
@@ -97,6 +88,32 @@ def descend(
         left -= int(exact or nearly_linear)
         exact = quickly is None or not nearly_linear
     return vector, value, known
+
+
+def _first_lower(
+    trials: Iterator[FloatArray],
+    evaluate: Callable[[FloatArray], tuple[float, T]],
+    begun: tuple[FloatArray, float, T],
+) -> tuple[tuple[FloatArray, float, T], int]:
+    """The first of some trials whose objective is lower, and how many were tried.
+
+    Args:
+        trials: vectors (n,), the first ones along a line by :data:`SHARES`.
+        evaluate: the objective at a vector, and what else was computed there.
+        begun: vector, objective and the rest where they begin, and stay if no trial is lower.
+    """
+    _, value, _ = begun
+    tried, lost = 0, list[tuple[float, float]]()
+    for trial in trials:
+        tried += 1
+        trial_value, trial_known = evaluate(trial)
+        if trial_value < value:
+            return (trial, trial_value, trial_known), tried
+        if tried <= ON_A_LINE:
+            lost.append((SHARES[tried - 1], trial_value - value))
+        if tried == ON_A_LINE and most_gained(lost) < SLIGHT:
+            break  # it is the minimum, but for what slopes leave out: how weights change
+    return begun, tried
 
 
 def predicted_decrease(hessian: FloatArray, gradient: FloatArray, step: FloatArray) -> float:

@@ -58,7 +58,7 @@ class ChecksPolicy(Numbers):
         uneven_ratios: spread over runs of ratios of beats from which runs differ.
         uneven_ratios_level: p-value of the spread over runs of ratios of beats from which runs
             differ.
-        one_clock_sd: standard errors within which a beat and a scale of angles are one clock.
+        one_clock_sd: standard errors from which a beat and a scale of angles are not one clock.
         clock_evidence: log likelihood by which the times of commands tell one clock from two.
         drive_law_level: p-value of a term of a law of the beat.
         certain_law_level: p-value of a law of the beat that is believed without a model of forces.

@@ -112,6 +112,20 @@ def test_a_tail_that_is_a_little_quick_is_no_wrong_clock():
     )
 
 
+def test_a_gain_of_gyros_that_is_not_the_beats_ratio_makes_no_clock_of_it():
+    """1.2 % beside a beat 1.5 % slow: two and a half standard errors apart, so neither is sure."""
+
+    def with_gain(run):
+        rates = {name: 1.0117 * run.channels[name] for name in "pqr"}
+        return replace(run, channels={**run.channels, **rates})
+
+    slow = spoilt(sensed(NINE, FIRST), command("tail_frequency", 1.0 / 0.985))
+    (fault,) = check_inputs(spoilt(slow, with_gain)).faults
+    assert fault.kind == "beat"
+    assert not fault.binds
+    assert any("clock" in line for line in fault.alternatives)
+
+
 def test_a_fish_that_knows_its_beat_makes_no_fault_of_it():
     good = sensed(NINE, FIRST)
     slow = spoilt(good, command("tail_frequency", 1.0 / 0.75))

@@ -115,11 +115,10 @@ def _clock_or_beat(
     if scale is None:
         return Fine(common, interval, p, (slow,), False)
     apart = abs(scale.value - (whole.value - 1.0)) / np.hypot(scale.error, whole.sd)
-    if not scale.found:
-        apart_enough = bool(apart >= CHECKS.one_clock_sd)
-        return Fine(common, interval, p, () if apart_enough else (slow,), apart_enough)
-    if apart > CHECKS.one_clock_sd:
-        return Fine(common, interval, p, (), False)
+    if not scale.found or apart > float(ndtri(POLICY.interval_ends[1])):
+        # Angles may grow by an error of their own: a scale that is not the beat's is no clock.
+        excluded = bool(apart >= CHECKS.one_clock_sd)
+        return Fine(common, interval, p, () if excluded else (slow,), excluded and not scale.found)
     changes = _one_clock_or_two(dataset, whole.value)
     return Fine(changes[0], interval, scale.p, tuple(changes[1:]), True)
 

@@ -53,7 +53,7 @@ def descend(
             deviation, the objective being -2 log likelihood.
         give_up_above: stop when the objective would stay above this if every step that is left
             gained the decrease predicted for the next one, or the share of it that the last one
-            has kept.
+            by new slopes has kept.
         quickly: roughly the same as ``linearise``. Steps after one that gained what was predicted
             follow it; it ends no descent that the other would go on with.
 
@@ -80,7 +80,8 @@ def descend(
         trials = islice(_trials(hessian, gradient, vector, whole, bounds), most)
         (vector, value, known), tried = _first_lower(trials, evaluate, (vector, value, known))
         gained = before - value
-        share = kept_of(gained, predicted)
+        if exact and tried:  # of kept slopes, and of steps too small to take, nothing follows
+            share = kept_of(gained, predicted)
         rough = tried > 1 and predicted < NEAR and gained < SLIGHT
         if exact and (rough or not gained):
             break

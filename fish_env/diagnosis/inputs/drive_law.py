@@ -110,7 +110,7 @@ def drive_law(dataset: Dataset) -> DriveLaw:
         return DriveLaw()
     rows, run_of = [], []
     for number, stroke in enumerate(strokes.values()):
-        windows = windows_of(stroke, whole.value)
+        windows = windows_of([stroke], whole.value)
         every = [terms for own in windows for terms in own.terms]
         for terms, peak in zip(every, peaks_of(windows, whole.value)[1], strict=True):
             if np.isfinite(peak[0]):

@@ -107,7 +107,8 @@ def _clock_or_beat(
 ) -> Fine:
     """Which of the two a common ratio is."""
     error = float(np.hypot(whole.sd, CHECKS.ratio_bias))
-    half = float(ndtri(POLICY.interval_ends[1])) * error
+    reach = float(ndtri(POLICY.interval_ends[1]))
+    half = reach * error
     p = float(2.0 * ndtr(-abs(whole.value - 1.0) / error))
     interval = (whole.value - half, whole.value + half)
     slow, common = clock(whole.value), beat({"": whole.value})
@@ -115,7 +116,7 @@ def _clock_or_beat(
     if scale is None:
         return Fine(common, interval, p, (slow,), False)
     apart = abs(scale.value - (whole.value - 1.0)) / np.hypot(scale.error, whole.sd)
-    if not scale.found or apart > float(ndtri(POLICY.interval_ends[1])):
+    if not scale.found or apart > reach:
         # Angles may grow by an error of their own: a scale that is not the beat's is no clock.
         excluded = bool(apart >= CHECKS.one_clock_sd)
         return Fine(common, interval, p, () if excluded else (slow,), excluded and not scale.found)

@@ -105,7 +105,7 @@ class Windows:
         phase: (w, n) commanded phase about its middle, rad.
         amplitude: (w, n) commanded amplitude over its mean.
         slow: (n, k) orthonormal basis of what is slow.
-        sway: (w, n) what is left of the channel.
+        sway: (w, n) residual of the channel.
         rate: (w,) commanded frequency at its quickest, cycles a sample.
         terms: (w, 4) mean of the stroke's.
     """
@@ -118,8 +118,12 @@ class Windows:
     terms: FloatArray
 
 
-def windows_of(stroke: Stroke, multiple: float) -> list[Windows]:
-    """Windows of a run that suit sways at about a multiple of the commanded frequency."""
+def windows_of(strokes: Iterable[Stroke], multiple: float) -> list[Windows]:
+    """Windows of runs that suit sways at about a multiple of the commanded frequency."""
+    return [own for stroke in strokes for own in _windows_of(stroke, multiple)]
+
+
+def _windows_of(stroke: Stroke, multiple: float) -> list[Windows]:
     beating = stroke.amplitude > 0.0
     if beating.sum() < 10:
         return []

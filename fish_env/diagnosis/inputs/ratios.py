@@ -38,7 +38,7 @@ def beat_ratio(strokes: Sequence[Stroke]) -> Ratio | None:
     """The multiple of the commanded frequency at which some runs sway; None if none is clear."""
     best, share = 1.0, 0.0
     for multiples in bands():
-        windows = [w for stroke in strokes for w in windows_of(stroke, float(multiples[0]))]
+        windows = windows_of(strokes, float(multiples[0]))
         if not windows:
             continue
         mean = explained(windows, multiples).mean(axis=0)
@@ -46,12 +46,12 @@ def beat_ratio(strokes: Sequence[Stroke]) -> Ratio | None:
             best, share = float(multiples[np.argmax(mean)]), float(mean.max())
     if share < CHECKS.clear_sway:
         return None
-    return _refined([w for s in strokes for w in windows_of(s, best)], best)
+    return _refined(windows_of(strokes, best), best)
 
 
 def ratio_near(strokes: Sequence[Stroke], near: float = 1.0) -> Ratio | None:
     """The same ratio, looked for close to where it is known to be."""
-    windows = [w for stroke in strokes for w in windows_of(stroke, near)]
+    windows = windows_of(strokes, near)
     found = _refined(windows, near) if windows else None
     return found if found is not None and found.clear >= CHECKS.clear_sway else None
 

@@ -62,14 +62,13 @@ class Aligner:
 
     def left(self, pair: Pair, multiple: float = 1.0) -> float:
         """Mean log of what a multiple of the commanded beat leaves of the sway; 0 for nothing."""
-        windows = [w for stroke in self.strokes(pair) for w in windows_of(stroke, multiple)]
+        windows = windows_of(self.strokes(pair), multiple)
         left = 1.01 - explained(windows, np.array([multiple]))
         return float(np.mean(np.log(left))) if len(left) else 0.0
 
     def windows(self, multiple: float = 1.0) -> int:
         """How many windows show the beat."""
-        windows = [w for s in self.strokes((1.0, 0.0)) for w in windows_of(s, multiple)]
-        return sum(len(own.sway) for own in windows)
+        return sum(len(own.sway) for own in windows_of(self.strokes((1.0, 0.0)), multiple))
 
 
 def near_skew(aligner: Aligner) -> Pair | None:

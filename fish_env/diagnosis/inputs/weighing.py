@@ -111,5 +111,5 @@ def left_by(stroke: Stroke | None) -> list[float]:
     """Share of the sway in each window that the commanded stroke leaves unexplained."""
     if stroke is None:
         return []
-    left: list[float] = (1.0 - explained(windows_of(stroke, 1.0), np.ones(1))[:, 0]).tolist()
+    left: list[float] = (1.0 - explained(windows_of([stroke], 1.0), np.ones(1))[:, 0]).tolist()
     return left

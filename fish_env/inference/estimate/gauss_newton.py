@@ -67,13 +67,13 @@ def descend(
     value, known = evaluate(vector)
     if not np.isfinite(value):
         raise np.linalg.LinAlgError("the simulation diverges at the start of the fit")
-    left, exact, share = iterations, True, 1.0
+    left, exact, kept = iterations, True, 1.0
     while left:
         found = linearise if exact or quickly is None else quickly
         hessian, gradient = found(vector, known)
         whole = bounds.step(hessian, gradient, vector)
         predicted = predicted_decrease(hessian, gradient, whole)
-        if value - left * share * predicted > give_up_above:
+        if value - left * kept * predicted > give_up_above:
             break
         before = value
         most = 0 if predicted < tolerance**2 else _most_trials(exact, predicted)
@@ -81,7 +81,7 @@ def descend(
         (vector, value, known), tried = _first_lower(trials, evaluate, (vector, value, known))
         gained = before - value
         if exact and tried:  # of kept slopes, and of steps too small to take, nothing follows
-            share = kept_of(gained, predicted)
+            kept = kept_of(gained, predicted)
         rough = tried > 1 and predicted < NEAR and gained < SLIGHT
         if exact and (rough or not gained):
             break

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
+import numba
 import numpy as np
 
 from fish_env.arrays import FloatArray
@@ -63,20 +64,21 @@ Foreign = Callable[[FloatArray], FloatArray]
 class Record(NamedTuple):
     """What the simulation computes with, in the order of :data:`PARAMETERS`."""
 
-    surge_drag: FloatArray | float
-    sway_drag: FloatArray | float
-    yaw_drag: FloatArray | float
-    thrust: FloatArray | float
-    rudder_lift: FloatArray | float
-    rudder_offset: FloatArray | float
-    walk_lever: FloatArray | float
-    north: FloatArray | float
-    east: FloatArray | float
+    surge_drag: float
+    sway_drag: float
+    yaw_drag: float
+    thrust: float
+    rudder_lift: float
+    rudder_offset: float
+    walk_lever: float
+    north: float
+    east: float
 
 
-def record_of(values: Values) -> Record:
-    """Coefficients and effect parameters, (N,) or numbers, as the simulation reads them."""
-    return Record(*(values[id] for id in PARAMETERS))
+def table_of(values: Values) -> FloatArray:
+    """Coefficients and effect parameters, (N,) or numbers, in the order of a record: (9, N)."""
+    rows = np.broadcast_arrays(*(values[id] for id in PARAMETERS))
+    return np.array([np.atleast_1d(row) for row in rows], dtype=float)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,43 +103,61 @@ class Runs:
         return Runs(self.clock, *own)
 
 
-def rates(
-    state: FloatArray, rudder: FloatArray, propeller: FloatArray, p: Record, push: FloatArray
-) -> FloatArray:
-    """Derivative of the state (R, 6, N): north, east, heading, surge, sway, yaw rate.
+@numba.njit(cache=True)
+def rates(x, rudder, propeller, p, push, out):
+    """Derivative of the state of one boat: north, east, heading, surge, sway, yaw rate.
 
     Args:
-        state: velocities are relative to the water, in body axes (x ahead, y to starboard).
-        rudder: (R, 1) commanded angle (rad).
-        propeller: (R, 1) revolutions per second.
-        p: coefficients and effect parameters.
-        push: (R, 3, N) force and moment of other origin.
+        x: (6,). Velocities are relative to the water, in body axes (x ahead, y to starboard).
+        rudder: commanded angle (rad).
+        propeller: revolutions per second.
+        p: record of coefficients and effect parameters.
+        push: (3,) force and moment of other origin.
+        out: (6,), written.
     """
-    _, _, heading, u, v, r = state.transpose(1, 0, 2)
+    heading, u, v, r = x[2], x[3], x[4], x[5]
     cos, sin = np.cos(heading), np.sin(heading)
-    thrust = p.thrust * propeller * np.abs(propeller)
+    thrust = p.thrust * propeller * abs(propeller)
     angle = np.sin(rudder + p.rudder_offset)
     side = -p.rudder_lift * u * (u * angle + v + STERN * r)
-    surge = thrust - p.surge_drag * np.abs(u) * u + SWAY * v * r + push[:, 0]
-    sway = side - p.sway_drag * v - SURGE * u * r + push[:, 1]
+    out[0] = cos * u - sin * v + p.north
+    out[1] = sin * u + cos * v + p.east
+    out[2] = r
+    out[3] = (thrust - p.surge_drag * abs(u) * u + SWAY * v * r + push[0]) / SURGE
+    out[4] = (side - p.sway_drag * v - SURGE * u * r + push[1]) / SWAY
     walk = p.walk_lever * thrust
-    yaw = STERN * side - p.yaw_drag * r + (SURGE - SWAY) * u * v + walk + push[:, 2]
-    north = cos * u - sin * v + p.north
-    east = sin * u + cos * v + p.east
-    return np.stack([north, east, r, surge / SURGE, sway / SWAY, yaw / YAW], axis=1)
+    out[5] = (STERN * side - p.yaw_drag * r + (SURGE - SWAY) * u * v + walk + push[2]) / YAW
 
 
-def step(
-    state: FloatArray, rudder: FloatArray, propeller: FloatArray, p: Record, push: FloatArray,
-    dt: float,
-) -> FloatArray:  # fmt: skip
-    """One RK4 step (s) with commands and push held."""
-    given = (rudder, propeller, p, push)
-    a = rates(state, *given)
-    b = rates(state + 0.5 * dt * a, *given)
-    c = rates(state + 0.5 * dt * b, *given)
-    d = rates(state + dt * c, *given)
-    return state + dt / 6.0 * (a + 2.0 * b + 2.0 * c + d)
+@numba.njit(cache=True)
+def step(state, rudder, propeller, table, push, dt):
+    """One RK4 step (s) of all boats with commands and push held, (R, 6, N).
+
+    Args:
+        state: (R, 6, N).
+        rudder: (R,) rad.
+        propeller: (R,) revolutions per second.
+        table: (9, N), or (9, 1) for the same boat in all lanes.
+        push: (R, 3, N), or (R, 3, 1).
+        dt: s.
+    """
+    after = np.empty_like(state)
+    a, b, c, d, x = np.empty(6), np.empty(6), np.empty(6), np.empty(6), np.empty(6)
+    for run in range(len(state)):
+        for lane in range(state.shape[2]):
+            own = table[:, lane % table.shape[1]]
+            p = Record(own[0], own[1], own[2], own[3], own[4], own[5], own[6], own[7], own[8])
+            given = (rudder[run], propeller[run], p, push[run, :, lane % push.shape[2]])
+            begin = state[run, :, lane]
+            rates(begin, *given, a)
+            for slope, part, following in ((a, 0.5, b), (b, 0.5, c), (c, 1.0, d)):
+                for i in range(6):
+                    x[i] = begin[i] + part * dt * slope[i]
+                rates(x, *given, following)
+            for i in range(6):
+                total = a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]
+                after[run, i, lane] = begin[i] + dt / 6.0 * total
+    return after
 
 
 def nothing(state: FloatArray) -> FloatArray:
@@ -171,15 +191,15 @@ def sail(
         Coefficient(path): mean * (1.0 + sd * rng.standard_normal())
         for path, (mean, sd, _) in COEFFICIENTS.items()
     }
-    p = record_of({**NEUTRAL, **drawn, **coefficients, **effects})
+    table = table_of({**NEUTRAL, **drawn, **coefficients, **effects})
     state = np.zeros((runs, 6, 1))
     state[:, 2, 0] = rng.uniform(-np.pi, np.pi, runs)
     state[:, 3, 0] = 0.0 if drifting else 1.2
     kicks = np.array([0.02, 0.02, 0.01]) * np.sqrt(0.25)
     states = [state]
     for k in range(1, len(clock)):
-        now = (rudder[:, [k - 1]], propeller[:, [k - 1]])
-        state = step(state, *now, p, foreign(state), 0.25)
+        now = (rudder[:, k - 1], propeller[:, k - 1])
+        state = step(state, *now, table, foreign(state), 0.25)
         state[:, 3:, 0] += kicks * rng.standard_normal((runs, 3))
         states.append(state)
     seen = np.array(states)[:, :, CHANNELS, 0].transpose(1, 0, 2)

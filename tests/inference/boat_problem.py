@@ -20,10 +20,9 @@ from tests.inference.boat import (
     EFFECTS,
     NEUTRAL,
     SENSOR_SD,
-    Record,
     Runs,
-    record_of,
     step,
+    table_of,
 )
 
 SEEN = list(CHANNELS)
@@ -142,7 +141,7 @@ class BoatProblem(Problem):
         """All runs under each of some noise models at once, as if they were more runs."""
         count, runs = self.run_count, self.runs
         many = runs.some(list(range(count)) * len(noises))
-        p = self._values(point.z[:, None], {k: np.array([v]) for k, v in point.effects.items()})
+        table = self._table(point.z[:, None], {k: np.array([v]) for k, v in point.effects.items()})
         dt = self.longest_step
         kicks = [[0.0, 0.0, 0.0, n.linear, n.linear, n.yaw] for n in noises for _ in range(count)]
         added = dt * np.einsum("ri,ij->rij", np.square(kicks), np.eye(6))
@@ -151,8 +150,8 @@ class BoatProblem(Problem):
         push = np.zeros((len(kicks), 3, 1))
         states, gains, whitening, errors = [state], [], [], []
         for k in range(1, len(runs.clock)):
-            given = (many.rudder[:, [k - 1]], many.propeller[:, [k - 1]])
-            moved = step(state[:, :, None] + nudged, *given, p, push, dt)
+            given = (many.rudder[:, k - 1], many.propeller[:, k - 1])
+            moved = step(state[:, :, None] + nudged, *given, table, push, dt)
             slope = (moved[:, :, 1:] - moved[:, :, [0]]) / SMALL
             covariance = slope @ covariance @ slope.transpose(0, 2, 1) + added
             shown = covariance[:, :, SEEN]
@@ -179,23 +178,23 @@ class BoatProblem(Problem):
         push: FloatArray | None = None,
     ) -> FloatArray:
         """Whitened residuals (N, D) with the gains of a filter, under a push (T, R, 3, N)."""
-        runs, p, dt = self.runs, self._values(z, effects), self.longest_step
+        runs, table, dt = self.runs, self._table(z, effects), self.longest_step
         gains = np.array([f.gains for f in filtered])
         whitening = np.array([f.whitening for f in filtered])
         state = np.repeat(self._start(runs)[0][:, :, None], z.shape[1], axis=2)
         none = np.zeros((self.run_count, 3, 1))
         residuals = np.empty((z.shape[1], self.run_count, len(runs.clock) - 1, len(SEEN)))
         for k in range(1, len(runs.clock)):
-            given = (runs.rudder[:, [k - 1]], runs.propeller[:, [k - 1]])
-            moved = step(state, *given, p, none if push is None else push[k - 1], dt)
+            given = (runs.rudder[:, k - 1], runs.propeller[:, k - 1])
+            moved = step(state, *given, table, none if push is None else push[k - 1], dt)
             error = runs.measured[:, k, :, None] - moved[:, SEEN]
             residuals[:, :, k - 1] = (whitening[:, k - 1] @ error).transpose(2, 0, 1)
             state = moved + gains[:, k - 1] @ error
         return residuals.reshape(len(residuals), -1)
 
-    def _values(self, z: FloatArray, effects: Mapping[EffectParameterId, FloatArray]) -> Record:
+    def _table(self, z: FloatArray, effects: Mapping[EffectParameterId, FloatArray]) -> FloatArray:
         coefficients = zip(self.baseline.ids, self.baseline.values(z), strict=True)
-        return record_of({**NEUTRAL, **dict(coefficients), **effects})
+        return table_of({**NEUTRAL, **dict(coefficients), **effects})
 
     def _start(self, runs: Runs) -> tuple[FloatArray, FloatArray]:
         """State (R, 6) as first measured, and its covariance (R, 6, 6)."""

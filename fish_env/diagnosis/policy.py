@@ -50,6 +50,9 @@ class ChecksPolicy(Numbers):
         gross_clock: logarithm of a ratio of angles to rates that no gain of a gyro makes.
         alike_beats: relative spread of ratios within which runs are taken to beat alike.
         largest_clock_offset_s: largest offset between two clocks that is looked for (s).
+        runs_for_rates: runs on which every rate of the commands' clock is tried.
+        promising_rates: rates of the commands' clock that are then tried on all runs.
+        rates_refined: the best of these, apart from each other, between which the beat decides.
         fewest_command_changes: changes of commands in a run that tell when they came.
         least_skew_gain: fall of the mean log of what the beat leaves for which a skew is tried.
         smallest_ratio_error: distance from one from which a ratio of beats or clocks is not one.
@@ -112,6 +115,9 @@ class ChecksPolicy(Numbers):
     gross_clock: float = number(0.1, 0.0, 1.0, BY_HAND)
     alike_beats: float = number(0.02, 0.0, 0.5, BY_HAND)
     largest_clock_offset_s: float = number(5.0, 0.0, 60.0, EFFORT)
+    runs_for_rates: int = number(3, 1, 100, EFFORT)
+    promising_rates: int = number(20, 1, 230, EFFORT)
+    rates_refined: int = number(3, 1, 20, EFFORT)
     fewest_command_changes: int = number(3, 1, 100, BY_HAND)
     least_skew_gain: float = number(0.1, 0.0, 5.0, BY_HAND)
     smallest_ratio_error: float = number(0.004, 0.0, 0.1, COUNTED)

@@ -46,6 +46,7 @@ QUICK = (
     (NINE, "commands exchanged"),
     (NINE, "clock 2.1"),
     (NINE, "clock of the measurements 0.5"),
+    (NINE, "clock of the measurements 2.1"),
     (NINE, "commands -0.4 s late"),
     (NINE, "beat 0.75"),
     (NINE, "beat 1.3 in one run"),

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from fish_env.data.schema import CommandSteps, Dataset, Run
 from fish_env.diagnosis.inputs.changes import Change
 from fish_env.diagnosis.inputs.clock_changes import skew
 from fish_env.diagnosis.inputs.orders import Stroke, explained, stroke_of, windows_of
-from fish_env.diagnosis.inputs.responses import BEAT_S, Simulated, simulate
+from fish_env.diagnosis.inputs.responses import BEAT_S, simulate
 from fish_env.diagnosis.policy import CHECKS
 from fish_env.identification.recorded import recorded
 from fish_env.rigidbody.gridded import GridRun, averaged, gridded, grown
@@ -20,10 +20,16 @@ from fish_env.simulator import Simulator
 
 SCALES = np.geomspace(0.18, 5.6, 230)
 """Rates of the commands' clock that are tried."""
+STEP = 0.01
+"""Relative step of the rates around which the beat decides."""
 SPACING_S = 0.2
 """s between the points at which answers are compared."""
 Pair = tuple[float, float]
 """Scale and offset (s) that put the times of the commands right."""
+Answers = dict[str, FloatArray]
+"""Averages by channel."""
+Moved = Callable[[float, int], tuple[Answers, Answers]]
+"""Rate and run -> what was measured, and what the nominal fish does, by one clock."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,26 +93,25 @@ def skews(aligner: Aligner, simulator: Simulator, near: Pair | None) -> list[Cha
         simulator: the nominal fish.
         near: where to look; anywhere if None.
     """
-    about = near or _anywhere(aligner, simulator)
-    if about is None:
-        return []
+    about = {True: [near], False: [near]} if near else _anywhere(aligner, simulator)
     found: list[Change] = []
-    # Either the clock of the measurements is right, or that of the commands.
-    for right in (True, False):
-        scale, offset = _refined(aligner, about, right)
+    for right, pairs in about.items():
+        _, (scale, offset) = min(_refined(aligner, pair, right) for pair in pairs)
         if abs(scale - 1.0) > CHECKS.smallest_ratio_error:
             value, shift = (scale, offset) if right else (1.0 / scale, offset / scale)
             found.append(skew(value, shift, of_commands=right))
-    found.append(skew(1.0, _refined(aligner, (1.0, about[1]), True, (1.0,))[1]))
+    if True in about:
+        begin = (1.0, about[True][0][1])
+        found.append(skew(1.0, _refined(aligner, begin, True, (1.0,))[1][1]))
     return found
 
 
 def _refined(
     aligner: Aligner, about: Pair, right: bool, factors: Sequence[float] | None = None
-) -> Pair:
-    """The best scale and offset around some, by the beat, on ever finer grids."""
+) -> tuple[float, Pair]:
+    """What the beat leaves at the best scale and offset around some, on ever finer grids."""
     best, worth = about, np.inf
-    for step, spacing in ((0.01, 0.2), (0.0025, 0.05)):
+    for step, spacing in ((STEP, 0.2), (STEP / 4.0, 0.05)):
         centre = best
         scales = factors or [centre[0] * (1.0 + step * i) for i in range(-3, 4)]
         for scale in scales:
@@ -114,68 +119,114 @@ def _refined(
                 left = aligner.left((scale, float(shift)), 1.0 if right else 1.0 / scale)
                 if left < worth - 1e-9:
                     best, worth = (scale, float(shift)), left
-    return best
+    return worth, best
 
 
-def _anywhere(aligner: Aligner, simulator: Simulator) -> Pair | None:
-    """Where the nominal fish, under commands moved in time, does what was measured."""
+def _anywhere(aligner: Aligner, simulator: Simulator) -> dict[bool, list[Pair]]:
+    """Where the nominal fish does what was measured, by whether the measurements' clock is right.
+
+    If it is, the fish swims under commands that are moved in time. If it is not, the fish swims as
+    commanded, and it is the measurements that are moved.
+    """
+    runs = range(len(aligner.runs))
     measured = [_answers(grid, grid.channels) for grid in aligner.grids]
-    best, worth = None, 0.0
-    for scale in SCALES:
-        swum = [
-            _simulated(aligner, simulator, i, (float(scale), 0.0)) for i in range(len(aligner.runs))
-        ]
-        scores, shifts = _by_shift(measured, swum)
+    swum = [_simulated(aligner, simulator, i, 1.0) for i in runs]
+
+    def moved_commands(scale: float, i: int) -> tuple[Answers, Answers]:
+        return measured[i], _simulated(aligner, simulator, i, scale)
+
+    def moved_samples(scale: float, i: int) -> tuple[Answers, Answers]:
+        grid = replace(aligner.grids[i], step_s=aligner.grids[i].step_s / scale)
+        return _answers(grid, grid.channels), swum[i]
+
+    commands = _best(aligner, moved_commands)
+    samples = [(scale, scale * shift) for scale, shift in _best(aligner, moved_samples)]
+    return {right: pairs for right, pairs in ((True, commands), (False, samples)) if pairs}
+
+
+def _best(aligner: Aligner, moved: Moved) -> list[Pair]:
+    """The best rates, and the times (s) by which measurements are later.
+
+    Every rate is tried on the runs with most commands, and the most promising ones on all. Where
+    commands change slowly, a rate can make up for an offset: several are left to the beat.
+    """
+
+    def scored(scale: float, runs: Sequence[int]) -> tuple[float, float]:
+        scores, shifts = _by_shift([moved(scale, i) for i in runs])
         at = int(np.argmin(scores))
-        if scores[at] < worth:
-            best, worth = (float(scale), float(shifts[at])), float(scores[at])
-    return best
+        return float(scores[at]), float(shifts[at])
+
+    every = range(len(aligner.runs))
+    telling = sorted(every, key=lambda i: -len(aligner.runs[i].commands.times_s))
+    telling = telling[: CHECKS.runs_for_rates]
+    found = {float(scale): scored(float(scale), telling) for scale in SCALES}
+    if len(telling) < len(every):
+        promising = sorted(found, key=lambda scale: found[scale])[: CHECKS.promising_rates]
+        found = {scale: scored(scale, every) for scale in promising}
+    apart: list[Pair] = []
+    for scale in sorted(found, key=lambda scale: found[scale]):
+        score, shift = found[scale]
+        near = any(abs(np.log(scale / other)) < 5.0 * STEP for other, _ in apart)
+        if score < 0.0 and not near and len(apart) < CHECKS.rates_refined:
+            apart.append((scale, shift))
+    return apart
 
 
-def _simulated(aligner: Aligner, simulator: Simulator, i: int, pair: Pair) -> dict[str, FloatArray]:
+def _simulated(aligner: Aligner, simulator: Simulator, i: int, scale: float) -> Answers:
+    """What the nominal fish answers to the commands of a run at another rate."""
     run, grid = aligner.runs[i], aligner.grids[i]
-    swum = simulate(simulator, grid, aligner.steps(run, pair), run.start == "rest")
+    swum = simulate(simulator, grid, aligner.steps(run, (scale, 0.0)), run.start == "rest")
     if swum is None:
         return {}
-    end = float(run.time_s[0]) + pair[0] * float(run.time_s[-1] - run.time_s[0])
     # What was commanded after the last row is not known.
-    late = grid.begin_s + grid.since_s > end
+    late = grid.since_s > scale * float(run.time_s[-1] - run.time_s[0])
     return _answers(grid, {name: np.where(late, np.nan, values) for name, values in swum.items()})
 
 
-def _answers(grid: GridRun, channels: Simulated | object) -> dict[str, FloatArray]:
+def _answers(grid: GridRun, channels: Mapping[str, FloatArray]) -> Answers:
     """Averages over a beat of what answers to commands, every `SPACING_S`."""
-    assert isinstance(channels, dict)
-    stride, every = grid.steps(BEAT_S), grid.steps(SPACING_S)
+    stride = grid.steps(BEAT_S)
     found = {}
     if "yaw" in channels and "yaw" in grid.channels:
         found["yaw"] = grown(channels["yaw"], stride)
     elif "r" in grid.channels:
         found["r"] = averaged(channels["r"], stride)
     if {"x", "y"} <= grid.channels.keys():
-        found["speed"] = np.hypot(*(grown(channels[name], stride) for name in "xy"))
+        found["speed"] = _varying(np.hypot(*(grown(channels[name], stride) for name in "xy")))
     elif "u" in grid.channels:
-        found["u"] = averaged(channels["u"], stride)
+        found["u"] = _varying(averaged(channels["u"], stride))
     for name in ("roll", "pitch"):
         if name in grid.channels:
-            values = averaged(channels[name], stride)
-            found[name] = values - np.nanmean(values) if np.isfinite(values).any() else values
+            found[name] = _varying(averaged(channels[name], stride))
     for name, angle in (("p", "roll"), ("q", "pitch")):
         if name in grid.channels and angle not in grid.channels:
             found[name] = averaged(channels[name], stride)
-    return {name: values[::every] for name, values in found.items()}
+    return {name: _spaced(values, grid.step_s) for name, values in found.items()}
 
 
-def _by_shift(
-    measured: Sequence[dict[str, FloatArray]], swum: Sequence[dict[str, FloatArray]]
-) -> tuple[FloatArray, FloatArray]:
-    """Score of every offset of the commands (low is good), and the offsets, s."""
+def _varying(values: FloatArray) -> FloatArray:
+    """Values less their mean, which does not tell when commands came."""
+    return values - np.nanmean(values) if np.isfinite(values).any() else values
+
+
+def _spaced(values: FloatArray, step_s: float) -> FloatArray:
+    """Values every step, interpolated every `SPACING_S`; NaN beside what is missing."""
+    if len(values) < 2:
+        return values
+    count = int(step_s * (len(values) - 1) / SPACING_S + 1e-6) + 1
+    at = SPACING_S / step_s * np.arange(count)
+    spaced: FloatArray = np.interp(at, np.arange(len(values)), values)
+    return spaced
+
+
+def _by_shift(pairs: Sequence[tuple[Answers, Answers]]) -> tuple[FloatArray, FloatArray]:
+    """Score of every time by which what was measured is later (low is good), and the times, s."""
     most = round(CHECKS.largest_clock_offset_s / SPACING_S)
     total = np.zeros(2 * most + 1)
-    for name in dict.fromkeys(name for answers in measured for name in answers):
+    for name in dict.fromkeys(name for measured, _ in pairs for name in measured):
         error, size, count = (np.zeros(2 * most + 1) for _ in range(3))
-        for m, g in zip(measured, swum, strict=True):
-            if name in m and name in g and len(m[name]) > 2:
+        for m, g in pairs:
+            if name in m and name in g and min(len(m[name]), len(g[name])) > 2:
                 cross, own, other, known = _correlated(m[name], g[name], most)
                 error += own + other - 2.0 * cross
                 size += own + other

@@ -26,6 +26,7 @@ from tests.diagnosis.mistakes import (
     column,
     command,
     found_by,
+    late,
     mistakes_of,
     sensed,
     times,
@@ -111,6 +112,19 @@ def test_a_tail_that_is_a_little_quick_is_no_wrong_clock():
         found.dataset.runs[0].commands
         == spoilt(good, command("tail_frequency", 1.0 / 1.05)).runs[0].commands
     )
+
+
+def test_late_commands_are_no_beats_that_differ():
+    """Each change of the commanded frequency shifts the phase by as much as another beat would."""
+    good = sensed(CAMERA, FIRST)
+    found = check_inputs(spoilt(good, late(0.3)))
+    (fault,) = (fault for fault in found.faults if fault.kind == "clock_offset")
+    assert fault.fix == "clock: {command_offset: -0.3}"
+    low, high = fault.interval
+    assert low < -0.3 < high
+    assert [line for line in fault.alternatives if line.startswith("runs: ")]
+    assert not fault.decisive
+    assert found.dataset.runs[0].commands == spoilt(good, late(0.3)).runs[0].commands
 
 
 def test_a_gain_of_gyros_that_is_not_the_beats_ratio_makes_no_clock_of_it():

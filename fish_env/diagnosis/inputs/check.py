@@ -274,5 +274,5 @@ def _fine_fault(fine: Fine) -> InputFault:
         change.kind, change.target, change.value, change.unit, fine.interval, fine.p, None,
         change.line, words, BEAT, None, None, tuple(rival.line for rival in fine.rivals),
         decisive=fine.sure and (uneven or is_clock or not ordinary),
-        binds=fine.sure and not ordinary, corrected=uneven or is_clock,
+        binds=fine.sure and not ordinary, corrected=uneven or (is_clock and fine.sure),
     )  # fmt: skip

@@ -16,8 +16,9 @@ from fish_env.data.schema import Dataset
 from fish_env.diagnosis.inputs.changes import Change
 from fish_env.diagnosis.inputs.clock_changes import beat, clock, skew
 from fish_env.diagnosis.inputs.clocks import strokes_of
+from fish_env.diagnosis.inputs.orders import Stroke
 from fish_env.diagnosis.inputs.ratios import Ratio, ratio_near
-from fish_env.diagnosis.inputs.skews import Aligner
+from fish_env.diagnosis.inputs.skews import Aligner, near_skew, offset_near
 from fish_env.diagnosis.policy import CHECKS
 from fish_env.identification.beats import beats_of, by_run
 from fish_env.identification.recorded import recorded
@@ -54,8 +55,7 @@ def fine_clock(dataset: Dataset, rng: np.random.Generator, beside_law: bool = Fa
         beside_law: whether a law says what the runs share: only their differences are looked for.
     """
     strokes = strokes_of(dataset)
-    single = {run: ratio_near([stroke]) for run, stroke in strokes.items()}
-    known = {run: ratio for run, ratio in single.items() if ratio is not None}
+    known = _ratios(strokes)
     p = _uneven(list(known.values()))
     if p is not None:
         ratios = _of_every_run(dataset, known)
@@ -65,11 +65,35 @@ def fine_clock(dataset: Dataset, rng: np.random.Generator, beside_law: bool = Fa
         change = beat(ratios)
         if beside_law:
             change = replace(change, words=f"beside that, {change.words}")
+        late = _late_commands(dataset, change)
+        if late is not None:
+            return late
         return Fine(change, (min(ratios.values()), max(ratios.values())), p, (), True)
     whole = None if beside_law else ratio_near(list(strokes.values()))
     if whole is None or not _off(whole):
         return None
     return _clock_or_beat(dataset, whole, rng)
+
+
+def _ratios(strokes: Mapping[str, Stroke]) -> dict[str, Ratio]:
+    """The ratio of each run that shows its beat."""
+    single = {run: ratio_near([stroke]) for run, stroke in strokes.items()}
+    return {run: ratio for run, ratio in single.items() if ratio is not None}
+
+
+def _late_commands(dataset: Dataset, uneven: Change) -> Fine | None:
+    """Commands at other times than they are logged, if beats are even then; None if they are not.
+
+    Each change of the commanded frequency then shifts the phase, which looks like another beat.
+    """
+    aligner = Aligner.of(dataset)
+    near = None if aligner is None else near_skew(aligner)
+    if aligner is None or near is None:
+        return None
+    shift, interval, p = offset_near(aligner, near[1])
+    if _uneven(list(_ratios(aligner.strokes((1.0, shift))).values())) is not None:
+        return None
+    return Fine(skew(1.0, shift), interval, p, (uneven,), False)
 
 
 def _of_every_run(dataset: Dataset, known: Mapping[str, Ratio]) -> dict[str, float]:

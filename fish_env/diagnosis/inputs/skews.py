@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import ndtri
 
 from fish_env.arrays import FloatArray
 from fish_env.data.schema import CommandSteps, Dataset, Run
@@ -15,6 +16,7 @@ from fish_env.diagnosis.inputs.orders import Stroke, explained, stroke_of, windo
 from fish_env.diagnosis.inputs.responses import BEAT_S, simulate
 from fish_env.diagnosis.policy import CHECKS
 from fish_env.identification.recorded import recorded
+from fish_env.inference.policy import POLICY
 from fish_env.rigidbody.gridded import GridRun, averaged, gridded, grown
 from fish_env.simulator import Simulator
 
@@ -24,6 +26,8 @@ STEP = 0.01
 """Relative step of the rates around which the beat decides."""
 SPACING_S = 0.2
 """s between the points at which answers are compared."""
+FINE_S = 0.01
+"""s between the offsets of which an interval consists."""
 Pair = tuple[float, float]
 """Scale and offset (s) that put the times of the commands right."""
 Answers = dict[str, FloatArray]
@@ -58,23 +62,23 @@ class Aligner:
         times = begin + pair[0] * (run.commands.times_s - begin) + pair[1]
         return CommandSteps(times, run.commands.values)
 
-    def strokes(self, pair: Pair) -> list[Stroke]:
-        """Commanded strokes of all runs at other times."""
-        found = [
-            stroke_of(grid, self.steps(run, pair))
+    def strokes(self, pair: Pair) -> dict[str, Stroke]:
+        """Commanded strokes at other times, by the id of the run, of runs that show them."""
+        found = {
+            run.id: stroke_of(grid, self.steps(run, pair))
             for grid, run in zip(self.grids, self.runs, strict=True)
-        ]
-        return [stroke for stroke in found if stroke is not None]
+        }
+        return {run: stroke for run, stroke in found.items() if stroke is not None}
 
     def left(self, pair: Pair, multiple: float = 1.0) -> float:
         """Mean log of what a multiple of the commanded beat leaves of the sway; 0 for nothing."""
-        windows = windows_of(self.strokes(pair), multiple)
+        windows = windows_of(self.strokes(pair).values(), multiple)
         left = 1.01 - explained(windows, np.array([multiple]))
         return float(np.mean(np.log(left))) if len(left) else 0.0
 
     def windows(self, multiple: float = 1.0) -> int:
         """How many windows show the beat."""
-        return sum(len(own.sway) for own in windows_of(self.strokes((1.0, 0.0)), multiple))
+        return sum(len(own.sway) for own in windows_of(self.strokes((1.0, 0.0)).values(), multiple))
 
 
 def near_skew(aligner: Aligner) -> Pair | None:
@@ -120,6 +124,20 @@ def _refined(
                 if left < worth - 1e-9:
                     best, worth = (scale, float(shift)), left
     return worth, best
+
+
+def offset_near(aligner: Aligner, near_s: float) -> tuple[float, tuple[float, float], float]:
+    """The offset of the commands close to some (s), its 95 % interval, and p of there being none.
+
+    A window counts as one number, however many samples it has: they are not independent.
+    """
+    _, (_, best) = _refined(aligner, (1.0, near_s), True, (1.0,))
+    shifts = best + np.append(FINE_S * np.arange(-30, 31), -best)
+    left = np.array([aligner.left((1.0, float(shift))) for shift in shifts])
+    evidence = 0.5 * aligner.windows() * (left - left.min())
+    within = shifts[evidence < 0.5 * ndtri(POLICY.interval_ends[1]) ** 2]
+    p = float(min(1.0, CHECKS.clocks_tried * np.exp(-evidence[-1])))
+    return best, (float(within.min()), float(within.max())), p
 
 
 def _anywhere(aligner: Aligner, simulator: Simulator) -> dict[bool, list[Pair]]:

@@ -8,7 +8,6 @@ from math import isfinite
 from typing import Any, Protocol
 
 import numpy as np
-from scipy.special import ndtri
 
 from fish_env.arrays import FloatArray
 from fish_env.diagnosis.gain import Gain, Pair
@@ -184,7 +183,7 @@ def residual_entry(model: ResidualModel | None) -> Plain | None:
 
 
 def _term(term: Term) -> Plain:
-    half = float(ndtri(POLICY.interval_ends[1])) * term.error
+    half = POLICY.interval_reach * term.error
     return {
         "direction": term.direction,
         "depends_on": term.function,

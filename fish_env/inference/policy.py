@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import ndtri
 
 from fish_env.inference.policy_numbers import AKAIKE, BY_HAND, EFFORT, FISHER, Numbers, number
 
@@ -250,6 +251,11 @@ class DecisionPolicy(Numbers):
     def interval_ends(self) -> tuple[float, float]:
         """Quantiles at the two ends of an interval."""
         return 0.5 * self.interval_error, 1.0 - 0.5 * self.interval_error
+
+    @property
+    def interval_reach(self) -> float:
+        """Standard errors from a normal estimate to either end of its interval."""
+        return float(ndtri(self.interval_ends[1]))
 
 
 POLICY = DecisionPolicy()

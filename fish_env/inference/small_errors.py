@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.special import ndtri
 
 from fish_env.arrays import FloatArray
 from fish_env.inference.changes import residual_changes
@@ -97,7 +96,7 @@ class SmallErrors:
         unknown = np.linalg.inv(self.information + np.eye(len(self.names)) / self.share**2)
         likeliest = unknown @ self.score
         spread = moved @ (unknown + np.outer(likeliest, likeliest)) @ moved.T
-        further = ndtri(POLICY.interval_ends[1]) * np.sqrt(np.diag(spread))
+        further = POLICY.interval_reach * np.sqrt(np.diag(spread))
         profiles = {}
         for id, value, more in zip(fit.ids, fit.estimates, further, strict=True):
             if id in fit.profiles:

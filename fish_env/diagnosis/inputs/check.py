@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from scipy.special import ndtri
 
 from fish_env.data.retiming import Clocks, retimed
 from fish_env.data.schema import Dataset
@@ -258,7 +257,7 @@ def _interval(change: Change, right: Dataset) -> tuple[float, float] | None:
     if left is None:
         return None
     error = float(np.hypot(left.sd, CHECKS.ratio_bias))
-    half = float(ndtri(POLICY.interval_ends[1])) * error
+    half = POLICY.interval_reach * error
     return change.value * (1.0 - half), change.value * (1.0 + half)
 
 

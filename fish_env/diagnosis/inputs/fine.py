@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import chdtrc, ndtr, ndtri
+from scipy.special import chdtrc, ndtr
 
 from fish_env.data.schema import Dataset
 from fish_env.diagnosis.inputs.changes import Change
@@ -131,7 +131,7 @@ def _clock_or_beat(
 ) -> Fine:
     """Which of the two a common ratio is."""
     error = float(np.hypot(whole.sd, CHECKS.ratio_bias))
-    reach = float(ndtri(POLICY.interval_ends[1]))
+    reach = POLICY.interval_reach
     half = reach * error
     p = float(2.0 * ndtr(-abs(whole.value - 1.0) / error))
     interval = (whole.value - half, whole.value + half)

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import ndtri
 
 from fish_env.arrays import FloatArray
 from fish_env.data.schema import CommandSteps, Dataset, Run
@@ -135,7 +134,7 @@ def offset_near(aligner: Aligner, near_s: float) -> tuple[float, tuple[float, fl
     shifts = best + np.append(FINE_S * np.arange(-30, 31), -best)
     left = np.array([aligner.left((1.0, float(shift))) for shift in shifts])
     evidence = 0.5 * aligner.windows() * (left - left.min())
-    within = shifts[evidence < 0.5 * ndtri(POLICY.interval_ends[1]) ** 2]
+    within = shifts[evidence < 0.5 * POLICY.interval_reach**2]
     p = float(min(1.0, CHECKS.clocks_tried * np.exp(-evidence[-1])))
     return best, (float(within.min()), float(within.max())), p
 
@@ -165,8 +164,7 @@ def _anywhere(aligner: Aligner, simulator: Simulator) -> dict[bool, list[Pair]]:
 def _best(aligner: Aligner, moved: Moved) -> list[Pair]:
     """The best rates, and the times (s) by which measurements are later.
 
-    Every rate is tried on the runs with most commands, and the most promising ones on all. Where
-    commands change slowly, a rate can make up for an offset: several are left to the beat.
+    Every rate is tried on the runs with most commands, and the most promising ones on all.
     """
 
     def scored(scale: float, runs: Sequence[int]) -> tuple[float, float]:
@@ -181,6 +179,17 @@ def _best(aligner: Aligner, moved: Moved) -> list[Pair]:
     if len(telling) < len(every):
         promising = sorted(found, key=lambda scale: found[scale])[: CHECKS.promising_rates]
         found = {scale: scored(scale, every) for scale in promising}
+    return _apart(found)
+
+
+def _apart(found: Mapping[float, tuple[float, float]]) -> list[Pair]:
+    """The best rates that differ by more than the beat is asked about.
+
+    Where commands change slowly, a rate can make up for an offset, and scores decide too little.
+
+    Args:
+        found: score and time (s) of each rate.
+    """
     apart: list[Pair] = []
     for scale in sorted(found, key=lambda scale: found[scale]):
         score, shift = found[scale]

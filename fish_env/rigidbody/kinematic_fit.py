@@ -10,7 +10,7 @@ the largest of all settings of all relations together.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +19,7 @@ from scipy.linalg import solveh_banded
 from fish_env.arrays import FloatArray, IntArray
 from fish_env.rigidbody.kinematics import Increments, Prepared, Relation
 from fish_env.rigidbody.policy import RECORDINGS
-from fish_env.rigidbody.recording import Recording
+from fish_env.rigidbody.recording import RecordedRun, Recording
 
 WINDOWS_S = (3.0, 6.0, 12.0)
 """Lengths of window that are tried until the scores of neighbours are independent."""
@@ -126,6 +126,7 @@ def fit_relation(
         return Tested(*about, 0, WINDOWS_S[0], (), float("nan"))
     values, scores, length = fitted
     errors, largest = _resampled(scores, rng, draws)
+    errors = np.maximum(errors, _unresolved(recording, relation, noise, values))
     critical = float(np.quantile(largest, 1.0 - RECORDINGS.consistency_level / sharing))
     estimates = []
     for setting, value, error in zip(relation.settings, values, errors, strict=True):
@@ -142,17 +143,10 @@ def _fit(
     recording: Recording, relation: Relation, noise: Mapping[str, float]
 ) -> tuple[FloatArray, Scores, float] | None:
     """Settings, scores there, and the length of the windows; None with too few windows."""
-    values, small = np.zeros(len(relation.settings)), np.array([s.size for s in relation.settings])
     prepared = [run for run in map(relation.prepared, recording.runs) if run is not None]
-    for _ in range(ROUNDS):
-        linear = [_linearised(run, relation, values) for run in prepared]
-        scores = _scores(linear, relation, values, noise, WINDOWS_S[0])
-        if len(scores.score) < RECORDINGS.fewest_consistency_windows:
-            return None
-        step = np.linalg.lstsq(scores.curvature.sum(0), scores.score.sum(0), rcond=None)[0]
-        values = values + step
-        if np.all(np.abs(step) < 0.01 * small):
-            break
+    values = _settled(prepared, relation, noise)
+    if values is None:
+        return None
     chosen = WINDOWS_S[0]
     linear = [_linearised(run, relation, values) for run in prepared]
     for length in WINDOWS_S:
@@ -163,6 +157,43 @@ def _fit(
         if not _neighbours_correlated(scores):
             break
     return values, scores, chosen
+
+
+def _settled(
+    prepared: Sequence[Prepared], relation: Relation, noise: Mapping[str, float]
+) -> FloatArray | None:
+    """Settings by Gauss-Newton; None with too few windows."""
+    values, small = np.zeros(len(relation.settings)), np.array([s.size for s in relation.settings])
+    for _ in range(ROUNDS):
+        linear = [_linearised(run, relation, values) for run in prepared]
+        scores = _scores(linear, relation, values, noise, WINDOWS_S[0])
+        if len(scores.score) < RECORDINGS.fewest_consistency_windows:
+            return None
+        step = np.linalg.lstsq(scores.curvature.sum(0), scores.score.sum(0), rcond=None)[0]
+        values = values + step
+        if np.all(np.abs(step) < 0.01 * small):
+            break
+    return values
+
+
+def _unresolved(
+    recording: Recording, relation: Relation, noise: Mapping[str, float], values: FloatArray
+) -> FloatArray:
+    """What every other sample of the inputs would change in the settings.
+
+    A spline knows nothing of motion that is quicker than the samples. Where that matters, it
+    matters more on half of them.
+    """
+    runs = [relation.prepared(_thinned(run, relation.inputs)) for run in recording.runs]
+    coarse = _settled([run for run in runs if run is not None], relation, noise)
+    return np.zeros(len(values)) if coarse is None else np.abs(coarse - values)
+
+
+def _thinned(run: RecordedRun, names: Sequence[str]) -> RecordedRun:
+    """A run in which every other sample of some channels is missing."""
+    even = np.arange(len(run.time_s)) % 2 == 0
+    thin = {name: np.where(even, run.channels[name], np.nan) for name in names}
+    return replace(run, channels={**run.channels, **thin})
 
 
 def _linearised(run: Prepared, relation: Relation, values: FloatArray) -> Linear:

@@ -20,8 +20,19 @@ COMMANDS = CommandSteps(np.zeros(1), np.array([[0.0, 0.4, 1.5, 0.0, 0.0]]))
 Channels = dict[str, np.ndarray]
 
 
-def motion(rng: np.random.Generator, seconds: float) -> Callable[[np.ndarray], Channels]:
-    """True channels at any times of one random motion."""
+SHAKE_HZ = 11.0
+
+
+def motion(
+    rng: np.random.Generator, seconds: float, shake: float = 0.0
+) -> Callable[[np.ndarray], Channels]:
+    """True channels at any times of one random motion.
+
+    Args:
+        rng: draws the motion.
+        seconds: its duration.
+        shake: yaw rate of a quick shaking (rad/s), at `SHAKE_HZ`.
+    """
     sizes = np.array([[0.06, 0.25], [0.05, 0.3], [0.12, 0.5]])
     pace = np.array([1.5, 0.13]) * rng.uniform(0.8, 1.2, (3, 2)) * 2 * np.pi
     phase = rng.uniform(0, 2 * np.pi, (3, 2))
@@ -33,6 +44,9 @@ def motion(rng: np.random.Generator, seconds: float) -> Callable[[np.ndarray], C
         euler, rate = (sizes * np.sin(wave)).sum(2), (sizes * pace * np.cos(wave)).sum(2)
         euler[:, 2] += drift * t
         rate[:, 2] += drift
+        quick = 2 * np.pi * SHAKE_HZ
+        euler[:, 2] += shake / quick * np.sin(quick * t)
+        rate[:, 2] += shake * np.cos(quick * t)
         return euler, np.linalg.solve(euler_rates(euler), rate[:, :, None])[:, :, 0]
 
     def speed(t):
@@ -76,13 +90,14 @@ def measured(
     gain: Mapping[str, float] | None = None,
     bias: Mapping[str, float] | None = None,
     start: str = "unknown",
+    shake: float = 0.0,
 ) -> Dataset:
     """A dataset of random motions as imperfect sensors see it."""
     rng = np.random.default_rng(seed)
     time = np.arange(round(seconds * rate)) / rate
     made = []
     for number in range(runs):
-        at = motion(rng, seconds)
+        at = motion(rng, seconds, shake)
         seen = {}
         for name in channels:
             true = at(np.maximum(time * clock - (late or {}).get(name, 0.0), 0.0))[name]

@@ -114,6 +114,15 @@ def test_the_smallest_detectable_size_is_found_about_four_times_in_five():
     assert 0.5 < np.mean(found) < 0.99
 
 
+def test_motion_that_is_too_quick_for_the_samples_contradicts_nothing():
+    """A spline through samples at 25 Hz misses part of a shaking at 11 Hz, at 100 Hz hardly any."""
+    found = estimates(checked(rate=25.0, shake=0.5))["attitude.scale"]
+    assert abs(found.value) > 0.01
+    assert not found.found
+    often = estimates(checked(rate=100.0, shake=0.5))["attitude.scale"]
+    assert abs(often.value) < 3.0 * often.error < 0.01
+
+
 def test_a_camera_alone_says_little_and_says_so():
     found = checked(channels=("x", "y", "z", "yaw"), rate=15.0)
     assert found.tested == ()

@@ -143,7 +143,7 @@ def _fit(
     recording: Recording, relation: Relation, noise: Mapping[str, float]
 ) -> tuple[FloatArray, Scores, float] | None:
     """Settings, scores there, and the length of the windows; None with too few windows."""
-    prepared = [run for run in map(relation.prepared, recording.runs) if run is not None]
+    prepared = _prepared(recording.runs, relation)
     values = _settled(prepared, relation, noise)
     if values is None:
         return None
@@ -157,6 +157,11 @@ def _fit(
         if not _neighbours_correlated(scores):
             break
     return values, scores, chosen
+
+
+def _prepared(runs: Sequence[RecordedRun], relation: Relation) -> list[Prepared]:
+    """Runs read for a relation, of those with samples to compare."""
+    return [run for run in map(relation.prepared, runs) if run is not None]
 
 
 def _settled(
@@ -184,8 +189,8 @@ def _unresolved(
     A spline knows nothing of motion that is quicker than the samples. Where that matters, it
     matters more on half of them.
     """
-    runs = [relation.prepared(_thinned(run, relation.inputs)) for run in recording.runs]
-    coarse = _settled([run for run in runs if run is not None], relation, noise)
+    thinned = [_thinned(run, relation.inputs) for run in recording.runs]
+    coarse = _settled(_prepared(thinned, relation), relation, noise)
     return np.zeros(len(values)) if coarse is None else np.abs(coarse - values)
 
 

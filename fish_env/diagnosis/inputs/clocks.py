@@ -14,7 +14,7 @@ import numpy as np
 from fish_env.data.schema import Dataset
 from fish_env.diagnosis.inputs.changes import Change
 from fish_env.diagnosis.inputs.clock_changes import beat, clock
-from fish_env.diagnosis.inputs.orders import Stroke, stroke_of
+from fish_env.diagnosis.inputs.orders import Stroke, strokes_under
 from fish_env.diagnosis.inputs.ratios import beat_ratio, clock_ratio
 from fish_env.diagnosis.inputs.skews import Aligner, near_skew, skews
 from fish_env.diagnosis.inputs.weighing import Scales, Weighed
@@ -25,9 +25,7 @@ from fish_env.rigidbody.gridded import gridded
 
 def strokes_of(dataset: Dataset) -> dict[str, Stroke]:
     """The strokes of all runs that have a channel which sways."""
-    pairs = zip(gridded(recorded(dataset)), dataset.runs, strict=True)
-    every = {run.id: stroke_of(grid, run.commands) for grid, run in pairs}
-    return {run: stroke for run, stroke in every.items() if stroke is not None}
+    return strokes_under(gridded(recorded(dataset)), [run.commands for run in dataset.runs])
 
 
 def changes_of_clocks(dataset: Dataset, scales: Scales, now: Weighed) -> list[Change]:

@@ -97,6 +97,12 @@ def stroke_of(run: GridRun, steps: CommandSteps) -> Stroke | None:
     return Stroke(2.0 * np.pi * cycles, amplitude, run.channels[channel], run.step_s, terms)
 
 
+def strokes_under(runs: Iterable[GridRun], steps: Iterable[CommandSteps]) -> dict[str, Stroke]:
+    """Strokes under the commands of each run, by its id, of runs with a channel that shows them."""
+    every = {run.id: stroke_of(run, own) for run, own in zip(runs, steps, strict=True)}
+    return {run: stroke for run, stroke in every.items() if stroke is not None}
+
+
 @dataclass(frozen=True, eq=False)
 class Windows:
     """Stretches of a run whose samples lie alike, what is slow in them taken off.

@@ -11,7 +11,7 @@ from fish_env.arrays import FloatArray
 from fish_env.data.schema import CommandSteps, Dataset, Run
 from fish_env.diagnosis.inputs.changes import Change
 from fish_env.diagnosis.inputs.clock_changes import skew
-from fish_env.diagnosis.inputs.orders import Stroke, explained, stroke_of, windows_of
+from fish_env.diagnosis.inputs.orders import Stroke, explained, strokes_under, windows_of
 from fish_env.diagnosis.inputs.responses import BEAT_S, simulate
 from fish_env.diagnosis.policy import CHECKS
 from fish_env.identification.recorded import recorded
@@ -63,11 +63,7 @@ class Aligner:
 
     def strokes(self, pair: Pair) -> dict[str, Stroke]:
         """Commanded strokes at other times, by the id of the run, of runs that show them."""
-        found = {
-            run.id: stroke_of(grid, self.steps(run, pair))
-            for grid, run in zip(self.grids, self.runs, strict=True)
-        }
-        return {run: stroke for run, stroke in found.items() if stroke is not None}
+        return strokes_under(self.grids, [self.steps(run, pair) for run in self.runs])
 
     def left(self, pair: Pair, multiple: float = 1.0) -> float:
         """Mean log of what a multiple of the commanded beat leaves of the sway; 0 for nothing."""
@@ -105,7 +101,8 @@ def skews(aligner: Aligner, simulator: Simulator, near: Pair | None) -> list[Cha
             found.append(skew(value, shift, of_commands=right))
     if True in about:
         begin = (1.0, about[True][0][1])
-        found.append(skew(1.0, _refined(aligner, begin, True, (1.0,))[1][1]))
+        _, (_, offset) = _refined(aligner, begin, True, (1.0,))
+        found.append(skew(1.0, offset))
     return found
 
 
@@ -131,11 +128,11 @@ def offset_near(aligner: Aligner, near_s: float) -> tuple[float, tuple[float, fl
     A window counts as one number, however many samples it has: they are not independent.
     """
     _, (_, best) = _refined(aligner, (1.0, near_s), True, (1.0,))
-    shifts = best + np.append(FINE_S * np.arange(-30, 31), -best)
+    shifts, count = best + FINE_S * np.arange(-30, 31), aligner.windows()
     left = np.array([aligner.left((1.0, float(shift))) for shift in shifts])
-    evidence = 0.5 * aligner.windows() * (left - left.min())
-    within = shifts[evidence < 0.5 * POLICY.interval_reach**2]
-    p = float(min(1.0, CHECKS.clocks_tried * np.exp(-evidence[-1])))
+    within = shifts[count * (left - left.min()) < POLICY.interval_reach**2]
+    gain = 0.5 * count * (aligner.left((1.0, 0.0)) - left.min())
+    p = float(min(1.0, CHECKS.clocks_tried * np.exp(-gain)))
     return best, (float(within.min()), float(within.max())), p
 
 

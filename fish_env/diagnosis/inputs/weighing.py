@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fish_env.data.schema import CommandSteps, Dataset, Run
-from fish_env.diagnosis.inputs.orders import Stroke, explained, stroke_of, windows_of
+from fish_env.diagnosis.inputs.orders import Stroke, explained, strokes_under, windows_of
 from fish_env.diagnosis.inputs.responses import STEP_S, Simulated, responses, simulate
 from fish_env.diagnosis.policy import CHECKS
 from fish_env.identification.recorded import recorded
@@ -88,10 +88,10 @@ class Scales:
     def weigh(self, dataset: Dataset) -> Weighed:
         """Every comparison that the channels of a dataset allow."""
         runs = gridded(recorded(dataset))
-        pairs = list(zip(runs, dataset.runs, strict=True))
-        swum = [self._swum(grid, run) for grid, run in pairs]
+        swum = [self._swum(grid, run) for grid, run in zip(runs, dataset.runs, strict=True)]
         found = [*links(runs), *responses(runs, swum)]
-        beats = {run.id: left_by(stroke_of(grid, run.commands)) for grid, run in pairs}
+        strokes = strokes_under(runs, [run.commands for run in dataset.runs])
+        beats = {run: left_by(stroke) for run, stroke in strokes.items()}
         return Weighed(
             {c.name: c for c in found}, {run: left for run, left in beats.items() if left}
         )
@@ -107,9 +107,7 @@ class Scales:
         return self._known[key][1]
 
 
-def left_by(stroke: Stroke | None) -> list[float]:
+def left_by(stroke: Stroke) -> list[float]:
     """Share of the sway in each window that the commanded stroke leaves unexplained."""
-    if stroke is None:
-        return []
     left: list[float] = (1.0 - explained(windows_of([stroke], 1.0), np.ones(1))[:, 0]).tolist()
     return left
